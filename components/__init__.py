@@ -1,0 +1,1 @@
+"""What is simulated: equations only. No FMI, no files, no clocks."""

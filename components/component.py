@@ -1,0 +1,220 @@
+"""What every block is: declared variables, a start, a step and an output.
+
+    x_0     = initialize(u, p)
+    x_{k+1} = step(x_k, u_k, p, t_k, h)
+    y_k     = output(x_k, u_k, p, t_k)
+
+All three are CasADi functions on flat columns; `Variable` says what each entry is.
+A *continuous* block (a plant) puts out y at the end of its step. A *sampled* block (a
+controller, an observer) started at t_k with the inputs of t_k puts out y_k, stamped t_k
+and valid on [t_k, t_k + h).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import casadi as ca
+
+Timing = Literal["continuous", "sampled"]
+Variability = Literal["fixed", "tunable"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A named scalar, vector or matrix signal; flat storage is row by row.
+
+    unit is an SI unit as FMI writes it ("m", "N.m", "rad/s", "1/kg"; "1" has none);
+    start one value for all entries or one for each; variability is for parameters.
+    """
+
+    name: str
+    shape: tuple[int, ...] = ()
+    unit: str | tuple[str, ...] = "1"
+    start: float | tuple[float, ...] = 0.0
+    description: str = ""
+    variability: Variability = "tunable"
+
+    @property
+    def size(self) -> int:
+        return math.prod(self.shape)
+
+    @property
+    def starts(self) -> tuple[float, ...]:
+        if isinstance(self.start, tuple):
+            if len(self.start) != self.size:
+                raise ValueError(f"`{self.name}`: {len(self.start)} start values for {self.size}")
+            return self.start
+        return (float(self.start),) * self.size
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """One unit an entry; a tuple of a row's length repeats for every row."""
+        row = self.unit if isinstance(self.unit, tuple) else (self.unit,)
+        if not self.size:
+            return ()
+        if self.size % len(row):
+            raise ValueError(f"`{self.name}`: {len(row)} units do not fit {self.size} entries")
+        return row * (self.size // len(row))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """FMI 2 structured names, 1-based: `F`, `x[1]`, `Lambda_inv[2,3]`."""
+        if len(self.shape) == 0:
+            return (self.name,)
+        if len(self.shape) == 1:
+            return tuple(f"{self.name}[{i + 1}]" for i in range(self.shape[0]))
+        rows, columns = self.shape
+        return tuple(f"{self.name}[{i + 1},{j + 1}]" for i in range(rows) for j in range(columns))
+
+
+POSE = ("m", "m", "rad")
+TWIST = ("m/s", "m/s", "rad/s")
+ACCELERATION = ("m/s2", "m/s2", "rad/s2")
+WRENCH = ("N", "N", "N.m")
+INERTIA = ("kg", "kg", "kg.m", "kg", "kg", "kg.m", "kg.m", "kg.m", "kg.m2")
+MOBILITY = ("1/kg", "1/kg", "1/(kg.m)") * 2 + ("1/(kg.m)", "1/(kg.m)", "1/(kg.m2)")
+
+
+class Signals(Mapping[str, ca.SX]):
+    """Symbols for a list of variables, by name and as one flat column `.vector`."""
+
+    def __init__(self, prefix: str, variables: Iterable[Variable]) -> None:
+        self.variables = tuple(variables)
+        self.vector = ca.SX.sym(prefix, sum(v.size for v in self.variables))
+        self._by_name: dict[str, ca.SX] = {}
+        offset = 0
+        for v in self.variables:
+            if v.name in self._by_name:
+                raise ValueError(f"`{v.name}` is declared twice")
+            flat = self.vector[offset : offset + v.size]
+            if len(v.shape) == 2:
+                flat = ca.reshape(flat, v.shape[1], v.shape[0]).T
+            self._by_name[v.name] = flat
+            offset += v.size
+
+    def __getitem__(self, name: str) -> ca.SX:
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self._by_name)
+
+
+def pack(variables: Iterable[Variable], values: Mapping[str, ca.SX]) -> ca.SX:
+    """The flat column of `values`, in the order and shapes of `variables`.
+
+    Raises ValueError where a name is missing, unknown or of another shape.
+    """
+    variables = tuple(variables)
+    unknown = set(values) - {v.name for v in variables}
+    missing = {v.name for v in variables} - set(values)
+    if unknown or missing:
+        raise ValueError(f"values: missing {sorted(missing)}, unknown {sorted(unknown)}")
+    columns = []
+    for v in variables:
+        value = ca.SX(values[v.name])
+        shape = (*v.shape, 1, 1)[:2]
+        if value.shape != shape:
+            raise ValueError(f"`{v.name}`: value of shape {value.shape}, declared {shape}")
+        columns.append(ca.vec(value.T) if len(v.shape) == 2 else ca.vec(value))
+    return ca.densify(ca.vertcat(*columns)) if columns else ca.SX(0, 1)
+
+
+@dataclass(frozen=True)
+class Component:
+    """An immutable block. `step` is called `substeps` times for each communication step."""
+
+    name: str
+    description: str
+    timing: Timing
+    inputs: tuple[Variable, ...]
+    parameters: tuple[Variable, ...]
+    states: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    initialize: ca.Function
+    step: ca.Function
+    output: ca.Function
+    substeps: int = 1
+    documentation: str = ""
+
+    @cached_property
+    def start_parameters(self) -> tuple[float, ...]:
+        return tuple(s for v in self.parameters for s in v.starts)
+
+    @cached_property
+    def start_inputs(self) -> tuple[float, ...]:
+        return tuple(s for v in self.inputs for s in v.starts)
+
+
+class Block:
+    """Symbols of a block under construction; `component` closes it into a `Component`."""
+
+    def __init__(
+        self,
+        *,
+        inputs: Iterable[Variable] = (),
+        parameters: Iterable[Variable] = (),
+        states: Iterable[Variable] = (),
+        outputs: Iterable[Variable] = (),
+    ) -> None:
+        self.u = Signals("u", inputs)
+        self.p = Signals("p", parameters)
+        self.x = Signals("x", states)
+        self.outputs = tuple(outputs)
+        self.t = ca.SX.sym("t")
+        self.h = ca.SX.sym("h")
+
+    def ode(self, derivative: Mapping[str, ca.SX]) -> ca.Function:
+        """(x, u, p, t) -> dx/dt, for an integrator."""
+        xdot = pack(self.x.variables, derivative)
+        arguments = [self.x.vector, self.u.vector, self.p.vector, self.t]
+        return ca.Function("ode", arguments, [xdot], ["x", "u", "p", "t"], ["xdot"])
+
+    def component(
+        self,
+        name: str,
+        description: str,
+        timing: Timing,
+        *,
+        initial: Mapping[str, ca.SX],
+        step: Mapping[str, ca.SX] | ca.SX,
+        output: Mapping[str, ca.SX],
+        substeps: int = 1,
+        documentation: str = "",
+    ) -> Component:
+        """step and output are expressions in this block's symbols; initial in u and p only."""
+        x, u, p, t, h = self.x.vector, self.u.vector, self.p.vector, self.t, self.h
+        x1 = pack(self.x.variables, step) if isinstance(step, Mapping) else ca.densify(step)
+        options = {"cse": True}
+        return Component(
+            name=name,
+            description=description,
+            timing=timing,
+            inputs=self.u.variables,
+            parameters=self.p.variables,
+            states=self.x.variables,
+            outputs=self.outputs,
+            initialize=ca.Function(
+                "initialize", [u, p], [pack(self.x.variables, initial)], ["u", "p"], ["x0"], options
+            ),
+            step=ca.Function(
+                "step", [x, u, p, t, h], [x1], ["x", "u", "p", "t", "h"], ["x1"], options
+            ),
+            output=ca.Function(
+                "output",
+                [x, u, p, t],
+                [pack(self.outputs, output)],
+                ["x", "u", "p", "t"],
+                ["y"],
+                options,
+            ),
+            substeps=substeps,
+            documentation=documentation,
+        )

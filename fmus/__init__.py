@@ -1,0 +1,1 @@
+"""How a component becomes an FMU, and how that FMU is checked."""

@@ -1,0 +1,1 @@
+"""How FMUs run together: scenes, rates, holds, coupling, results, commands."""
