@@ -109,12 +109,15 @@ class GraphicsCopy:
     """The graphics-rate copy and the PD graphics controller that pulls it.
 
     stiffness K_g (N/m, N/m, N.m/rad) and damping B_g as section B.6 prints them. sync
-    "operational" pulls the operational pose (the report), "joint" every joint coordinate.
+    "operational" pulls the operational pose (the report), "joint" every joint coordinate, as
+    an acceleration joint_stiffness (1/s2) times the error and joint_damping (1/s) its rate.
     """
 
     sync: Literal["operational", "joint"] = "operational"
     stiffness: Vector3 = (1000.0, 1000.0, 10000.0)
     damping: Vector3 = (100.0, 100.0, 10000.0)
+    joint_stiffness: float = 1e4
+    joint_damping: float = 200.0
     substeps: int = 20
 
 

@@ -1,0 +1,158 @@
+"""The virtual environment (the report's graphics block): a copy of the linkage at graphics rate.
+
+A PD graphics controller pulls the copy to the haptic mechanism (section 4.2.2). With the
+report's gains, B_g on an inertia of about 0.002 kg.m2 is stiff far beyond any explicit step of
+10 to 60 Hz, so the pull is integrated linearly implicitly (h substep, velocity terms explicit):
+
+    (D + h J'B_g J + h^2 J'K_g J) qd+
+        = D qd + h (J'(K_g (x_ref - x) + B_g v_ref) - C qd + W' lambda)
+    W qd+ = 0,   q+ = q + h qd+, then projected on the closures
+
+It computes what the haptic side is too busy for: Lambda^-1 (B.13), the projector on the resisted
+directions (in place of B.14) and their number, and whether it is on the mechanism's branch.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from hapticlink.components import branch, resisted
+from hapticlink.components.assembly import assemble, require_closed
+from hapticlink.components.closure import ClosedLoopSolver
+from hapticlink.components.component import POSE, TWIST, Block, Component, Variable
+from hapticlink.components.linkage import LinkageModel, coordinate_units, coordinates, parameters
+from hapticlink.components.mechanism import (
+    direction_outputs,
+    direction_parameters,
+    start_parameters,
+)
+from hapticlink.components.operational_space import OperationalSpace
+from hapticlink.components.projection import project
+from hapticlink.components.specs import Directions, GraphicsCopy, Linkage
+
+
+def virtual_environment(linkage: Linkage, copy: GraphicsCopy, directions: Directions) -> Component:
+    """The FMU `virtual_environment`. Raises AssemblyError where a loop does not close."""
+    joint_sync = copy.sync == "joint"
+    units = coordinate_units(linkage)
+    rates = tuple(f"{u}/s" for u in units)
+    n = len(units)
+    inputs = [
+        Variable("x_ref", (3,), POSE, description="pose of the mechanism's operational point"),
+        Variable("v_ref", (3,), TWIST, description="its velocity"),
+    ]
+    if joint_sync or linkage.loop:
+        inputs.append(Variable("q_ref", (n,), units, description="the mechanism's coordinates"))
+    if joint_sync:
+        inputs = inputs[2:]
+        inputs.append(Variable("qd_ref", (n,), rates, description="the mechanism's joint rates"))
+    block = Block(
+        inputs=inputs,
+        parameters=[
+            *parameters(linkage),
+            *start_parameters(linkage),
+            *_gains(copy),
+            *direction_parameters(linkage, directions),
+        ],
+        states=[Variable("q", (n,), units), Variable("qd", (n,), rates), Variable("n_resisted")],
+        outputs=_outputs(linkage, units),
+    )
+    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
+    S = resisted.scaling(block.p["length_scale"])
+    resistance = (block.p["rank_tolerance"], block.p["hysteresis"])
+
+    q1, qd1 = _pulled(block, model, joint_sync)
+    scaled = ca.Function(
+        "scaled", [model.q, block.p.vector], [S @ OperationalSpace(model).Lambda_inv @ S]
+    )
+    after, _ = resisted.eigen(scaled(q1, block.p.vector))
+    q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
+    first, _ = resisted.eigen(scaled(q0, block.p.vector))
+    values, vectors = resisted.eigen(scaled(model.q, block.p.vector))
+
+    output = {
+        "x": model.x_h,
+        "v": model.v_h,
+        "q": model.q,
+        "Lambda_inv": OperationalSpace(model).Lambda_inv,
+        "P_c": resisted.projector(values, vectors, block.x["n_resisted"]),
+        "n_constraints": block.x["n_resisted"],
+    }
+    if linkage.loop:
+        output |= _branch(block, model)
+    component = block.component(
+        "virtual_environment",
+        "Graphics-rate copy of the linkage, its mobility and resisted directions",
+        "continuous",
+        initial={
+            "q": q0,
+            "qd": qd0,
+            "n_resisted": resisted.count(first, ca.SX(0), *resistance),
+        },
+        step={
+            "q": q1,
+            "qd": qd1,
+            "n_resisted": resisted.count(after, block.x["n_resisted"], *resistance),
+        },
+        output=output,
+        substeps=copy.substeps,
+        documentation=__doc__ or "",
+    )
+    require_closed(component, model)
+    return component
+
+
+def _gains(copy: GraphicsCopy) -> list[Variable]:
+    if copy.sync == "joint":
+        return [
+            Variable("K_g", (), "1/s2", copy.joint_stiffness, "pull on a coordinate's error"),
+            Variable("B_g", (), "1/s", copy.joint_damping, "pull on its rate"),
+        ]
+    stiffness, damping = ("N/m", "N/m", "N.m/rad"), ("N.s/m", "N.s/m", "N.m.s/rad")
+    return [
+        Variable("K_g", (3,), stiffness, copy.stiffness, "stiffness of the graphics controller"),
+        Variable("B_g", (3,), damping, copy.damping, "damping of the graphics controller"),
+    ]
+
+
+def _outputs(linkage: Linkage, units: tuple[str, ...]) -> list[Variable]:
+    found = [
+        Variable("x", (3,), POSE, description="pose of the copy's operational point"),
+        Variable("v", (3,), TWIST, description="its velocity"),
+        Variable("q", (len(units),), units, description="the copy's coordinates"),
+        *direction_outputs(),
+    ]
+    if linkage.loop:
+        found.append(Variable("branch_ok", description="1 on the mechanism's branch, 0 folded"))
+        found.append(Variable("q_error", (), "1", description="norm of q_ref - q"))
+    return found
+
+
+def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX, ca.SX]:
+    """(q, qd) after one linearly implicit substep."""
+    u, h, q, qd = block.u, block.h, model.q, model.qd
+    if joint_sync:
+        K, B = model.D * block.p["K_g"], model.D * block.p["B_g"]
+        pull = K @ (u["q_ref"] - q) + B @ u["qd_ref"]
+    else:
+        J, K_g, B_g = model.J_h, ca.diag(block.p["K_g"]), ca.diag(block.p["B_g"])
+        K, B = J.T @ K_g @ J, J.T @ B_g @ J
+        pull = J.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
+    solver = ClosedLoopSolver(model.D + h * B + h**2 * K, model.W)
+    qd1, _ = solver.solve(model.D @ qd + h * (pull - model.C_qd), ca.SX(solver.m, 1))
+    # Twice: a frame's motion is large for one chord of the closures.
+    return project(model, *project(model, q + h * qd1, qd1))
+
+
+def _branch(block: Block, model: LinkageModel) -> dict[str, ca.SX]:
+    linkage, q_ref = model.linkage, block.u["q_ref"]
+    start = [*coordinates(linkage, linkage.start)]
+    defaults = [s for v in block.p.variables for s in v.starts]
+    rows, columns = branch.dependent_coordinates(model, np.array([*start, *defaults]))
+    W = ca.Function("W", [model.q, block.p.vector], [model.W])
+    signs = [branch.branch_sign(W(q, block.p.vector), rows, columns) for q in (model.q, q_ref)]
+    return {
+        "branch_ok": signs[0] * signs[1] >= 0,
+        "q_error": ca.norm_2(q_ref - model.q),
+    }

@@ -1,0 +1,38 @@
+"""Fixed-step methods for plants, one a file; `METHODS` names them as a scene does.
+
+A method advances x' = f(x, u, p, t) by h with u held. `positions` lists the entries of x
+that are positions: methods that treat positions and velocities apart need to know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+
+from hapticlink.components.integrators.base import Integrator
+from hapticlink.components.integrators.runge_kutta import RungeKutta
+from hapticlink.components.integrators.semi_implicit_euler import SemiImplicitEuler
+from hapticlink.components.integrators.tableaus import HEUN, RK4
+
+METHODS: dict[str, Integrator] = {
+    "semi-implicit-euler": SemiImplicitEuler(),
+    "heun": RungeKutta("heun", HEUN),
+    "rk4": RungeKutta("rk4", RK4),
+}
+
+
+def step(
+    method: str,
+    ode: ca.Function,
+    x: ca.SX,
+    u: ca.SX,
+    p: ca.SX,
+    t: ca.SX,
+    h: ca.SX,
+    positions: Sequence[int],
+) -> ca.SX:
+    """x(t + h) by the named method. Raises ValueError for a name that is not in METHODS."""
+    if method not in METHODS:
+        raise ValueError(f"`method`: {method!r} is unknown; take one of {sorted(METHODS)}")
+    return METHODS[method].step(ode, x, u, p, t, h, positions)

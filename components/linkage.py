@@ -1,0 +1,259 @@
+"""Kinematics and Lagrangian terms of a planar linkage, by differentiation of the kinematics.
+
+Relative joint coordinates q of the tree; loops stay open in q and are closed by
+h(q) = 0 (2.13). The terms of (2.3), D qdd + C qd + g = J_h' F_h + W' lambda:
+
+    D   = sum_i m_i J_i' J_i + I_i J_theta,i' J_theta,i       (2.7), (2.10)
+    C qd = sum_i J_i' M_i Jdot_i qd                           (2.11) contracted with qd
+    W   = dh/dq,   w = Wdot qd                                (2.14), (3.2) as corrected
+    J_h = d x_h/dq                                            (2.18)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+
+from hapticlink.components.component import Signals, Variable
+from hapticlink.components.specs import Joint, Linkage, Point
+
+COORDINATES = {"revolute": 1, "prismatic": 1, "free": 3}
+UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A body's frame in the world: origin (m) and angle (rad), with its cosine and sine."""
+
+    origin: ca.SX
+    angle: ca.SX
+    rotation: ca.SX
+
+    @staticmethod
+    def at(origin: ca.SX, angle: ca.SX) -> Frame:
+        return Frame(origin, angle, _rotation(angle))
+
+    def point(self, at: ca.SX | None) -> ca.SX:
+        """World position of a point of the body; None is the frame's origin."""
+        return self.origin if at is None else self.origin + self.rotation @ at
+
+
+def _rotation(angle: ca.SX) -> ca.SX:
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(c, -s), ca.horzcat(s, c))
+
+
+def parameters(linkage: Linkage) -> tuple[Variable, ...]:
+    """Masses and geometry as `fixed` FMI parameters: `link1.mass`, `elbow1.at_parent[1]`.
+
+    A point that the scene does not mention is structure: the frame's origin.
+    """
+
+    def fixed(name: str, unit: str, value: float | Point, text: str) -> Variable:
+        shape = () if isinstance(value, int | float) else (2,)
+        return Variable(name, shape, unit, value, text, variability="fixed")
+
+    found = []
+    for b in linkage.body:
+        found.append(fixed(f"{b.name}.mass", "kg", b.mass, f"mass of {b.name}"))
+        found.append(
+            fixed(f"{b.name}.inertia", "kg.m2", b.inertia, f"inertia of {b.name} about its centre")
+        )
+        if b.center is not None:
+            found.append(fixed(f"{b.name}.center", "m", b.center, f"centre of mass of {b.name}"))
+    for j in linkage.joint:
+        if j.at_parent is not None:
+            found.append(fixed(f"{j.name}.at_parent", "m", j.at_parent, f"{j.name} on {j.parent}"))
+        if j.at_child is not None:
+            found.append(fixed(f"{j.name}.at_child", "m", j.at_child, f"{j.name} on {j.child}"))
+        if j.type == "prismatic":
+            found.append(fixed(f"{j.name}.axis", "rad", j.axis or 0.0, f"direction of {j.name}"))
+    for i, loop in enumerate(linkage.loop):
+        name = loop_name(linkage, i)
+        for k, (body, at) in enumerate(zip(loop.bodies, loop.at, strict=True)):
+            found.append(fixed(f"{name}.at{k + 1}", "m", at, f"{name} on {body}"))
+    if linkage.operational_point.at is not None:
+        at, body = linkage.operational_point.at, linkage.operational_point.body
+        found.append(fixed("operational_point.at", "m", at, f"operational point on {body}"))
+    return tuple(found)
+
+
+def loop_name(linkage: Linkage, index: int) -> str:
+    return linkage.loop[index].name or f"loop{index + 1}"
+
+
+def coordinate_units(linkage: Linkage) -> tuple[str, ...]:
+    return tuple(unit for j in linkage.joint for unit in UNITS[j.type])
+
+
+def coordinates(linkage: Linkage, values: Mapping[str, float | tuple[float, ...]]) -> list[float]:
+    """Flat joint coordinates from values by joint name; what is missing is 0."""
+    flat: list[float] = []
+    for j in linkage.joint:
+        value = values.get(j.name, (0.0,) * COORDINATES[j.type])
+        flat.extend(value if isinstance(value, tuple | list) else (value,))
+    return flat
+
+
+def mean_link_length(linkage: Linkage) -> float:
+    """Mean over the bodies of the largest distance between two of their joint points, m.
+
+    A linkage without any such distance takes its mean radius of gyration.
+    """
+    points: dict[str, list[Point]] = {b.name: [] for b in linkage.body}
+    for j in linkage.joint:
+        points[j.child].append(j.at_child or (0.0, 0.0))
+        if j.parent in points:
+            points[j.parent].append(j.at_parent or (0.0, 0.0))
+    for loop in linkage.loop:
+        for body, at in zip(loop.bodies, loop.at, strict=True):
+            if body in points:
+                points[body].append(at)
+    spans = [max(math.dist(a, b) for a in p for b in p) for p in points.values() if p]
+    lengths = [s for s in spans if s > 0] or [
+        math.sqrt(b.inertia / b.mass) for b in linkage.body if b.mass > 0 and b.inertia > 0
+    ]
+    return sum(lengths) / len(lengths) if lengths else 1.0
+
+
+class LinkageModel:
+    """The terms of (2.3) at q, qd, each built when it is first asked for.
+
+    q, qd: n x 1; p: the parameters by name. D n x n, W m x n (m two for each loop),
+    J_h 3 x n. Raises ValueError for bodies that no joint connects to the ground.
+    """
+
+    def __init__(self, linkage: Linkage, p: Signals, q: ca.SX, qd: ca.SX) -> None:
+        self.linkage, self.p, self.q, self.qd = linkage, p, q, qd
+
+    @cached_property
+    def frames(self) -> dict[str, Frame]:
+        """World frame of every body, from the ground outward."""
+        frames = {"ground": Frame.at(ca.SX(2, 1), ca.SX(0))}
+        offsets, n = {}, 0
+        for j in self.linkage.joint:
+            offsets[j.name], n = n, n + COORDINATES[j.type]
+        waiting = list(self.linkage.joint)
+        while waiting:
+            ready = [j for j in waiting if j.parent in frames]
+            if not ready:
+                names = ", ".join(f"`{j.name}`" for j in waiting)
+                raise ValueError(f"joints {names}: no chain of joints leads to `ground`")
+            for j in ready:
+                k = offsets[j.name]
+                frames[j.child] = self._child(
+                    j, frames[j.parent], self.q[k : k + COORDINATES[j.type]]
+                )
+                waiting.remove(j)
+        return frames
+
+    def _child(self, joint: Joint, parent: Frame, q: ca.SX) -> Frame:
+        def at(end: str) -> ca.SX | None:
+            return self.p.get(f"{joint.name}.{end}")
+
+        pivot, angle = parent.point(at("at_parent")), parent.angle
+        if joint.type == "revolute":
+            angle = angle + q
+        elif joint.type == "prismatic":
+            axis = self.p[f"{joint.name}.axis"]
+            pivot = pivot + parent.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis)) * q
+        else:
+            pivot, angle = pivot + parent.rotation @ q[:2], angle + q[2]
+        child = Frame.at(pivot, angle)
+        back = at("at_child")
+        return (
+            child if back is None else Frame(pivot - child.rotation @ back, angle, child.rotation)
+        )
+
+    def _rate(self, r: ca.SX) -> ca.SX:
+        return ca.jtimes(r, self.q, self.qd)
+
+    @cached_property
+    def _bodies(self) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
+        """(weights m, m, I; Jacobian 3 x n; Jdot qd) of every body's centre of mass."""
+        found = []
+        for b in self.linkage.body:
+            frame = self.frames[b.name]
+            pose = ca.vertcat(frame.point(self.p.get(f"{b.name}.center")), frame.angle)
+            mass, inertia = self.p[f"{b.name}.mass"], self.p[f"{b.name}.inertia"]
+            weights = ca.vertcat(mass, mass, inertia)
+            found.append((weights, ca.jacobian(pose, self.q), self._rate(self._rate(pose))))
+        return found
+
+    @cached_property
+    def D(self) -> ca.SX:
+        terms = [J.T @ ca.diag(m) @ J for m, J, _ in self._bodies]
+        return sum(terms[1:], start=terms[0])
+
+    @cached_property
+    def C_qd(self) -> ca.SX:
+        """Centripetal and Coriolis terms C qd, n x 1."""
+        terms = [J.T @ (m * bias) for m, J, bias in self._bodies]
+        return sum(terms[1:], start=terms[0])
+
+    @cached_property
+    def C(self) -> ca.SX:
+        """Christoffel matrix (2.11), (2.12) as corrected; Ddot - 2C is skew."""
+        n, D = self.q.numel(), self.D
+        dD = [ca.reshape(ca.jacobian(ca.vec(D), self.q)[:, i], n, n) for i in range(n)]
+        C = ca.SX(n, n)
+        for k in range(n):
+            for j in range(n):
+                C[k, j] = 0.5 * sum(
+                    (dD[i][k, j] + dD[j][k, i] - dD[k][i, j]) * self.qd[i] for i in range(n)
+                )
+        return C
+
+    @cached_property
+    def kinetic_energy(self) -> ca.SX:
+        return 0.5 * sum(ca.dot(m, (J @ self.qd) ** 2) for m, J, _ in self._bodies)
+
+    @cached_property
+    def h(self) -> ca.SX:
+        """Loop closures, two rows a loop: the gap from bodies[1]'s point to bodies[0]'s, m."""
+        gaps = []
+        for i, loop in enumerate(self.linkage.loop):
+            name = loop_name(self.linkage, i)
+            ends = [
+                self.frames[body].point(self.p[f"{name}.at{k + 1}"])
+                for k, body in enumerate(loop.bodies)
+            ]
+            gaps.append(ends[0] - ends[1])
+        return ca.vertcat(*gaps) if gaps else ca.SX(0, 1)
+
+    @cached_property
+    def W(self) -> ca.SX:
+        return ca.jacobian(self.h, self.q)
+
+    @cached_property
+    def w(self) -> ca.SX:
+        """Wdot qd (3.2), so that hddot = W qdd + w."""
+        return self._rate(self._rate(self.h))
+
+    @cached_property
+    def closure_error(self) -> ca.SX:
+        """Largest gap over the loops, m."""
+        gaps = [ca.norm_2(self.h[2 * i : 2 * i + 2]) for i in range(len(self.linkage.loop))]
+        return ca.SX(0) if not gaps else gaps[0] if len(gaps) == 1 else ca.mmax(ca.vertcat(*gaps))
+
+    @cached_property
+    def x_h(self) -> ca.SX:
+        """Pose (x, y, theta) of the operational point (2.16)."""
+        frame = self.frames[self.linkage.operational_point.body]
+        return ca.vertcat(frame.point(self.p.get("operational_point.at")), frame.angle)
+
+    @cached_property
+    def J_h(self) -> ca.SX:
+        return ca.jacobian(self.x_h, self.q)
+
+    @cached_property
+    def v_h(self) -> ca.SX:
+        return self._rate(self.x_h)
+
+    @cached_property
+    def Jdot_qd(self) -> ca.SX:
+        return self._rate(self.v_h)

@@ -1,0 +1,67 @@
+"""Directions that the joints resist at the hand, in bounded time.
+
+Null directions of Lambda^-1 are wrenches, and its entries mix units. With S = diag(1, 1, L)
+the scaled mobility S Lambda^-1 S is in 1/kg throughout; its small eigenvalues are resisted.
+The report takes an SVD (B.14) at the graphics rate since SVDs have no guaranteed run time; a
+fixed number of cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, section 8.5)
+has one, and a 3 x 3 matrix is diagonal to rounding after five sweeps.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+SWEEPS = 5
+TINY = 1e-300
+
+
+def scaling(length_scale: ca.SX) -> ca.SX:
+    """S = diag(1, 1, L)."""
+    return ca.diag(ca.vertcat(1, 1, length_scale))
+
+
+def eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """(eigenvalues 3 x 1, eigenvectors in columns 3 x 3) of a symmetric 3 x 3 matrix."""
+    A, V = ca.SX(A), ca.SX.eye(3)
+    V = ca.densify(V)
+    for _ in range(SWEEPS):
+        for i, j in ((0, 1), (0, 2), (1, 2)):
+            gap, twice = A[j, j] - A[i, i], 2 * A[i, j]
+            sign = ca.if_else(gap < 0, -1, 1)
+            tangent = sign * twice / (ca.fabs(gap) + ca.sqrt(gap**2 + twice**2) + TINY)
+            c = 1 / ca.sqrt(1 + tangent**2)
+            s = c * tangent
+            G = ca.SX.eye(3)
+            G[i, i], G[j, j], G[i, j], G[j, i] = c, c, s, -s
+            A = G.T @ A @ G
+            V = V @ G
+    return ca.diag(A), V
+
+
+def _ratios_and_ranks(eigenvalues: ca.SX) -> tuple[list[ca.SX], list[ca.SX]]:
+    """Share of the largest, and place in ascending order (0 the smallest, ties by index)."""
+    largest = ca.fmax(ca.fmax(eigenvalues[0], eigenvalues[1]), eigenvalues[2])
+    ranks = []
+    for i in range(3):
+        below = [
+            eigenvalues[j] < eigenvalues[i] if j > i else eigenvalues[j] <= eigenvalues[i]
+            for j in range(3)
+            if j != i
+        ]
+        ranks.append(below[0] + below[1])
+    return [eigenvalues[i] / (largest + TINY) for i in range(3)], ranks
+
+
+def count(eigenvalues: ca.SX, before: ca.SX, tolerance: ca.SX, hysteresis: ca.SX) -> ca.SX:
+    """Number of resisted directions: ratio below `tolerance`, or below `hysteresis` times it
+    for the `before` smallest, which were resisted before."""
+    ratios, ranks = _ratios_and_ranks(eigenvalues)
+    bounds = [tolerance * ca.if_else(rank < before, hysteresis, 1) for rank in ranks]
+    return sum((r < b for r, b in zip(ratios, bounds, strict=True)), start=ca.SX(0))
+
+
+def projector(eigenvalues: ca.SX, vectors: ca.SX, number: ca.SX) -> ca.SX:
+    """P_c, orthogonal projector (3 x 3, dimensionless) on the `number` smallest directions."""
+    _, ranks = _ratios_and_ranks(eigenvalues)
+    chosen = ca.vertcat(*(ca.if_else(rank < number, 1, 0) for rank in ranks))
+    return vectors @ ca.diag(chosen) @ vectors.T

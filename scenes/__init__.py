@@ -1,0 +1,1 @@
+"""The shipped scenes: one TOML file an experiment, found by name from any folder."""
