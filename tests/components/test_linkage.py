@@ -1,0 +1,89 @@
+"""Linkage terms against the report's Appendix A and against the laws they must obey."""
+
+import appendix_a
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from mechanisms import TABLE_6_1, five_bar, linkages
+
+from hapticlink.components.component import Signals
+from hapticlink.components.linkage import LinkageModel, mean_link_length, parameters
+from hapticlink.components.specs import Body, Joint, Linkage, OperationalPoint
+
+F_CM = (0.3, 0.6, 0.45, 0.7)
+
+
+def functions(linkage, *names):
+    """Numpy-valued terms of a linkage at (q, qd), with its own parameter values."""
+    variables = parameters(linkage)
+    p = Signals("p", variables)
+    n = sum({"free": 3}.get(j.type, 1) for j in linkage.joint)
+    q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
+    model = LinkageModel(linkage, p, q, qd)
+    f = ca.Function("f", [q, qd, p.vector], [getattr(model, name) for name in names])
+    values = [s for v in variables for s in v.starts]
+    return lambda q, qd: [np.array(a) for a in f.call([ca.DM(q), ca.DM(qd), ca.DM(values)])]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_terms_meet_appendix_a(seed):
+    rng = np.random.default_rng(seed)
+    m, l, J = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"]  # noqa: E741
+    at = functions(five_bar(f=F_CM), "D", "C", "C_qd", "W", "w", "h", "x_h", "J_h")
+    q, qd = rng.uniform(-3, 3, 4), rng.uniform(-5, 5, 4)
+    D, C, C_qd, W, w, h, x_h, J_h = at(q, qd)
+    tight = {"rtol": 1e-13, "atol": 1e-15}
+    np.testing.assert_allclose(D, appendix_a.D(q, m, l, J, F_CM), **tight)
+    np.testing.assert_allclose(C, appendix_a.C(q, qd, m, l, F_CM), **tight)
+    np.testing.assert_allclose(C_qd.ravel(), C @ qd, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(W, appendix_a.W(q, l), **tight)
+    np.testing.assert_allclose(w.ravel(), appendix_a.w(q, qd, l), rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(h.ravel(), appendix_a.h(q, l), **tight)
+    np.testing.assert_allclose(x_h.ravel(), appendix_a.r_h(q, l, F_CM), **tight)
+    np.testing.assert_allclose(J_h, appendix_a.J_h(q, l, F_CM), **tight)
+
+
+@settings(max_examples=30, deadline=None)
+@given(linkages())
+def test_laws_of_any_linkage(drawn):
+    """D is symmetric positive definite, Ddot - 2C skew, T = 1/2 qd' D qd, loops closed."""
+    linkage, q, qd = drawn
+    at = functions(linkage, "D", "C", "C_qd", "kinetic_energy", "h")
+    D, C, C_qd, T, h = at(q, qd)
+    np.testing.assert_allclose(D, D.T, atol=1e-14)
+    assert np.linalg.eigvalsh(D).min() > 0
+    np.testing.assert_allclose(C_qd.ravel(), C @ qd, atol=1e-11)
+    np.testing.assert_allclose(T.item(), 0.5 * qd @ D @ qd, rtol=1e-12)
+    step = 1e-6
+    Ddot = (at(q + step * qd, qd)[0] - at(q - step * qd, qd)[0]) / (2 * step)
+    skew = Ddot - 2 * C
+    np.testing.assert_allclose(skew, -skew.T, atol=1e-7 * (1 + np.abs(Ddot).max()))
+    assert np.abs(h).max(initial=0) < 1e-14
+
+
+def test_free_body_is_its_own_inertia():
+    linkage = Linkage(
+        body=(Body(name="b", mass=2.0, inertia=0.1, center=(0.3, -0.2)),),
+        joint=(Joint(name="j", type="free", child="b"),),
+        operational_point=OperationalPoint(body="b", at=(0.3, -0.2)),
+    )
+    q, qd = np.array([0.1, -0.2, 0.7]), np.array([1.0, 2.0, 3.0])
+    D, J_h, T = functions(linkage, "D", "J_h", "kinetic_energy")(q, qd)
+    v = J_h @ qd
+    np.testing.assert_allclose(J_h.T @ np.diag([2.0, 2.0, 0.1]) @ J_h, D, atol=1e-15)
+    np.testing.assert_allclose(T.item(), 0.5 * (2 * v[0] ** 2 + 2 * v[1] ** 2 + 0.1 * v[2] ** 2))
+
+
+def test_mean_link_length_of_the_five_bar():
+    assert mean_link_length(five_bar()) == pytest.approx(np.mean(TABLE_6_1["l"]), rel=1e-15)
+
+
+def test_a_tree_without_a_root_is_refused():
+    linkage = Linkage(
+        body=(Body(name="a", mass=1, inertia=1), Body(name="b", mass=1, inertia=1)),
+        joint=(Joint(name="ab", parent="b", child="a"), Joint(name="ba", parent="a", child="b")),
+        operational_point=OperationalPoint(body="a"),
+    )
+    with pytest.raises(ValueError, match="no chain of joints leads to `ground`"):
+        functions(linkage, "x_h")
