@@ -18,6 +18,7 @@ from functools import cached_property
 
 import casadi as ca
 
+from hapticlink.components import forces
 from hapticlink.components.component import Signals, Variable
 from hapticlink.components.specs import Joint, Linkage, Point
 
@@ -79,7 +80,7 @@ def parameters(linkage: Linkage) -> tuple[Variable, ...]:
     if linkage.operational_point.at is not None:
         at, body = linkage.operational_point.at, linkage.operational_point.body
         found.append(fixed("operational_point.at", "m", at, f"operational point on {body}"))
-    return tuple(found)
+    return (*found, *forces.parameters(linkage))
 
 
 def loop_name(linkage: Linkage, index: int) -> str:
@@ -127,16 +128,27 @@ class LinkageModel:
     J_h 3 x n. Raises ValueError for bodies that no joint connects to the ground.
     """
 
-    def __init__(self, linkage: Linkage, p: Signals, q: ca.SX, qd: ca.SX) -> None:
+    def __init__(
+        self, linkage: Linkage, p: Signals, q: ca.SX, qd: ca.SX, t: ca.SX | None = None
+    ) -> None:
         self.linkage, self.p, self.q, self.qd = linkage, p, q, qd
+        self.t = ca.SX(0) if t is None else t
+
+    @cached_property
+    def _offsets(self) -> dict[str, int]:
+        offsets, n = {}, 0
+        for j in self.linkage.joint:
+            offsets[j.name], n = n, n + COORDINATES[j.type]
+        return offsets
+
+    def coordinate(self, joint: str) -> int:
+        """Index in q of the (first) coordinate of a joint."""
+        return self._offsets[joint]
 
     @cached_property
     def frames(self) -> dict[str, Frame]:
         """World frame of every body, from the ground outward."""
         frames = {"ground": Frame.at(ca.SX(2, 1), ca.SX(0))}
-        offsets, n = {}, 0
-        for j in self.linkage.joint:
-            offsets[j.name], n = n, n + COORDINATES[j.type]
         waiting = list(self.linkage.joint)
         while waiting:
             ready = [j for j in waiting if j.parent in frames]
@@ -144,10 +156,9 @@ class LinkageModel:
                 names = ", ".join(f"`{j.name}`" for j in waiting)
                 raise ValueError(f"joints {names}: no chain of joints leads to `ground`")
             for j in ready:
-                k = offsets[j.name]
-                frames[j.child] = self._child(
-                    j, frames[j.parent], self.q[k : k + COORDINATES[j.type]]
-                )
+                k = self.coordinate(j.name)
+                q = self.q[k : k + COORDINATES[j.type]]
+                frames[j.child] = self._child(j, frames[j.parent], q)
                 waiting.remove(j)
         return frames
 
@@ -169,19 +180,27 @@ class LinkageModel:
             child if back is None else Frame(pivot - child.rotation @ back, angle, child.rotation)
         )
 
-    def _rate(self, r: ca.SX) -> ca.SX:
+    def rate(self, r: ca.SX) -> ca.SX:
+        """dr/dt along the motion, of an expression in q."""
         return ca.jtimes(r, self.q, self.qd)
+
+    @cached_property
+    def centers(self) -> dict[str, ca.SX]:
+        """World position of every body's centre of mass, m."""
+        return {
+            b.name: self.frames[b.name].point(self.p.get(f"{b.name}.center"))
+            for b in self.linkage.body
+        }
 
     @cached_property
     def _bodies(self) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
         """(weights m, m, I; Jacobian 3 x n; Jdot qd) of every body's centre of mass."""
         found = []
         for b in self.linkage.body:
-            frame = self.frames[b.name]
-            pose = ca.vertcat(frame.point(self.p.get(f"{b.name}.center")), frame.angle)
+            pose = ca.vertcat(self.centers[b.name], self.frames[b.name].angle)
             mass, inertia = self.p[f"{b.name}.mass"], self.p[f"{b.name}.inertia"]
             weights = ca.vertcat(mass, mass, inertia)
-            found.append((weights, ca.jacobian(pose, self.q), self._rate(self._rate(pose))))
+            found.append((weights, ca.jacobian(pose, self.q), self.rate(self.rate(pose))))
         return found
 
     @cached_property
@@ -213,6 +232,16 @@ class LinkageModel:
         return 0.5 * sum(ca.dot(m, (J @ self.qd) ** 2) for m, J, _ in self._bodies)
 
     @cached_property
+    def Q(self) -> ca.SX:
+        """Applied generalised forces, n x 1: gravity (-g of (2.3)), springs, friction, drives."""
+        return forces.efforts(self)
+
+    @cached_property
+    def energy(self) -> ca.SX:
+        """Kinetic and potential, J."""
+        return self.kinetic_energy + forces.energy(self)
+
+    @cached_property
     def h(self) -> ca.SX:
         """Loop closures, two rows a loop: the gap from bodies[1]'s point to bodies[0]'s, m."""
         gaps = []
@@ -232,7 +261,7 @@ class LinkageModel:
     @cached_property
     def w(self) -> ca.SX:
         """Wdot qd (3.2), so that hddot = W qdd + w."""
-        return self._rate(self._rate(self.h))
+        return self.rate(self.rate(self.h))
 
     @cached_property
     def closure_error(self) -> ca.SX:
@@ -252,8 +281,8 @@ class LinkageModel:
 
     @cached_property
     def v_h(self) -> ca.SX:
-        return self._rate(self.x_h)
+        return self.rate(self.x_h)
 
     @cached_property
     def Jdot_qd(self) -> ca.SX:
-        return self._rate(self.v_h)
+        return self.rate(self.v_h)

@@ -1,6 +1,6 @@
 """The virtual mechanism: the linkage's own dynamics, at the rate of the haptic loop.
 
-    D qdd + C qd = J_h' (F_hand - F_drift) + W' lambda,   W qdd + w_stab = 0     (B.6)
+    D qdd + C qd = Q + J_h' (F_hand - F_drift) + W' lambda,   W qdd + w_stab = 0   (B.6)
     w_stab = w + 2 alpha beta W qd + alpha^2 h                                  (B.5) as corrected
 
 Closures are kept by the stabilisation that the scene names: none, Baumgarte, or projection of
@@ -61,7 +61,7 @@ def virtual_mechanism(
         states=_states(linkage, directions),
         outputs=_outputs(linkage, m, directions),
     )
-    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
+    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"], block.t)
     space = OperationalSpace(model)
     F = block.u["F_hand"] - block.u["F_drift"]
     qdd, multipliers = space.motion(F)
@@ -75,7 +75,7 @@ def virtual_mechanism(
         "qd": model.qd,
         "qdd": qdd,
         "a_bias": space.a_bias,
-        "energy": model.kinetic_energy,
+        "energy": model.energy,
     }
     if m:
         output |= {"lambda": multipliers, "closure_error": model.closure_error}
@@ -193,7 +193,7 @@ def _step(
     if model.linkage.loop and mechanism.stabilization == "baumgarte":
         alpha, beta = block.p["alpha"], block.p["beta"]
         closing -= 2 * alpha * beta * (model.W @ model.qd) + alpha**2 * model.h
-    qdd, _ = space.solver.solve(model.J_h.T @ F - model.C_qd, closing)
+    qdd, _ = space.solver.solve(model.Q + model.J_h.T @ F - model.C_qd, closing)
     x = ca.vertcat(model.q, model.qd)
     ode = ca.Function(
         "ode", [x, block.u.vector, block.p.vector, block.t], [ca.vertcat(model.qd, qdd)]

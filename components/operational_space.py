@@ -31,7 +31,7 @@ class OperationalSpace:
 
     @cached_property
     def _bias(self) -> tuple[ca.SX, ca.SX]:
-        return self.solver.solve(-self.model.C_qd, -self.model.w)
+        return self.solver.solve(self.model.Q - self.model.C_qd, -self.model.w)
 
     @cached_property
     def Lambda_inv(self) -> ca.SX:

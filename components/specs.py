@@ -26,11 +26,57 @@ class Body:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ConstantDrive:
+    """A constant effort (N or N.m) on a joint."""
+
+    type: Literal["constant"] = "constant"
+    effort: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProfileDrive:
+    """An effort from rows (t s, N or N.m), linear between rows, the ends held."""
+
+    type: Literal["profile"] = "profile"
+    table: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PDDrive:
+    """A servo: stiffness (target - q) + damping (target' - qd); rows (t s, target rad or m)."""
+
+    type: Literal["pd"] = "pd"
+    table: tuple[tuple[float, float], ...]
+    stiffness: float
+    damping: float
+
+
+Drive = ConstantDrive | ProfileDrive | PDDrive
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spring:
+    """A spring and damper (N/m, N.s/m) of free length `length` (m) between two points of
+    bodies (m, in their frames); "ground" is a body."""
+
+    bodies: tuple[str, str]
+    at: tuple[Point, Point]
+    stiffness: float | None = None
+    damping: float | None = None
+    length: float | None = None
+    name: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Joint:
     """A joint of the tree; at_parent and at_child (m) in the frames of the two bodies.
 
     revolute: one angle; prismatic: one displacement along `axis` of the parent's frame,
     a direction in rad; free: x, y and theta of the child in the parent's frame.
+
+    On one coordinate also: stiffness about `rest` and viscous damping (N.m/rad, N.m.s/rad or
+    N/m, N.s/m), Coulomb friction (N.m or N) that saturates over `friction_speed` (rad/s or
+    m/s), and a drive.
     """
 
     name: str
@@ -40,6 +86,12 @@ class Joint:
     at_parent: Point | None = None
     at_child: Point | None = None
     axis: float | None = None
+    stiffness: float | None = None
+    rest: float | None = None
+    damping: float | None = None
+    friction: float | None = None
+    friction_speed: float = 0.01
+    drive: Drive | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,14 +115,16 @@ class OperationalPoint:
 class Linkage:
     """Bodies, a tree of joints, and the cut joints that close loops.
 
-    start and start_velocity give joint coordinates by joint name (rad or m; a free joint
-    takes three numbers); what is missing is 0.
+    gravity (m/s2) acts on every body. start and start_velocity give joint coordinates by joint
+    name (rad or m; a free joint takes three numbers); what is missing is 0.
     """
 
     body: tuple[Body, ...]
     joint: tuple[Joint, ...]
     operational_point: OperationalPoint
     loop: tuple[Loop, ...] = ()
+    spring: tuple[Spring, ...] = ()
+    gravity: Point | None = None
     start: Mapping[str, float | Vector3] = field(default_factory=dict)
     start_velocity: Mapping[str, float | Vector3] = field(default_factory=dict)
 

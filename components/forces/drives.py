@@ -1,0 +1,69 @@
+"""Joint drives: the active linkages of the report's future work (chapter 7).
+
+constant  Q = effort
+profile   Q = effort(t), from a table
+pd        Q = k (target(t) - q) + b (target'(t) - qd)
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from hapticlink.components.component import Variable
+from hapticlink.components.specs import ConstantDrive, Joint, Linkage, PDDrive
+from hapticlink.components.tables import interpolate, slope
+
+if TYPE_CHECKING:
+    from hapticlink.components.linkage import LinkageModel
+
+
+def parameters(linkage: Linkage) -> list[Variable]:
+    """Raises ValueError for a drive on a free joint, which has three coordinates."""
+    found = []
+    for j in linkage.joint:
+        if j.drive is not None and j.type == "free":
+            raise ValueError(
+                f"joint `{j.name}`: a drive acts on one coordinate, a free joint has 3"
+            )
+        rotary, text = j.type == "revolute", f"drive of {j.name}"
+        if isinstance(j.drive, ConstantDrive):
+            unit = "N.m" if rotary else "N"
+            found.append(Variable(f"{j.name}.effort", (), unit, j.drive.effort, text))
+        elif isinstance(j.drive, PDDrive):
+            units = ("N.m/rad", "N.m.s/rad") if rotary else ("N/m", "N.s/m")
+            gains = (j.drive.stiffness, j.drive.damping)
+            for name, unit, gain in zip(("K", "B"), units, gains, strict=True):
+                found.append(Variable(f"{j.name}.drive_{name}", (), unit, gain, text))
+    return found
+
+
+def energy(model: LinkageModel) -> None:
+    """A drive stores nothing: what it gives is work done on the linkage."""
+    return None
+
+
+def efforts(model: LinkageModel) -> ca.SX | None:
+    driven = [j for j in model.linkage.joint if j.drive is not None]
+    if not driven:
+        return None
+    Q = ca.SX(model.q.numel(), 1)
+    for j in driven:
+        Q[model.coordinate(j.name)] = _effort(model, j)
+    return Q
+
+
+def _effort(model: LinkageModel, joint: Joint) -> ca.SX:
+    drive, p = joint.drive, model.p
+    if isinstance(drive, ConstantDrive):
+        return p[f"{joint.name}.effort"]
+    assert drive is not None
+    value = interpolate(drive.table, model.t, f"{joint.name}.drive.table")
+    if not isinstance(drive, PDDrive):
+        return value
+    k = model.coordinate(joint.name)
+    rate = slope(drive.table, model.t)
+    return p[f"{joint.name}.drive_K"] * (value - model.q[k]) + p[f"{joint.name}.drive_B"] * (
+        rate - model.qd[k]
+    )
