@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.closure import ClosedLoopSolver
+from hapticlink.components.closure import ClosedLoopSolver, UnitInertia
 from hapticlink.components.component import Component
 from hapticlink.components.linkage import LinkageModel, loop_name
 
@@ -30,7 +30,7 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     n = q.numel()
     symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
     at = LinkageModel(model.linkage, model.p, *symbols)
-    least = ClosedLoopSolver(ca.SX.eye(n), at.W)
+    least = ClosedLoopSolver(UnitInertia(n), at.W)
     parameters = model.p.vector
     newton = ca.Function("newton", [symbols[0], parameters], [symbols[0] - least.constrain(at.h)])
     project = ca.Function(

@@ -30,6 +30,7 @@ from hapticlink.components.mechanism import (
 from hapticlink.components.operational_space import OperationalSpace
 from hapticlink.components.projection import project
 from hapticlink.components.specs import Directions, GraphicsCopy, Linkage
+from hapticlink.components.tree import TreeInertia, to_point
 
 
 def virtual_environment(linkage: Linkage, copy: GraphicsCopy, directions: Directions) -> Component:
@@ -131,16 +132,20 @@ def _outputs(linkage: Linkage, units: tuple[str, ...]) -> list[Variable]:
 
 def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX, ca.SX]:
     """(q, qd) after one linearly implicit substep."""
-    u, h, q, qd = block.u, block.h, model.q, model.qd
+    u, p, h, q, qd = block.u, block.p, block.h, model.q, model.qd
+    D = TreeInertia(model)
     if joint_sync:
-        K, B = model.D * block.p["K_g"], model.D * block.p["B_g"]
-        pull = K @ (u["q_ref"] - q) + B @ u["qd_ref"]
+        solver = ClosedLoopSolver(D, model.W)
+        pull = D.apply(p["K_g"] * (u["q_ref"] - q) + p["B_g"] * u["qd_ref"])
+        weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
-        J, K_g, B_g = model.J_h, ca.diag(block.p["K_g"]), ca.diag(block.p["B_g"])
-        K, B = J.T @ K_g @ J, J.T @ B_g @ J
-        pull = J.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
-    solver = ClosedLoopSolver(model.D + h * B + h**2 * K, model.W)
-    qd1, _ = solver.solve(model.D @ qd + h * (pull - model.C_qd), ca.SX(solver.m, 1))
+        K_g, B_g, X = ca.diag(p["K_g"]), ca.diag(p["B_g"]), to_point(model.x_h)
+        held = {model.linkage.operational_point.body: X.T @ (h * B_g + h**2 * K_g) @ X}
+        solver = ClosedLoopSolver(TreeInertia(model, held), model.W)
+        pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
+        weight = ca.SX(1)
+    momentum = D.apply(qd) + h * (pull - model.C_qd)
+    qd1, _ = solver.solve(momentum / weight, ca.SX(solver.m, 1))
     # Twice: a frame's motion is large for one chord of the closures.
     return project(model, *project(model, q + h * qd1, qd1))
 

@@ -4,7 +4,7 @@ Relative joint coordinates q of the tree; loops stay open in q and are closed by
 h(q) = 0 (2.13). The terms of (2.3), D qdd + C qd + g = J_h' F_h + W' lambda:
 
     D   = sum_i m_i J_i' J_i + I_i J_theta,i' J_theta,i       (2.7), (2.10)
-    C qd = sum_i J_i' M_i Jdot_i qd                           (2.11) contracted with qd
+    C qd = J' M Jdot qd of all bodies, stacked                (2.11) contracted with qd
     W   = dh/dq,   w = Wdot qd                                (2.14), (3.2) as corrected
     J_h = d x_h/dq                                            (2.18)
 """
@@ -146,21 +146,52 @@ class LinkageModel:
         return self._offsets[joint]
 
     @cached_property
-    def frames(self) -> dict[str, Frame]:
-        """World frame of every body, from the ground outward."""
-        frames = {"ground": Frame.at(ca.SX(2, 1), ca.SX(0))}
-        waiting = list(self.linkage.joint)
+    def outward(self) -> list[Joint]:
+        """The joints in an order in which each stands on the ground or an earlier child."""
+        reached, order, waiting = {"ground"}, [], list(self.linkage.joint)
         while waiting:
-            ready = [j for j in waiting if j.parent in frames]
+            ready = [j for j in waiting if j.parent in reached]
             if not ready:
                 names = ", ".join(f"`{j.name}`" for j in waiting)
                 raise ValueError(f"joints {names}: no chain of joints leads to `ground`")
-            for j in ready:
-                k = self.coordinate(j.name)
-                q = self.q[k : k + COORDINATES[j.type]]
-                frames[j.child] = self._child(j, frames[j.parent], q)
-                waiting.remove(j)
+            order += ready
+            reached |= {j.child for j in ready}
+            waiting = [j for j in waiting if j not in ready]
+        return order
+
+    @cached_property
+    def frames(self) -> dict[str, Frame]:
+        """World frame of every body, from the ground outward."""
+        frames = {"ground": Frame.at(ca.SX(2, 1), ca.SX(0))}
+        for j in self.outward:
+            frames[j.child] = self._child(j, frames[j.parent], self._of(j))
         return frames
+
+    def _of(self, joint: Joint) -> ca.SX:
+        k = self.coordinate(joint.name)
+        return self.q[k : k + COORDINATES[joint.type]]
+
+    def _pivot(self, joint: Joint) -> ca.SX:
+        """World position of the joint's point of the parent, m."""
+        return self.frames[joint.parent].point(self.p.get(f"{joint.name}.at_parent"))
+
+    def twists(self, joint: Joint) -> list[ca.SX]:
+        """(omega, v_x, v_y at the world's origin) of a unit rate of each of its coordinates."""
+        R = self.frames[joint.parent].rotation
+
+        def slide(direction: ca.SX) -> ca.SX:
+            return ca.vertcat(0, direction)
+
+        def turn(about: ca.SX) -> ca.SX:
+            return ca.vertcat(1, about[1], -about[0])
+
+        if joint.type == "revolute":
+            return [turn(self._pivot(joint))]
+        if joint.type == "prismatic":
+            axis = self.p[f"{joint.name}.axis"]
+            return [slide(R @ ca.vertcat(ca.cos(axis), ca.sin(axis)))]
+        moved = self._pivot(joint) + R @ self._of(joint)[:2]
+        return [slide(R[:, 0]), slide(R[:, 1]), turn(moved)]
 
     def _child(self, joint: Joint, parent: Frame, q: ca.SX) -> Frame:
         def at(end: str) -> ca.SX | None:
@@ -193,26 +224,26 @@ class LinkageModel:
         }
 
     @cached_property
-    def _bodies(self) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
-        """(weights m, m, I; Jacobian 3 x n; Jdot qd) of every body's centre of mass."""
-        found = []
+    def _bodies(self) -> tuple[ca.SX, ca.SX]:
+        """(x, y, theta of every body's centre of mass; weights m, m, I), stacked, 3k x 1."""
+        poses, weights = [], []
         for b in self.linkage.body:
-            pose = ca.vertcat(self.centers[b.name], self.frames[b.name].angle)
             mass, inertia = self.p[f"{b.name}.mass"], self.p[f"{b.name}.inertia"]
-            weights = ca.vertcat(mass, mass, inertia)
-            found.append((weights, ca.jacobian(pose, self.q), self.rate(self.rate(pose))))
-        return found
+            poses += [self.centers[b.name], self.frames[b.name].angle]
+            weights += [mass, mass, inertia]
+        return ca.vertcat(*poses), ca.vertcat(*weights)
 
     @cached_property
     def D(self) -> ca.SX:
-        terms = [J.T @ ca.diag(m) @ J for m, J, _ in self._bodies]
-        return sum(terms[1:], start=terms[0])
+        poses, weights = self._bodies
+        J = ca.jacobian(poses, self.q)
+        return J.T @ ca.diag(weights) @ J
 
     @cached_property
     def C_qd(self) -> ca.SX:
         """Centripetal and Coriolis terms C qd, n x 1."""
-        terms = [J.T @ (m * bias) for m, J, bias in self._bodies]
-        return sum(terms[1:], start=terms[0])
+        poses, weights = self._bodies
+        return ca.jtimes(poses, self.q, weights * self.rate(self.rate(poses)), True)
 
     @cached_property
     def C(self) -> ca.SX:
@@ -229,7 +260,8 @@ class LinkageModel:
 
     @cached_property
     def kinetic_energy(self) -> ca.SX:
-        return 0.5 * sum(ca.dot(m, (J @ self.qd) ** 2) for m, J, _ in self._bodies)
+        poses, weights = self._bodies
+        return 0.5 * ca.dot(weights, self.rate(poses) ** 2)
 
     @cached_property
     def Q(self) -> ca.SX:

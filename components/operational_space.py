@@ -15,6 +15,7 @@ import casadi as ca
 
 from hapticlink.components.closure import ClosedLoopSolver
 from hapticlink.components.linkage import LinkageModel
+from hapticlink.components.tree import TreeInertia
 
 
 class OperationalSpace:
@@ -22,7 +23,7 @@ class OperationalSpace:
 
     def __init__(self, model: LinkageModel) -> None:
         self.model = model
-        self.solver = ClosedLoopSolver(model.D, model.W)
+        self.solver = ClosedLoopSolver(TreeInertia(model), model.W)
 
     @cached_property
     def _forced(self) -> tuple[ca.SX, ca.SX]:

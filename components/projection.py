@@ -12,22 +12,24 @@ import casadi as ca
 
 from hapticlink.components.closure import ClosedLoopSolver
 from hapticlink.components.linkage import LinkageModel
+from hapticlink.components.tree import TreeInertia
 
-REPEATS = 3
+REPEATS = 2
 
 
 def project(model: LinkageModel, q: ca.SX, qd: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """(q, qd) on h(q) = 0 and W(q) qd = 0; unchanged where there is no loop."""
+    """(q, qd), expressions, moved onto h(q) = 0 and W(q) qd = 0; unchanged without a loop."""
     if not model.linkage.loop:
         return q, qd
     p = model.p.vector
     h = ca.Function("h", [model.q, p], [model.h])
     W = ca.Function("W", [model.q, p], [model.W])
-    D = ca.Function("D", [model.q, p], [model.D])
-    solver = ClosedLoopSolver(D(q, p), W(q, p))
+    solver = ClosedLoopSolver(TreeInertia(model), model.W)
+    closed, rate = model.q, model.qd
     for _ in range(REPEATS):
-        q = q - solver.constrain(h(q, p))
-    W_q = W(q, p)
+        closed = closed - solver.constrain(h(closed, p))
+    W_closed = W(closed, p)
     for _ in range(REPEATS):
-        qd = qd - solver.constrain(W_q @ qd)
-    return q, qd
+        rate = rate - solver.constrain(W_closed @ rate)
+    moved = ca.Function("project", [model.q, model.qd, p], [closed, rate])
+    return moved(q, qd, p)

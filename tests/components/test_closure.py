@@ -9,10 +9,23 @@ from hypothesis import strategies as st
 from hapticlink.components.closure import ClosedLoopSolver
 
 
+class DenseInertia:
+    """D as a matrix."""
+
+    def __init__(self, D):
+        self.D, self.n = D, D.shape[0]
+
+    def solve(self, b):
+        return ca.solve(self.D, b)
+
+    def apply(self, a):
+        return self.D @ a
+
+
 def solve(D, W, b, c):
     symbols = [ca.SX.sym("D", *D.shape), ca.SX.sym("W", *W.shape)]
     symbols += [ca.SX.sym("b", len(b)), ca.SX.sym("c", len(c))]
-    out = ClosedLoopSolver(*symbols[:2]).solve(*symbols[2:])
+    out = ClosedLoopSolver(DenseInertia(symbols[0]), symbols[1]).solve(*symbols[2:])
     f = ca.Function("solve", symbols, list(out))
     return [np.array(v).ravel() for v in f(D, W, b, c)]
 

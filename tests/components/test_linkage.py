@@ -1,5 +1,7 @@
 """Linkage terms against the report's Appendix A and against the laws they must obey."""
 
+from dataclasses import replace
+
 import appendix_a
 import casadi as ca
 import numpy as np
@@ -10,6 +12,7 @@ from mechanisms import TABLE_6_1, five_bar, linkages
 from hapticlink.components.component import Signals
 from hapticlink.components.linkage import LinkageModel, mean_link_length, parameters
 from hapticlink.components.specs import Body, Joint, Linkage, OperationalPoint
+from hapticlink.components.tree import TreeInertia
 
 F_CM = (0.3, 0.6, 0.45, 0.7)
 
@@ -87,3 +90,23 @@ def test_a_tree_without_a_root_is_refused():
     )
     with pytest.raises(ValueError, match="no chain of joints leads to `ground`"):
         functions(linkage, "x_h")
+
+
+@settings(max_examples=30, deadline=None)
+@given(linkages(max_bodies=8))
+def test_tree_recursion_is_D_and_its_inverse(drawn):
+    """D a and D^-1 b by the articulated-body recursion against the matrix, free joints too."""
+    linkage, q, qd = drawn
+    free = Joint(name="float", type="free", child="extra", parent=linkage.body[-1].name)
+    body = Body(name="extra", mass=0.7, inertia=0.02, center=(0.1, -0.2))
+    linkage = replace(linkage, body=(*linkage.body, body), joint=(*linkage.joint, free))
+    q, qd = np.r_[q, 0.2, -0.1, 0.5], np.r_[qd, 1, 2, 3]
+    variables = parameters(linkage)
+    p, symbol = Signals("p", variables), ca.SX.sym("q", len(q))
+    model = LinkageModel(linkage, p, symbol, ca.SX.sym("qd", len(q)))
+    tree, right = TreeInertia(model), ca.SX.sym("b", len(q), 2)
+    f = ca.Function("f", [symbol, p.vector, right], [model.D, tree.apply(right), tree.solve(right)])
+    b = np.random.default_rng(0).normal(size=(len(q), 2))
+    D, applied, solved = map(np.array, f(q, [s for v in variables for s in v.starts], b))
+    np.testing.assert_allclose(applied, D @ b, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(solved, np.linalg.solve(D, b), rtol=1e-8, atol=1e-8)
