@@ -1,1 +1,8 @@
 """How a component becomes an FMU, and how that FMU is checked."""
+
+from hapticlink.fmus.build import build
+from hapticlink.fmus.cache import cached
+from hapticlink.fmus.check import check_fmu
+from hapticlink.fmus.errors import FmuError
+
+__all__ = ["FmuError", "build", "cached", "check_fmu"]

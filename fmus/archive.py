@@ -1,0 +1,156 @@
+"""What a Python FMU holds, as bytes by name.
+
+pythonfmu gives the slave's base class and the binaries. Its FmuBuilder is left aside: it
+takes a Python file of the model, leaves sys.path and sys.modules changed, and writes files
+in random order, with dates and a random GUID, where the same component has to give the same
+bytes.
+
+resources/ is put on sys.path for good by every load, so nothing in it can be imported but
+pythonfmu's own copy and the slave, whose module name carries a hash of the content.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import sys
+import uuid
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+import casadi as ca
+import pythonfmu
+
+from hapticlink.components.component import Component, Variable
+from hapticlink.fmus import python_slave
+from hapticlink.fmus.documentation import documentation
+from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
+from hapticlink.fmus.icon import icon
+from hapticlink.fmus.model_description import model_description
+from hapticlink.fmus.straight_line import program
+
+PYTHONFMU = Path(pythonfmu.__file__).parent
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
+
+
+def require_platform() -> None:
+    """Raise UnsupportedPlatform where pythonfmu ships no binary."""
+    if sys.platform in ("linux", "win32") and platform.machine().lower() in ("x86_64", "amd64"):
+        return
+    raise UnsupportedPlatform(
+        f"pythonfmu has no binary for {sys.platform} on {platform.machine()}, only for Linux "
+        "and Windows on x86-64; build and run Python FMUs there"
+    )
+
+
+def entries(component: Component, *, stop_time: float, step_size: float) -> dict[str, bytes]:
+    """Every file of the FMU. The GUID and the slave's name are a hash of all of them."""
+    check_functions(component)
+
+    def describe(guid: str) -> bytes:
+        return model_description(component, guid, stop_time=stop_time, step_size=step_size)
+
+    functions = (component.initialize, component.step, component.output)
+    texts = {name: f.serialize() for name, f in zip(_ROLES, functions, strict=True)}
+    files = {
+        "documentation/index.html": documentation(component),
+        "model.png": icon(component.timing),
+        "resources/functions.casadi.json": json.dumps(texts).encode(),
+        "resources/functions.txt": program(functions).encode(),
+    }
+    for path in sorted(PYTHONFMU.glob("*.py")):
+        files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
+    for path in sorted((PYTHONFMU / "resources" / "binaries").rglob("*.*")):
+        files[f"binaries/{path.parent.name}/{component.name}{path.suffix}"] = path.read_bytes()
+
+    slave = Path(python_slave.__file__).read_bytes()
+    about = _about(component)
+    content = {**files, "slave": slave, "about": json.dumps(about).encode(), "xml": describe("")}
+    digest = _digest(content)
+    module = f"hapticlink_{digest[:16]}"
+    files |= {
+        "modelDescription.xml": describe(f"{{{uuid.UUID(digest[:32])}}}"),
+        "resources/component.json": json.dumps(about | {"digest": digest}).encode(),
+        f"resources/{module}.py": slave,
+        "resources/slavemodule.txt": f"{module}\n".encode(),
+    }
+    return files
+
+
+def write(files: Mapping[str, bytes], target: BinaryIO) -> None:
+    """A zip archive whose bytes depend on `files` only: sorted names, one date, one system."""
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(files):
+            info = zipfile.ZipInfo(name, EPOCH)
+            info.create_system = 3  # Unix, wherever it is written
+            info.external_attr = 0o644 << 16
+            archive.writestr(info, files[name], zipfile.ZIP_DEFLATED)
+
+
+_ROLES = ("initialize", "step", "output")
+
+
+def check_functions(component: Component) -> None:
+    """Raise FmuError where a function does not fit the declared variables."""
+    if not component.name.isidentifier() or not component.name.isascii():
+        raise FmuError(f"`{component.name}` is no C identifier; an FMU is named by one")
+    u, p, x, y = (
+        sum(v.size for v in variables)
+        for variables in (
+            component.inputs,
+            component.parameters,
+            component.states,
+            component.outputs,
+        )
+    )
+    expected = {"initialize": [u, p, x], "step": [x, u, p, 1, 1, x], "output": [x, u, p, 1, y]}
+    for role, sizes in expected.items():
+        function: ca.Function = getattr(component, role)
+        if function.name() != role:
+            raise FmuError(f"`{component.name}`: {role} is a function named {function.name()}")
+        parts = [function.sparsity_in(i) for i in range(function.n_in())]
+        parts += [function.sparsity_out(i) for i in range(function.n_out())]
+        if [part.numel() for part in parts] != sizes or not all(s.is_dense() for s in parts):
+            raise FmuError(
+                f"`{component.name}`: {function} does not fit the declared variables; expected "
+                f"dense columns of {sizes[:-1]} to {sizes[-1]}"
+            )
+    known = [n for v in (*component.inputs, *component.parameters, *component.outputs)
+             for n in v.names]  # fmt: skip
+    if len(set(known)) != len(known):
+        twice = sorted({name for name in known if known.count(name) > 1})
+        raise FmuError(f"`{component.name}`: declared twice: {', '.join(twice)}")
+    if component.substeps < 1:
+        raise FmuError(f"`{component.name}`: {component.substeps} substeps; take 1 or more")
+
+
+def _names(variables: tuple[Variable, ...]) -> list[str]:
+    return [name for v in variables for name in v.names]
+
+
+def _about(component: Component) -> dict[str, object]:
+    """What the slave needs to know beside the functions."""
+    variability = ["tunable"] * len(component.start_inputs)
+    variability += [v.variability for v in component.parameters for _ in v.names]
+    return {
+        "names": _names((*component.inputs, *component.parameters, *component.outputs)),
+        "starts": [*component.start_inputs, *component.start_parameters],
+        "fixed": [vr for vr, kind in enumerate(variability) if kind == "fixed"],
+        "states": _names(component.states),
+        "n_inputs": len(component.start_inputs),
+        "n_parameters": len(component.start_parameters),
+        "n_outputs": sum(v.size for v in component.outputs),
+        "n_x": sum(v.size for v in component.states),
+        "timing": component.timing,
+        "substeps": component.substeps,
+    }
+
+
+def _digest(content: Mapping[str, bytes]) -> str:
+    sha = hashlib.sha256()
+    for name in sorted(content):
+        sha.update(f"{name}\0{len(content[name])}\0".encode() + content[name])
+    return sha.hexdigest()

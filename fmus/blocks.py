@@ -1,0 +1,92 @@
+"""The blocks by name: which settings each is made of, and its FMU, from the cache if it can.
+
+The factories are imported when a block is built, so a cached FMU needs no casadi.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, is_dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hapticlink.fmus import cache
+from hapticlink.fmus.errors import FmuError
+
+if TYPE_CHECKING:
+    from hapticlink.components.component import Component
+
+Settings = Mapping[str, Any]
+
+
+def _components(module: str) -> Any:
+    return import_module(f"hapticlink.components.{module}")
+
+
+def _virtual_mechanism(s: Settings, step_s: float) -> Component:
+    factory = _components("mechanism").virtual_mechanism
+    return factory(s["linkage"], s["mechanism"], s.get("directions"), step_s=step_s)
+
+
+def _virtual_environment(s: Settings, step_s: float) -> Component:
+    factory = _components("environment").virtual_environment
+    return factory(s["linkage"], s["graphics"], s["directions"])
+
+
+def _haptic_device(s: Settings, step_s: float) -> Component:
+    return _components("device").haptic_device(s["device"])
+
+
+def _controller(s: Settings, step_s: float) -> Component:
+    length_scale = s["directions"].length_scale
+    if length_scale is None:
+        length_scale = _components("linkage").mean_link_length(s["linkage"])
+    return _components("controller").controller(s["controller"], length_scale)
+
+
+def _hand(s: Settings, step_s: float) -> Component:
+    return _components("hand").hand(s["hand"])
+
+
+BLOCKS: dict[str, Callable[[Settings, float], Component]] = {
+    "virtual_mechanism": _virtual_mechanism,
+    "virtual_environment": _virtual_environment,
+    "haptic_device": _haptic_device,
+    "controller": _controller,
+    "hand": _hand,
+}
+
+
+def component(name: str, settings: Settings, step_size: float) -> Component:
+    """The block `name` of `settings`. Raises FmuError where they give no component."""
+    try:
+        return BLOCKS[name](settings, step_size)
+    except (ValueError, ArithmeticError) as error:
+        raise FmuError(f"{name}: {error}") from error
+
+
+def build_block(
+    name: str, settings: Settings, room: Path, *, stop_time: float, step_size: float
+) -> Path:
+    """The path of the block's FMU: in the cache, or made in `room` where the cache is off.
+
+    settings holds the records of `components.specs` that the block is made of, by the names
+    of a scene's tables; step_size (s) is its communication step.
+    """
+
+    def make(folder: Path) -> Path:
+        from hapticlink.fmus.build import build
+
+        made = component(name, settings, step_size)
+        return build(made, folder, stop_time=stop_time, step_size=step_size)
+
+    if cache.folder() is None:
+        return make(room)
+    material = {
+        "block": name,
+        "settings": {k: asdict(v) if is_dataclass(v) else v for k, v in settings.items()},  # type: ignore[arg-type]
+        "stop_time": stop_time,
+        "step_size": step_size,
+    }
+    return cache.cached(material, make)

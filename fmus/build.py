@@ -1,0 +1,45 @@
+"""A component becomes a Python FMU on disk."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from pathlib import Path
+
+from fmpy.validation import validate_fmu
+
+from hapticlink.components.component import Component
+from hapticlink.fmus.archive import entries, require_platform, write
+from hapticlink.fmus.errors import FmuError
+
+
+def build(
+    component: Component,
+    folder: Path | str,
+    *,
+    stop_time: float = 1.0,
+    step_size: float = 1 / 512,
+) -> Path:
+    """Write `<folder>/<component.name>.fmu` and return its path.
+
+    stop_time and step_size (s) are the FMU's default experiment. The same component gives
+    the same bytes. The file appears whole or not at all, and only if FMPy's validation has
+    no finding; otherwise FmuError lists the findings. UnsupportedPlatform is raised where
+    pythonfmu has no binary.
+    """
+    require_platform()
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = entries(component, stop_time=stop_time, step_size=step_size)
+    target = folder / f"{component.name}.fmu"
+    unfinished = folder / f".{component.name}.{uuid.uuid4().hex}.fmu"
+    try:
+        with unfinished.open("xb") as file:
+            write(files, file)
+        findings = validate_fmu(str(unfinished))
+        if findings:
+            raise FmuError(f"`{component.name}` fails validation:\n  " + "\n  ".join(findings))
+        os.replace(unfinished, target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return target

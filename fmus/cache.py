@@ -1,0 +1,95 @@
+"""Built FMUs, kept by what they were made from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import tempfile
+import uuid
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import hapticlink.components
+import hapticlink.fmus
+
+VERSIONS = ("hapticlink", "casadi", "pythonfmu")
+
+
+def folder() -> Path | None:
+    """HAPTICLINK_CACHE, or the user's cache folder; None where HAPTICLINK_CACHE is "off"."""
+    chosen = os.environ.get("HAPTICLINK_CACHE")
+    if chosen == "off":
+        return None
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "hapticlink"
+
+
+def key(material: Mapping[str, Any]) -> str:
+    """sha256 of the JSON `material`, the versions in VERSIONS and the sources of the equations."""
+    whole = {
+        "material": material,
+        "versions": {name: version(name) for name in VERSIONS},
+        "sources": _sources(),
+    }
+    return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()
+
+
+@cache
+def _sources() -> str:
+    sha = hashlib.sha256()
+    for package in (hapticlink.components, hapticlink.fmus):
+        root = Path(package.__path__[0])
+        for path in sorted(root.rglob("*.py")):
+            sha.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    return sha.hexdigest()
+
+
+def cached(key_material: Mapping[str, Any], build_function: Callable[[Path], Path]) -> Path:
+    """The FMU for `key_material`, made by `build_function(folder) -> path` if it is not there.
+
+    Runs that race build each their own, and the last rename wins: the bytes are the same. A
+    cached file that is damaged is built again. With the cache off, the FMU lands in a new
+    temporary folder, which is the caller's to remove.
+    """
+    root = folder()
+    if root is None:
+        return build_function(Path(tempfile.mkdtemp(prefix="hapticlink-")))
+    place = root / key(key_material)
+    for path in place.glob("[!.]*.fmu"):
+        if _is_whole(path):
+            return path
+    place.mkdir(parents=True, exist_ok=True)
+    # Built beside its final place and moved in whole, so a reader never sees half a file.
+    room = place / f".{uuid.uuid4().hex}"
+    room.mkdir()
+    try:
+        built = build_function(room)
+        target = place / built.name
+        os.replace(built, target)
+    finally:
+        for left in room.iterdir():
+            left.unlink()
+        room.rmdir()
+    return target
+
+
+def _is_whole(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return archive.testzip() is None and "modelDescription.xml" in archive.namelist()
+    except (OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):
+        return False

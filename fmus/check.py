@@ -1,0 +1,212 @@
+"""The contract that every FMU of the project meets, Python or native.
+
+A run sets inputs near their start values, steps and gets all reals. Every way to the same
+run has to give the same bits.
+"""
+
+from __future__ import annotations
+
+import shutil
+from array import array
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import fmpy
+import numpy as np
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from fmpy.validation import validate_fmu
+
+STEPS = 4
+Trace = list[bytes]
+
+
+class Session:
+    """An extracted FMU and instances of it, all freed at the end."""
+
+    def __init__(self, path: Path | str) -> None:
+        self.description = fmpy.read_model_description(str(path), validate=False)
+        variables = self.description.modelVariables
+        self.reals = [v.valueReference for v in variables if v.type == "Real"]
+        self.inputs = [v for v in variables if v.causality == "input" and v.type == "Real"]
+        experiment = self.description.defaultExperiment
+        self.step_size = float(experiment.stepSize or 1e-3) if experiment else 1e-3
+        self.folder = fmpy.extract(str(path))
+        self.messages: list[str] = []
+        self._instances: list[FMU2Slave] = []
+
+    def instance(self, name: str = "instance") -> FMU2Slave:
+        """Instantiated, before initialisation; its log goes to `messages`."""
+        slave = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=self.folder,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
+        callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+        callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+        slave.instantiate(callbacks=callbacks, loggingOn=True)
+        self._instances.append(slave)
+        return slave
+
+    def _log(self, _: object, __: bytes, status: int, ___: bytes, message: bytes) -> None:
+        self.messages.append(message.decode())
+
+    def free(self, slave: FMU2Slave) -> None:
+        self._instances.remove(slave)
+        slave.freeInstance()
+
+    def close(self) -> None:
+        """Free what is left and remove the extracted files."""
+        for slave in list(self._instances):
+            self.free(slave)
+        shutil.rmtree(self.folder)
+
+
+@contextmanager
+def session(path: Path | str) -> Iterator[Session]:
+    """A Session, closed whatever happens."""
+    opened = Session(path)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def initialize(slave: FMU2Slave) -> None:
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+
+
+def run(slave: FMU2Slave, at: Session, first: int = 0, count: int = STEPS) -> Trace:
+    """Set inputs, step, get all reals; steps `first` to `first + count - 1`."""
+    references = [v.valueReference for v in at.inputs]
+    trace = []
+    for k in range(first, first + count):
+        # Small, all different, changing: a value lost or swapped shows.
+        nudged = [float(v.start or 0.0) + 1e-4 * (i + 1 + k) for i, v in enumerate(at.inputs)]
+        if references:
+            slave.setReal(references, nudged)
+        slave.doStep(k * at.step_size, at.step_size)
+        trace.append(array("d", slave.getReal(at.reals)).tobytes())
+    return trace
+
+
+def check_fmu(path: Path | str) -> list[str]:
+    """What is wrong with the FMU at `path`; empty where it meets the contract."""
+    findings = [f"validation: {finding}" for finding in validate_fmu(str(path))]
+    if findings:
+        return findings
+    with session(path) as at:
+        slave = at.instance()
+        initialize(slave)
+        try:
+            reference = run(slave, at)
+        except FMICallException as error:
+            return [f"run: {error}; {' | '.join(at.messages)}"]
+        at.free(slave)
+        for check in CHECKS:
+            try:
+                finding = check(at, reference)
+            except FMICallException as error:
+                finding = f"{error}; {' | '.join(at.messages)}"
+            if finding:
+                findings.append(f"{check.__name__.strip('_')}: {finding}")
+    findings += _alone(path, at.step_size)
+    return findings
+
+
+def _alone(path: Path | str, step_size: float) -> list[str]:
+    """Under FMPy with nothing but its start values it has to run and stay finite."""
+    stop = STEPS * step_size
+    try:
+        result = fmpy.simulate_fmu(str(path), stop_time=stop, output_interval=step_size)
+    except Exception as error:
+        return [f"alone: {error}"]
+    bad = [name for name in result.dtype.names if not np.isfinite(result[name]).all()]
+    return [f"alone: not finite from its own start values: {', '.join(bad)}"] if bad else []
+
+
+def _inputs_read_back(at: Session, _: Trace) -> str | None:
+    slave = at.instance()
+    initialize(slave)
+    references = [v.valueReference for v in at.inputs]
+    values = [float(v.start or 0.0) + 0.1 * (i + 1) for i, v in enumerate(at.inputs)]
+    if references:
+        slave.setReal(references, values)
+    read = slave.getReal(references) if references else []
+    at.free(slave)
+    return None if read == values else f"set {values}, read {read}"
+
+
+def _load_again(at: Session, reference: Trace) -> str | None:
+    slave = at.instance()
+    initialize(slave)
+    return _compare(run(slave, at), reference)
+
+
+def _reset(at: Session, reference: Trace) -> str | None:
+    slave = at.instance()
+    initialize(slave)
+    run(slave, at)
+    slave.reset()
+    initialize(slave)
+    return _compare(run(slave, at), reference)
+
+
+def _two_instances(at: Session, reference: Trace) -> str | None:
+    one, two = at.instance("one"), at.instance("two")
+    initialize(one)
+    initialize(two)
+    run(one, at, count=1)
+    trace = run(two, at)
+    rest = run(one, at, first=1, count=STEPS - 1)
+    return _compare(trace, reference) or _compare(rest, reference[1:])
+
+
+def _save_and_restore(at: Session, reference: Trace) -> str | None:
+    slave = at.instance()
+    initialize(slave)
+    run(slave, at, count=2)
+    state = slave.getFMUState()
+    saved = slave.serializeFMUstate(state)
+    run(slave, at, first=2, count=STEPS - 2)
+    slave.setFMUState(state)
+    slave.freeFMUState(state)
+    trace = run(slave, at, first=2, count=STEPS - 2)
+    return _compare(trace, reference[2:]) or _deserialize(at, saved, reference)
+
+
+def _deserialize(at: Session, saved: bytes, reference: Trace) -> str | None:
+    """Into another instance, which then goes on as the first one did."""
+    slave = at.instance("other")
+    initialize(slave)
+    state = slave.deSerializeFMUstate(saved)
+    if slave.serializeFMUstate(state) != saved:
+        return "serialised, read and serialised again, the bytes differ"
+    slave.setFMUState(state)
+    slave.freeFMUState(state)
+    return _compare(run(slave, at, first=2, count=STEPS - 2), reference[2:])
+
+
+CHECKS: tuple[Callable[[Session, Trace], str | None], ...] = (
+    _inputs_read_back,
+    _load_again,
+    _reset,
+    _two_instances,
+    _save_and_restore,
+)
+
+
+def _compare(trace: Trace, reference: Trace) -> str | None:
+    for k, (got, expected) in enumerate(zip(trace, reference, strict=True)):
+        if got != expected:
+            a, b = array("d", got), array("d", expected)
+            i = next(i for i in range(len(a)) if a[i : i + 1].tobytes() != b[i : i + 1].tobytes())
+            return f"entry {k} of the run differs in real {i}: {a[i]!r} instead of {b[i]!r}"
+    return None

@@ -1,0 +1,128 @@
+"""Scalar functions with the IEEE 754 results of C, where Python's `math` raises.
+
+1/0 is inf, log(-1) is nan, exp(1000) is inf. This file's text is put before generated
+straight-line code, which must run without this package: it needs only `math`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from math import asinh, atan, atan2, copysign, erf, fabs, inf, isnan, nan, tanh  # noqa: F401
+
+Function = Callable[..., float]
+
+
+def div(a: float, b: float) -> float:
+    try:
+        return a / b
+    except ZeroDivisionError:
+        if a == 0.0 or isnan(a):
+            return nan
+        return copysign(inf, a) * copysign(1.0, b)
+
+
+def power(a: float, b: float) -> float:
+    """C's pow: a pole for 0 to a negative power, odd whole powers keep the sign."""
+    try:
+        return math.pow(a, b)
+    except OverflowError:
+        return -inf if a < 0.0 and math.fmod(b, 2.0) else inf
+    except ValueError:
+        if a == 0.0:
+            return copysign(inf, a) if fabs(math.fmod(b, 2.0)) == 1.0 else inf
+        return nan
+
+
+def _overflowing(function: Function) -> Function:
+    """An odd or positive function that leaves the range of floats only by overflow."""
+
+    def guarded(a: float) -> float:
+        try:
+            return function(a)
+        except OverflowError:
+            return inf if a > 0.0 or function is math.cosh else -inf
+
+    return guarded
+
+
+def _with_domain(function: Function) -> Function:
+    """nan outside the domain."""
+
+    def guarded(*arguments: float) -> float:
+        try:
+            return function(*arguments)
+        except ValueError:
+            return nan
+
+    return guarded
+
+
+def _with_pole(function: Function, pole: float) -> Function:
+    """-inf at the pole of a logarithm, nan beyond it."""
+
+    def guarded(a: float) -> float:
+        try:
+            return function(a)
+        except ValueError:
+            return -inf if a == pole else nan
+
+    return guarded
+
+
+exp, expm1, sinh, cosh = map(_overflowing, (math.exp, math.expm1, math.sinh, math.cosh))
+sqrt, sin, cos, tan = map(_with_domain, (math.sqrt, math.sin, math.cos, math.tan))
+asin, acos, acosh = map(_with_domain, (math.asin, math.acos, math.acosh))
+fmod, remainder = map(_with_domain, (math.fmod, math.remainder))
+log, log1p = _with_pole(math.log, 0.0), _with_pole(math.log1p, -1.0)
+hypot = math.hypot
+
+
+def atanh(a: float) -> float:
+    return copysign(inf, a) if fabs(a) == 1.0 else nan if fabs(a) > 1.0 else math.atanh(a)
+
+
+def floor(a: float) -> float:
+    return copysign(float(math.floor(a)), a) if math.isfinite(a) else a
+
+
+def ceil(a: float) -> float:
+    return copysign(float(math.ceil(a)), a) if math.isfinite(a) else a
+
+
+def sign(a: float) -> float:
+    return -1.0 if a < 0.0 else 1.0 if a > 0.0 else a
+
+
+def fmin(a: float, b: float) -> float:
+    """The number where one of the two is nan."""
+    return a if a < b or isnan(b) else b if not isnan(b) else a
+
+
+def fmax(a: float, b: float) -> float:
+    return a if a > b or isnan(b) else b if not isnan(b) else a
+
+
+def if_else_zero(condition: float, value: float) -> float:
+    """0 where the condition is 0, whatever the value, even nan."""
+    return 0.0 if condition == 0.0 else value
+
+
+def erfinv(a: float) -> float:
+    """Inverse of erf: CasADi's rational start (calculus.hpp), polished by two Newton steps."""
+    if fabs(a) >= 1.0:
+        return copysign(inf, a) if fabs(a) == 1.0 else nan
+    if isnan(a):
+        return nan
+    if a < 0.7 and a >= -0.7:
+        z = a * a
+        top = ((-0.140543331 * z + 0.914624893) * z - 1.645349621) * z + 0.886226899
+        low = (((-0.329097515 * z + 0.012229801) * z + 1.442710462) * z - 2.118377725) * z + 1.0
+        y = a * top / low
+    else:
+        z = math.sqrt(-math.log((1.0 - fabs(a)) / 2.0))
+        top = ((1.641345311 * z + 3.429567803) * z - 1.624906493) * z - 1.970840454
+        y = copysign(top / ((1.637067800 * z + 3.543889200) * z + 1.0), a)
+    for _ in range(2):
+        y = y - (erf(y) - a) / (2.0 / math.sqrt(math.pi) * math.exp(-y * y))
+    return y

@@ -1,0 +1,152 @@
+"""modelDescription.xml of a component, FMI 2.0.5 co-simulation.
+
+Value references count [inputs | parameters | outputs] from 0 in flat order; the index in
+ModelStructure is the value reference + 1.
+
+Dependencies are structural, from CasADi's sparsity. For `Outputs` FMI asks which inputs
+an output reads at a communication point (section 2.2.8). A continuous block answers with
+the inputs that y = output(x, u, p, t) reads. A sampled block's y_k is made inside the
+doStep that starts at t_k, from the inputs of t_k: it lists those inputs, which is what the
+order of blocks within a tick has to know; set after the doStep they have no effect, so for
+a strict reading the list is longer than need be, which FMI allows. `InitialUnknowns` lists
+inputs and parameters, through x0 = initialize(u, p). Outputs of sampled blocks have
+variability "discrete".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from importlib.metadata import version
+from xml.etree import ElementTree as ET
+
+import casadi as ca
+
+from hapticlink.components.component import Component, Variable
+from hapticlink.fmus.units import base_unit
+
+CAPABILITIES = {
+    "needsExecutionTool": "true",
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+}
+LOG_CATEGORIES = {
+    "logStatusWarning": "Messages with status fmi2Warning.",
+    "logStatusDiscard": "Messages with status fmi2Discard.",
+    "logStatusError": "Messages with status fmi2Error.",
+    "logStatusFatal": "Messages with status fmi2Fatal.",
+    "logAll": "All messages.",
+}
+
+
+def model_description(
+    component: Component, guid: str, *, stop_time: float, step_size: float
+) -> bytes:
+    """The XML text, the same bytes for the same arguments (it carries no date)."""
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=component.name,
+        guid=guid,
+        description=component.description,
+        generationTool=f"hapticlink {version('hapticlink')}",
+        variableNamingConvention="structured",
+    )
+    ET.SubElement(root, "CoSimulation", {"modelIdentifier": component.name, **CAPABILITIES})
+    _unit_definitions(root, component)
+    categories = ET.SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        ET.SubElement(categories, "Category", name=name, description=text)
+    ET.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0.0",
+        stopTime=repr(float(stop_time)),
+        stepSize=repr(float(step_size)),
+    )
+    tool = ET.SubElement(ET.SubElement(root, "VendorAnnotations"), "Tool", name="hapticlink")
+    ET.SubElement(tool, "Block", timing=component.timing, substeps=str(component.substeps))
+    _model_variables(root, component)
+    _model_structure(root, component)
+    ET.indent(root)
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def _unit_definitions(root: ET.Element, component: Component) -> None:
+    variables = (*component.inputs, *component.parameters, *component.outputs)
+    units = sorted({unit for v in variables for unit in v.units})
+    if units:
+        definitions = ET.SubElement(root, "UnitDefinitions")
+        for unit in units:
+            element = ET.SubElement(definitions, "Unit", name=unit)
+            exponents = {base: str(power) for base, power in base_unit(unit).items()}
+            ET.SubElement(element, "BaseUnit", exponents)
+
+
+def scalars(variables: Iterable[Variable]) -> Iterator[tuple[Variable, str, str, float]]:
+    """(variable, name, unit, start) of each scalar in flat order."""
+    for v in variables:
+        for name, unit, start in zip(v.names, v.units, v.starts, strict=True):
+            yield v, name, unit, start
+
+
+def _model_variables(root: ET.Element, component: Component) -> None:
+    parent = ET.SubElement(root, "ModelVariables")
+
+    def add(v: Variable, name: str, unit: str, start: float | None, **attributes: str) -> None:
+        if v.description:
+            attributes["description"] = v.description
+        scalar = ET.SubElement(
+            parent,
+            "ScalarVariable",
+            {"name": name, "valueReference": str(len(parent)), **attributes},
+        )
+        real = ET.SubElement(scalar, "Real", unit=unit)
+        if start is not None:
+            real.set("start", repr(float(start)))
+
+    for v, name, unit, start in scalars(component.inputs):
+        add(v, name, unit, start, causality="input", variability="continuous")
+    for v, name, unit, start in scalars(component.parameters):
+        add(v, name, unit, start, causality="parameter", variability=v.variability, initial="exact")
+    kind = "discrete" if component.timing == "sampled" else "continuous"
+    for v, name, unit, _ in scalars(component.outputs):
+        add(v, name, unit, None, causality="output", variability=kind, initial="calculated")
+
+
+def _model_structure(root: ET.Element, component: Component) -> None:
+    structure = ET.SubElement(root, "ModelStructure")
+    known = len(component.start_inputs) + len(component.start_parameters)
+    for tag, dependencies in (
+        ("Outputs", feed_through(component)),
+        ("InitialUnknowns", initial_dependencies(component)),
+    ):
+        if dependencies:
+            parent = ET.SubElement(structure, tag)
+            for k, columns in enumerate(dependencies):
+                indices = " ".join(str(column + 1) for column in columns)
+                ET.SubElement(parent, "Unknown", index=str(known + k + 1), dependencies=indices)
+
+
+def feed_through(component: Component) -> list[list[int]]:
+    """For each flat output the flat inputs that y = output(x, u, p, t) reads."""
+    return _rows(component.output.jac_sparsity(0, 1))
+
+
+def initial_dependencies(component: Component) -> list[list[int]]:
+    """For each flat output the places in [inputs | parameters] that it reads at t = 0."""
+    n_u, n_p = len(component.start_inputs), len(component.start_parameters)
+    known, t = ca.SX.sym("known", n_u + n_p), ca.SX.sym("t")
+    u, p = known[:n_u], known[n_u:]
+    y = component.output(component.initialize(u, p), u, p, t)
+    return _rows(ca.Function("initial", [known, t], [y]).jac_sparsity(0, 0))
+
+
+def _rows(sparsity: ca.Sparsity) -> list[list[int]]:
+    rows: list[list[int]] = [[] for _ in range(sparsity.size1())]
+    for row, column in zip(*sparsity.get_triplet(), strict=True):
+        rows[row].append(column)
+    return [sorted(columns) for columns in rows]

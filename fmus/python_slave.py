@@ -1,0 +1,273 @@
+"""The slave of every Python FMU: a component's functions behind pythonfmu's interface.
+
+Its text is copied into the FMU's resources/ under a name that carries a hash of the FMU's
+content: all Python FMUs of a process share one interpreter, and a second module of the
+same name would silently be the first. It needs the standard library and pythonfmu; casadi
+is used where it is there. pythonfmu runs the body twice and takes for the slave the class
+that it finds in it, so the body does nothing and imports no other class.
+
+All reals stand in one array [inputs | parameters | outputs]; a place is a value reference.
+
+    continuous   doStep: substeps times x <- step(x, u, p, t, h/substeps);
+                 get: y = output(x, u, p, t), evaluated when asked for
+    sampled      doStep: y <- output(x, u, p, t_k), then x <- step(...); get: that y
+
+Up to the end of initialisation mode both kinds answer a get with y = output(x0, u, p, t),
+x0 = initialize(u, p), of the values set so far.
+"""
+
+from __future__ import annotations
+
+import array
+import ctypes
+import functools
+import json
+import math
+import os
+import typing
+
+from pythonfmu import Fmi2Slave, enums
+
+
+def _surviving(method: typing.Callable) -> typing.Callable:
+    """A method whose exceptions leave the process whole.
+
+    pythonfmu 0.7 answers an exception with fmi2Fatal and drops its references to the class,
+    the instance and its log, and then drops them again when it frees the instance: the
+    process crashes. So each gets the reference that will be missing.
+    """
+
+    @functools.wraps(method)
+    def surviving(self: HapticlinkSlave, *arguments: typing.Any) -> typing.Any:
+        try:
+            return method(self, *arguments)
+        except Exception:
+            for kept in (type(self), self, self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            raise
+
+    return surviving
+
+
+class HapticlinkSlave(Fmi2Slave):
+    _loaded: typing.ClassVar[
+        dict
+    ] = {}  # functions by way of evaluation, read once for all instances
+
+    def __init__(self, **kwargs: typing.Any) -> None:
+        super().__init__(**kwargs)
+        with open(os.path.join(self.resources, "component.json"), encoding="utf-8") as file:
+            self._about = about = json.load(file)
+        n_u, n_p, n_y, n_x = (about[k] for k in ("n_inputs", "n_parameters", "n_outputs", "n_x"))
+        self._settable, self._n_inputs = n_u + n_p, n_u
+        self._fixed = frozenset(about["fixed"])
+        self._sampled, self._substeps = about["timing"] == "sampled", about["substeps"]
+        # time, substep, and three flags: initialised, x0 to be computed, y to be computed
+        clock = _doubles([0.0, 0.0, 0.0, 1.0, 1.0])
+        x, trial, after = (_doubles([0.0] * n_x) for _ in range(3))
+        values = _doubles(about["starts"] + [0.0] * n_y)
+        u, p, y = values[:n_u], values[n_u : n_u + n_p], values[n_u + n_p :]
+        t, h = clock[0:1], clock[1:2]
+        self._clock, self._values = clock, values
+        self._state, self._trial, self._after = x, trial, after
+        self._buffers: list = []
+        self._blocks: dict = {}
+        self._evaluate_x0 = self._bind("initialize", (u, p), x)
+        self._evaluate_y = self._bind("output", (x, u, p, t), y)
+        self._evaluate_step = self._bind("step", (trial, u, p, t, h), after)
+
+    # --- the component's functions ------------------------------------------------------
+
+    def _bind(self, name: str, arguments: tuple, result: memoryview) -> typing.Callable:
+        """A call without arguments that reads and writes these arrays in place."""
+        function = self._functions()[name]
+        if not hasattr(function, "buffer"):
+            return functools.partial(function, *arguments, result)
+        buffer, evaluate = function.buffer()
+        for i, argument in enumerate(arguments):
+            buffer.set_arg(i, argument)
+        buffer.set_res(0, result)
+        self._buffers.append(buffer)  # `evaluate` holds a bare pointer to it
+        return evaluate
+
+    def _functions(self) -> dict:
+        pure = os.environ.get("HAPTICLINK_PURE_PYTHON") == "1"
+        if pure not in self._loaded:
+            self._loaded[pure] = self._read_text() if pure else self._read_casadi()
+        return self._loaded[pure]
+
+    def _read_casadi(self) -> dict:
+        """The CasADi functions; the same in plain Python where casadi is missing or refuses."""
+        try:
+            import casadi
+
+            with open(os.path.join(self.resources, "functions.casadi.json")) as file:
+                texts = json.load(file)
+            return {name: casadi.Function.deserialize(text) for name, text in texts.items()}
+        except Exception as error:
+            self.log(f"runs on plain Python, which is slower than casadi: {error}")
+            return self._read_text()
+
+    def _read_text(self) -> dict:
+        path = os.path.join(self.resources, "functions.txt")
+        with open(path, encoding="utf-8") as file:
+            namespace = {"__name__": "functions"}
+            exec(compile(file.read(), path, "exec"), namespace)
+        return {name: namespace[name] for name in ("initialize", "step", "output")}
+
+    # --- FMI ----------------------------------------------------------------------------
+
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        self._clock[0] = start_time
+
+    @_surviving
+    def exit_initialization_mode(self) -> None:
+        self._refresh()
+        if not all(map(math.isfinite, self._state)):
+            raise ValueError(self._not_finite(self._state, self._clock[0]))
+        self._clock[2] = 1.0
+
+    @_surviving
+    def get_real(self, vrs: list) -> list:
+        block, last = self._block(vrs)
+        if self._clock[4] and last >= self._settable:
+            self._refresh()
+        values = self._values
+        return values[block].tolist() if block else [values[vr] for vr in vrs]
+
+    @_surviving
+    def set_real(self, vrs: list, values: list) -> None:
+        block, last = self._block(vrs)
+        clock = self._clock
+        if last >= self._n_inputs:
+            self._refuse_unsettable(vrs)
+        if block:
+            self._values[block] = array.array("d", values)
+        else:
+            for vr, value in zip(vrs, values):  # noqa: B905 - pythonfmu sends pairs
+                self._values[vr] = value
+        if not clock[2]:
+            clock[3] = clock[4] = 1.0
+        elif not self._sampled:
+            clock[4] = 1.0
+
+    def _block(self, vrs: list) -> tuple:
+        """(slice where the value references are a run, else None; the largest), remembered."""
+        key = tuple(vrs)
+        found = self._blocks.get(key)
+        if found is None:
+            last = max(key, default=-1)
+            if last >= len(self._values):
+                raise ValueError(f"unknown value reference {last}; {len(self._values)} are known")
+            run = key == tuple(range(last + 1 - len(key), last + 1))
+            found = (slice(last + 1 - len(key), last + 1) if run else None, last)
+            if len(self._blocks) >= 1000:
+                self._blocks.clear()
+            self._blocks[key] = found
+        return found
+
+    def _refuse_unsettable(self, vrs: list) -> None:
+        for vr in vrs:
+            name = self._about["names"][vr]
+            if vr >= self._settable:
+                raise ValueError(f"{name} is an output; it cannot be set")
+            if self._clock[2] and vr in self._fixed:
+                raise ValueError(
+                    f"parameter {name} is fixed; set it before the end of initialisation mode"
+                )
+
+    def _refresh(self) -> None:
+        """Bring x0 and y up to date with what was set."""
+        clock = self._clock
+        if clock[3]:
+            self._evaluate_x0()
+            clock[3] = 0.0
+        if clock[4]:
+            self._evaluate_y()
+            clock[4] = 0.0
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """True is fmi2OK, False fmi2Discard; nothing is raised. The state moves on success."""
+        try:
+            return self._advance(current_time, step_size)
+        except Exception as error:
+            self.log(f"step at t = {current_time!r}: {error!r}", enums.Fmi2Status.error)
+            return False
+
+    def _advance(self, start: float, step_size: float) -> bool:
+        clock, x, trial, after = self._clock, self._state, self._trial, self._after
+        if clock[3]:
+            self._refresh()
+        n = self._substeps
+        clock[1] = step_size / n
+        trial[:] = x
+        for k in range(n):
+            clock[0] = start + k * step_size / n
+            self._evaluate_step()
+            trial[:] = after
+        if not all(map(math.isfinite, trial)):
+            clock[0] = start
+            message = self._not_finite(trial, start + step_size)
+            self.log(f"{message}; the state stays at t = {start!r}", enums.Fmi2Status.error)
+            return False
+        if self._sampled:
+            clock[0] = start
+            self._evaluate_y()
+        x[:] = trial
+        clock[0] = start + step_size
+        clock[4] = 0.0 if self._sampled else 1.0
+        return True
+
+    def _not_finite(self, state: memoryview, time: float) -> str:
+        """Which state is not finite, and the likely cause."""
+        about = self._about
+        i = next(i for i, value in enumerate(state) if not math.isfinite(value))
+        known = zip(about["names"], self._values[: self._settable])  # noqa: B905 - outputs left out
+        bad = [f"{name} = {value}" for name, value in known if not math.isfinite(value)]
+        cause = (
+            f"not finite before: {', '.join(bad[:3])}; look at what sets it"
+            if bad
+            else "inputs and parameters are finite; take a smaller step or more substeps"
+        )
+        return f"{about['states'][i]} became {state[i]} at t = {time!r}; {cause}"
+
+    # --- FMU state: bytes, so that saving and serialising are the same, bit for bit -------
+
+    def _get_fmu_state(self) -> bytes:
+        parts = (self._clock, self._values, self._state)
+        return self._about["digest"].encode() + b"".join(part.tobytes() for part in parts)
+
+    @_surviving
+    def _set_fmu_state(self, state: bytes) -> None:
+        digest, parts = self._about["digest"].encode(), (self._clock, self._values, self._state)
+        size = len(digest) + sum(8 * len(part) for part in parts)
+        if not state.startswith(digest) or len(state) != size:
+            raise ValueError("this FMU state was not saved by this FMU")
+        offset = len(digest)
+        for part in parts:
+            end = offset + 8 * len(part)
+            part[:] = array.array("d", state[offset:end])
+            offset = end
+
+    # There are none of these; asked for all the same, the answer must not crash.
+    get_integer = _surviving(Fmi2Slave.get_integer)
+    get_boolean = _surviving(Fmi2Slave.get_boolean)
+    get_string = _surviving(Fmi2Slave.get_string)
+    set_integer = _surviving(Fmi2Slave.set_integer)
+    set_boolean = _surviving(Fmi2Slave.set_boolean)
+    set_string = _surviving(Fmi2Slave.set_string)
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: bytes) -> bytes:
+        return state
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> bytes:
+        return bytes(state)
+
+
+def _doubles(values: list) -> typing.Any:
+    """Doubles in memory of our own; slices of it share that memory."""
+    return memoryview(array.array("d", values))

@@ -1,0 +1,99 @@
+"""A CasADi function as straight-line Python text that needs nothing but `math`.
+
+Each instruction of CasADi's virtual machine becomes one assignment, in its order, so both
+ways of evaluating do the same operations on the same numbers. A generated function reads
+its arguments and writes its results in place:
+
+    def step(a0, a1, r0):        # r0[i] = ...
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+import casadi as ca
+
+from hapticlink.fmus import ieee
+from hapticlink.fmus.errors import UnknownOperation
+
+# One of `UNARY` and `BINARY` is a function of ieee.py by the same name.
+UNARY = """exp expm1 log log1p sqrt sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh
+           floor ceil fabs sign erf erfinv"""
+BINARY = "atan2 fmod remainder copysign fmin fmax hypot if_else_zero"
+
+# Plain arithmetic stays an operator; division and powers raise in Python, so they do not.
+TEMPLATES: dict[int, str] = {
+    ca.OP_ASSIGN: "{0}",
+    ca.OP_ADD: "{0} + {1}",
+    ca.OP_SUB: "{0} - {1}",
+    ca.OP_MUL: "{0} * {1}",
+    ca.OP_DIV: "div({0}, {1})",
+    ca.OP_NEG: "-{0}",
+    ca.OP_INV: "div(1.0, {0})",
+    ca.OP_SQ: "{0} * {0}",
+    ca.OP_TWICE: "{0} + {0}",
+    ca.OP_POW: "power({0}, {1})",
+    ca.OP_CONSTPOW: "power({0}, {1})",
+    ca.OP_LT: "1.0 if {0} < {1} else 0.0",
+    ca.OP_LE: "1.0 if {0} <= {1} else 0.0",
+    ca.OP_EQ: "1.0 if {0} == {1} else 0.0",
+    ca.OP_NE: "1.0 if {0} != {1} else 0.0",
+    ca.OP_NOT: "0.0 if {0} else 1.0",
+    ca.OP_AND: "1.0 if {0} and {1} else 0.0",
+    ca.OP_OR: "1.0 if {0} or {1} else 0.0",
+    ca.OP_LIFT: "{0}",
+    ca.OP_PRINTME: "{0}",
+}
+TEMPLATES |= {getattr(ca, f"OP_{name.upper()}"): name + "({0})" for name in UNARY.split()}
+TEMPLATES |= {getattr(ca, f"OP_{name.upper()}"): name + "({0}, {1})" for name in BINARY.split()}
+
+_NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
+
+
+def straight_line(function: ca.Function) -> str:
+    """The text of a Python function of the same name.
+
+    Raises UnknownOperation for an instruction that is not scalar arithmetic (an external
+    call, a solver) and for a free variable.
+    """
+    if not function.is_a("SXFunction"):
+        function = function.expand()
+    if function.has_free():
+        raise UnknownOperation(f"`{function.name()}` has free variables {function.get_free()}")
+    lines = [_instruction(function, k) for k in range(function.n_instructions())]
+    arguments = [f"a{i}" for i in range(function.n_in())]
+    results = [f"r{i}" for i in range(function.n_out())]
+    head = f"def {function.name()}({', '.join(arguments + results)}):"
+    return "\n".join([head, *(f"    {line}" for line in lines or ["pass"])]) + "\n"
+
+
+def _instruction(function: ca.Function, k: int) -> str:
+    operation = function.instruction_id(k)
+    into, of = function.instruction_output(k), function.instruction_input(k)
+    if operation == ca.OP_CONST:
+        return f"w{into[0]} = {_literal(function.instruction_constant(k))}"
+    if operation == ca.OP_INPUT:
+        return f"w{into[0]} = a{of[0]}[{of[1]}]"
+    if operation == ca.OP_OUTPUT:
+        return f"r{into[0]}[{into[1]}] = w{of[0]}"
+    template = TEMPLATES.get(operation)
+    if template is None:
+        name = _NAMES.get(operation, str(operation))
+        raise UnknownOperation(
+            f"`{function.name()}`, instruction {k}: {name} has no straight-line Python form; "
+            "write the expression with scalar operations"
+        )
+    return f"w{into[0]} = " + template.format(*(f"w{i}" for i in of))
+
+
+def _literal(value: float) -> str:
+    """repr gives the same double back; inf and nan have no literal."""
+    return repr(float(value)) if math.isfinite(value) else f"float({str(value)!r})"
+
+
+def program(functions: Iterable[ca.Function]) -> str:
+    """One text, to be executed in an empty namespace, that defines all `functions`."""
+    helpers = Path(ieee.__file__).read_text(encoding="utf-8")
+    return "\n\n".join([helpers, *(straight_line(f) for f in functions)])

@@ -1,0 +1,26 @@
+"""FMUs built once for all tests of this folder, and a way to drive them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+import sample_components
+
+from hapticlink.fmus import build
+from hapticlink.fmus.check import Session, session
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("fmus")
+    return {c.name: build(c, folder) for c in sample_components.EVERY}
+
+
+@pytest.fixture
+def opened(fmus: dict[str, Path]) -> Iterator[Callable[[str], Session]]:
+    """name -> Session; closed at the end of the test."""
+    with ExitStack() as stack:
+        yield lambda name: stack.enter_context(session(fmus[name]))

@@ -1,0 +1,152 @@
+"""The FMU as a file: the same bytes, whole or not at all, documented."""
+
+from __future__ import annotations
+
+import re
+import struct
+import subprocess
+import sys
+import uuid
+import zipfile
+import zlib
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import casadi as ca
+import fmpy
+import pytest
+import sample_components
+
+from hapticlink.components.component import Variable
+from hapticlink.fmus import FmuError, build
+from hapticlink.fmus.errors import UnsupportedPlatform
+
+
+def test_same_component_same_bytes(fmus, tmp_path):
+    for component in sample_components.EVERY:
+        again = build(component, tmp_path)
+        assert again.read_bytes() == fmus[component.name].read_bytes()
+
+
+def test_same_bytes_from_another_process(fmus, tmp_path):
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import sample_components\nfrom hapticlink.fmus import build\n"
+        "build(sample_components.spring(), sys.argv[2])"
+    )
+    here = str(Path(__file__).parent)
+    subprocess.run([sys.executable, "-c", code, here, str(tmp_path)], check=True)
+    assert (tmp_path / "spring.fmu").read_bytes() == fmus["spring"].read_bytes()
+
+
+def test_the_guid_is_of_the_content(fmus, tmp_path):
+    def guid(path):
+        return fmpy.read_model_description(str(path)).guid
+
+    own = guid(fmus["spring"])
+    uuid.UUID(own)
+    assert re.fullmatch(r"\{[0-9a-f-]{36}\}", own)
+    changed = replace(sample_components.spring(), description="another word")
+    assert guid(build(changed, tmp_path)) != own
+    assert guid(build(sample_components.spring(substeps=2), tmp_path)) != own
+    assert guid(build(sample_components.spring(), tmp_path, step_size=0.1)) != own
+
+
+def test_binaries_of_both_platforms(fmus):
+    names = zipfile.ZipFile(fmus["spring"]).namelist()
+    assert {n for n in names if n.startswith("binaries/")} == {
+        "binaries/linux64/spring.so",
+        "binaries/win64/spring.dll",
+    }
+    assert names == sorted(names)
+
+
+def test_a_finding_publishes_nothing(tmp_path, monkeypatch):
+    build(sample_components.spring(), tmp_path)
+    before = (tmp_path / "spring.fmu").read_bytes()
+    # The package's `build` is the function; this is its module.
+    module = sys.modules["hapticlink.fmus.build"]
+    monkeypatch.setattr(module, "validate_fmu", lambda path: ["line 7 is odd"])
+    with pytest.raises(FmuError, match="line 7 is odd"):
+        build(sample_components.spring(substeps=2), tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["spring.fmu"]
+    assert (tmp_path / "spring.fmu").read_bytes() == before
+
+
+@pytest.mark.parametrize("machine", ["aarch64", "arm64"])
+def test_a_processor_without_a_binary_is_named(tmp_path, monkeypatch, machine):
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    with pytest.raises(UnsupportedPlatform, match=machine):
+        build(sample_components.spring(), tmp_path)
+
+
+SPRING = sample_components.spring()
+X = ca.SX.sym("x", 3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"name": "two words"}, "two words"),
+        ({"substeps": 0}, "0 substeps"),
+        ({"inputs": (Variable("F", (2,)),)}, "does not fit the declared variables"),
+        ({"initialize": ca.Function("start", [X], [X])}, "a function named start"),
+        ({"outputs": (Variable("F"), Variable("x", (3,)))}, "declared twice: F"),
+        ({"inputs": (Variable("F", unit="lbf"),)}, "'lbf' is none of"),
+    ],
+)
+def test_what_cannot_be_built_says_why(tmp_path, changes, message):
+    with pytest.raises(FmuError, match=message):
+        build(replace(SPRING, **changes), tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+class _Text(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.text: list[str] = []
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag != "meta":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def test_documentation_names_every_variable_and_escapes(fmus):
+    page = zipfile.ZipFile(fmus["spring"]).read("documentation/index.html").decode()
+    parser = _Text()
+    parser.feed(page)
+    assert parser.open == []
+    assert "  v <- v + h a < 1" in parser.text
+    cells = [text.strip() for text in parser.text]
+    for word in ("F", "pushing force", "m", "before the run", "8.0", "m, m/s", "m/s2"):
+        assert word in cells
+
+
+@pytest.mark.parametrize("name", ["spring", "controller"])
+def test_the_icon_is_a_whole_png(fmus, name):
+    data = zipfile.ZipFile(fmus[name]).read("model.png")
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    at, kinds, pixels = 8, [], b""
+    while at < len(data):
+        (size,) = struct.unpack(">I", data[at : at + 4])
+        kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
+        (crc,) = struct.unpack(">I", data[at + 8 + size : at + 12 + size])
+        assert crc == zlib.crc32(kind + body)
+        kinds.append(kind)
+        pixels += body if kind == b"IDAT" else b""
+        at += 12 + size
+    assert kinds == [b"IHDR", b"IDAT", b"IEND"]
+    assert len(zlib.decompress(pixels)) == 96 * (1 + 3 * 96)
+
+
+def test_the_icon_tells_the_kind(fmus):
+    read = {name: zipfile.ZipFile(path).read("model.png") for name, path in fmus.items()}
+    assert read["spring"] == read["fragile"] != read["controller"] == read["gain"]
