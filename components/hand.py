@@ -5,14 +5,19 @@ Sampled: F of t_k from the handle's x and v of t_k, with + on the handle.
 
 from __future__ import annotations
 
-import casadi as ca
-
 from hapticlink.components import integrators, specs
-from hapticlink.components.component import POSE, TWIST, WRENCH, Block, Component, Variable
+from hapticlink.components.component import (
+    DAMPING,
+    POSE,
+    STIFFNESS,
+    TWIST,
+    WRENCH,
+    Block,
+    Component,
+    Variable,
+)
 from hapticlink.components.tables import interpolate, slope
 
-STIFFNESS = ("N/m", "N/m", "N.m/rad")
-DAMPING = ("N.s/m", "N.s/m", "N.m.s/rad")
 _F = Variable("F", (3,), WRENCH, description="wrench of the hand on the handle")
 _X = Variable("x", (3,), POSE, description="pose of the handle")
 _V = Variable("v", (3,), TWIST, description="velocity of the handle")
@@ -45,7 +50,8 @@ def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
 
 
 def _arm(spec: specs.ArmHand) -> Component:
-    """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F,  F = K_gr (x_a - x) + B_gr (x_a' - v)."""
+    """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F, the grip
+    F = K_gr (x_a - x) + B_gr (x_a' - v)."""
     block = Block(
         inputs=[_X, _V],
         parameters=[

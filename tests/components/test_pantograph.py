@@ -1,0 +1,234 @@
+"""Twin pantograph: kinematics, dynamics, sensing and actuation as properties over the workspace."""
+
+from dataclasses import asdict
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from hapticlink.components import pantograph, specs
+
+DEVICE = specs.Device()
+P = {k: v for k, v in asdict(DEVICE).items() if isinstance(v, float | int)}
+POSE, V, WRENCH, ANGLES = (ca.SX.sym(s, n) for s, n in (("x", 3), ("v", 3), ("F", 3), ("a", 4)))
+
+
+def function(arguments, *expressions):
+    f = ca.Function("f", list(arguments), list(expressions))
+
+    def call(*values):
+        out = [np.array(v) for v in f.call([ca.DM(v) for v in values])]
+        return out[0] if len(out) == 1 else out
+
+    return call
+
+
+ARMS = tuple(pantograph.arms(POSE, P))
+angles = function([POSE], pantograph.base_angles(POSE, P))
+distal = function([POSE], ca.vertcat(*(arm.distal for arm in ARMS)))
+reach = function([POSE], ca.vertcat(*(arm.reach for arm in ARMS)))
+jacobian = function([POSE], pantograph.jacobian(POSE, P))
+dynamics = function([POSE, V], *pantograph.dynamics(POSE, V, P))
+margins = function([POSE], pantograph.margins(POSE, P))
+stop = function([POSE, V], pantograph.stop_wrench(POSE, V, P))
+estimate = function([ANGLES, POSE], pantograph.pose_from_angles(ANGLES, POSE, P))
+estimate_4 = function([ANGLES, POSE], pantograph.pose_from_angles(ANGLES, POSE, P, iterations=4))
+torques = function([WRENCH, POSE], pantograph.motor_torques(WRENCH, POSE, P))
+
+workspace = st.tuples(st.floats(-0.06, 0.05), st.floats(-0.05, 0.05), st.floats(-20, 20))
+wrenches = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-0.02, 0.02))
+twists = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-5, 5))
+
+
+@settings(max_examples=60, deadline=None)
+@given(workspace)
+def test_links_close_on_the_crank_ends_with_elbows_outward(pose):
+    q, psi = angles(pose).ravel(), distal(pose).ravel()
+    half = DEVICE.crank / 2 * np.array([np.cos(pose[2]), np.sin(pose[2])])
+    ends = np.array(pose[:2]) + np.array([-half, -half, half, half])
+    left_right = np.array([-1, 1, -1, 1])
+    base = np.column_stack(
+        [DEVICE.base_x + DEVICE.base_half_width * left_right, [-0.2, -0.2, 0.2, 0.2]]
+    )
+    elbow = base + DEVICE.proximal_length * np.column_stack([np.cos(q), np.sin(q)])
+    reached = elbow + DEVICE.distal_length * np.column_stack([np.cos(psi), np.sin(psi)])
+    np.testing.assert_allclose(reached, ends, atol=1e-14)
+    chord = ends - base
+    turn = chord[:, 0] * (elbow - base)[:, 1] - chord[:, 1] * (elbow - base)[:, 0]
+    toward = np.array([1, 1, -1, -1])
+    assert (turn * -left_right * toward > 0).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(workspace)
+def test_jacobian_is_the_derivative(pose):
+    step = 1e-6
+    numeric = [(angles(pose + step * e) - angles(pose - step * e)) / (2 * step) for e in np.eye(3)]
+    np.testing.assert_allclose(jacobian(pose), np.hstack(numeric), atol=1e-7)
+
+
+@settings(max_examples=60, deadline=None)
+@given(workspace)
+def test_angles_do_not_jump_as_the_handle_turns(pose):
+    turned = (*pose[:2], pose[2] + 2 * np.pi)
+    np.testing.assert_allclose(angles(turned), angles(pose), atol=1e-12)
+    near = (*pose[:2], pose[2] + 1e-5)
+    assert np.abs(angles(near) - angles(pose)).max() < 1e-5
+
+
+@settings(max_examples=60, deadline=None)
+@given(workspace, twists)
+def test_mass_matrix_is_that_of_the_moving_parts(pose, v):
+    """v' M v = 2 T, with T from velocities of the parts by finite differences."""
+    step = 1e-6
+
+    def parts(at):
+        q, psi = angles(at).ravel(), distal(at).ravel()
+        tip = np.column_stack([np.cos(q), np.sin(q)])
+        along = np.column_stack([np.cos(psi), np.sin(psi)])
+        center = DEVICE.proximal_length * tip + DEVICE.distal_center * along
+        return q, psi, DEVICE.proximal_center * tip, center
+
+    after, before = parts(pose + step * np.array(v)), parts(pose - step * np.array(v))
+    q, psi, proximal, center = ((a - b) / (2 * step) for a, b in zip(after, before, strict=True))
+    twice_T = (
+        (DEVICE.rotor_inertia + DEVICE.proximal_inertia) * (q**2).sum()
+        + DEVICE.proximal_mass * (proximal**2).sum()
+        + DEVICE.distal_mass * (center**2).sum()
+        + DEVICE.distal_inertia * (psi**2).sum()
+        + DEVICE.handle_mass * (v[0] ** 2 + v[1] ** 2)
+        + DEVICE.handle_inertia * v[2] ** 2
+    )
+    M, _ = dynamics(pose, v)
+    assert np.array(v) @ M @ v == pytest.approx(twice_T, rel=1e-6, abs=1e-12)
+    np.testing.assert_allclose(M, M.T, atol=1e-15)
+    assert np.linalg.eigvalsh(M)[0] > 0
+
+
+@settings(max_examples=60, deadline=None)
+@given(workspace, twists)
+def test_rate_of_the_mass_matrix_less_2C_is_skew(pose, v):
+    step = 1e-6
+    M_after, _ = dynamics(pose + step * np.array(v), v)
+    M_before, _ = dynamics(pose - step * np.array(v), v)
+    _, C = dynamics(pose, v)
+    N = (M_after - M_before) / (2 * step) - 2 * C
+    np.testing.assert_allclose(N, -N.T, atol=1e-6)
+
+
+def test_free_motion_keeps_its_energy():
+    """M v' + C v = 0, SciPy's DOP853: a wrong C would make or lose energy."""
+
+    def rate(_, x):
+        M, C = dynamics(x[:3], x[3:])
+        return np.concatenate([x[3:], np.linalg.solve(M, -C @ x[3:])])
+
+    x0 = np.array([-0.03, 0.01, 0.4, 0.05, -0.04, 9.0])
+    run = solve_ivp(rate, (0, 0.6), x0, "DOP853", rtol=1e-11, atol=1e-13)
+    energy = [x[3:] @ dynamics(x[:3], x[3:])[0] @ x[3:] / 2 for x in run.y.T]
+    assert np.ptp(run.y[2]) > np.pi
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-8)
+
+
+def test_the_default_device_fits_the_reported_motion():
+    """Over x -.06 to .05, |y| <= .05 m and every theta: far from singular, light, well sensed."""
+    rows = []
+    for x in np.linspace(-0.06, 0.05, 5):
+        for y in np.linspace(-0.05, 0.05, 5):
+            for theta in np.linspace(0, 2 * np.pi, 24, endpoint=False):
+                J = jacobian((x, y, theta))
+                M, _ = dynamics((x, y, theta), (0, 0, 0))
+                mobility = np.linalg.inv(M)
+                apparent = 1 / np.linalg.eigvalsh(mobility[:2, :2])
+                count = DEVICE.encoder_resolution * np.linalg.pinv(J)
+                rows.append(
+                    (
+                        reach((x, y, theta)).max() / 0.36,
+                        np.linalg.cond(J @ np.diag([1, 1, 1 / 0.04])),
+                        apparent.min(),
+                        apparent.max(),
+                        1 / mobility[2, 2],
+                        np.linalg.norm(count[:2], 2),
+                        np.linalg.norm(count[2]),
+                        margins((x, y, theta)).min(),
+                    )
+                )
+    stretch, condition, light, heavy, inertia, position, angle, margin = np.array(rows).T
+    assert stretch.max() < 0.845
+    assert condition.max() < 2.65
+    assert light.min() > 0.22
+    assert heavy.max() < 0.37
+    assert inertia.min() > 2.5e-4
+    assert inertia.max() < 4.8e-4
+    assert position.max() < 0.215e-3
+    assert angle.max() < 5.2e-3
+    assert margin.min() > 0.03
+
+
+@settings(max_examples=60, deadline=None)
+@given(workspace, wrenches)
+def test_torques_give_the_wrench_with_least_norm(pose, wrench):
+    tau = torques(wrench, pose).ravel()
+    J = jacobian(pose)
+    asked = np.linalg.pinv(J.T) @ wrench
+    if np.abs(asked).max() <= DEVICE.torque_limit:
+        np.testing.assert_allclose(J.T @ tau, wrench, atol=1e-12)
+    np.testing.assert_allclose(
+        tau, asked * min(1, 0.5 / max(np.abs(asked).max(), 1e-9)), atol=1e-12
+    )
+
+
+def test_saturation_keeps_the_direction():
+    pose, wrench = (0.01, -0.02, 0.7), np.array([9.0, -5.0, 0.1])
+    tau = torques(wrench, pose).ravel()
+    given_wrench = jacobian(pose).T @ tau
+    assert np.abs(tau).max() == pytest.approx(DEVICE.torque_limit, rel=1e-12)
+    assert np.linalg.norm(given_wrench) < np.linalg.norm(wrench)
+    np.testing.assert_allclose(
+        given_wrench / np.linalg.norm(given_wrench), wrench / np.linalg.norm(wrench), atol=1e-12
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(workspace, st.tuples(*[st.floats(-3.5e-3, 3.5e-3)] * 2, st.floats(-0.1, 0.1)))
+def test_pose_from_exact_angles(pose, off):
+    """Two iterations from 5 mm and 0.1 rad away come within 1 % of a count, at any turn."""
+    guess = np.array(pose) + off
+    error = estimate(angles(pose), guess).ravel() - pose
+    assert np.abs(angles(pose + error) - angles(pose)).max() < 0.01 * DEVICE.encoder_resolution
+    assert abs(error[2]) < 1e-3
+
+
+@settings(max_examples=60, deadline=None)
+@given(workspace, st.tuples(*[st.floats(-0.5, 0.5)] * 4))
+def test_pose_is_the_least_squares_one(pose, counts):
+    """Angles that no pose has: the residual is normal to the columns of J_q."""
+    measured = angles(pose) + DEVICE.encoder_resolution * np.array(counts)[:, None]
+    found = estimate_4(measured, pose).ravel()
+    J, r = jacobian(found), measured - angles(found)
+    np.testing.assert_allclose(J.T @ r, 0, atol=1e-7)
+
+
+def test_margin_is_the_distance_to_the_nearest_limit():
+    """theta = 0: the reach of each arm is Pythagoras."""
+    y = 0.06
+    ends = np.array([-0.04, -0.04, 0.04, 0.04])
+    bases = DEVICE.base_x + 0.03 * np.array([-1, 1, -1, 1])
+    r = np.hypot(ends - bases, y - np.array([-0.2, -0.2, 0.2, 0.2]))
+    found = margins((0, y, 0)).ravel()
+    np.testing.assert_allclose(found[:4], 0.95 * 0.36 - r, atol=1e-15)
+    np.testing.assert_allclose(found[4:], r - (0.04 + 0.05 * 0.36), atol=1e-15)
+
+
+def test_stops_push_back_and_only_beyond_the_margin():
+    inside = (0.0, 0.09, 0.0)
+    assert margins(inside).min() > 0
+    np.testing.assert_array_equal(stop(inside, (0, 1.0, 0)), 0)
+    outside = (0.0, 0.145, 0.0)
+    assert margins(outside).min() < 0
+    assert stop(outside, (0, 0, 0))[1] < 0
+    assert stop(outside, (0, 0.3, 0))[1] < stop(outside, (0, 0, 0))[1]
+    np.testing.assert_array_equal(stop(outside, (0, -50.0, 0)), 0)  # never pulls

@@ -1,0 +1,92 @@
+"""The rules of section 1.3.1 against their definitions and the exact map of poles."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from hapticlink.components import rules
+
+RULES = ("forward", "backward", "trapezoidal")
+A = np.array([[-3.0, 2.0], [-40.0, -1.0]])
+B = np.array([[1.0, 0.0], [0.5, 2.0]])
+
+
+def step(rule, A, B, x, u, u_next, period):
+    return np.array(
+        ca.DM(rules.step(rule, *(ca.SX(ca.DM(a)) for a in (A, B, x, u, u_next, period))))
+    )
+
+
+def rates(rule, period=0.05):
+    """x(k), x(k+1) and both rates for one step with changing inputs."""
+    x, u, u_next = np.array([[0.3], [-1.2]]), np.array([[0.2], [1.0]]), np.array([[-0.4], [0.7]])
+    after = step(rule, A, B, x, u, u_next, period)
+    return (after - x) / period, A @ x + B @ u, A @ after + B @ u_next
+
+
+def test_each_rule_is_its_equation():
+    slope, now, then = rates("forward")
+    np.testing.assert_allclose(slope, now, rtol=1e-12)  # (1.1)
+    slope, now, then = rates("backward")
+    np.testing.assert_allclose(slope, then, rtol=1e-12)  # (1.2)
+    slope, now, then = rates("trapezoidal")
+    np.testing.assert_allclose(slope, (then + now) / 2, rtol=1e-12)  # (1.3) as corrected
+
+
+def test_printed_trapezoid_does_not_integrate_a_constant():
+    """(1.3) is printed with xdot(k+1) - xdot(k): a constant rate would not move x."""
+    zero, one = np.zeros((1, 1)), np.ones((1, 1))
+    moved = step("trapezoidal", zero, one, zero, one, one, 0.25)
+    printed = 0.25 * (one - one) / 2
+    assert moved == pytest.approx(0.25)
+    assert printed != pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("rule", RULES)
+@settings(max_examples=60, deadline=None)
+@given(re=st.floats(-50, 50), im=st.floats(-50, 50), period=st.floats(1e-3, 0.5))
+def test_poles_go_where_the_map_says(rule, re, im, period):
+    A = np.array([[re, im], [-im, re]])
+    if abs(1 - rules.weight(rule) * complex(re, im) * period) < 1e-3:
+        return
+    columns = [
+        step(rule, A, np.zeros((2, 1)), e[:, None], [0], [0], period)[:, 0] for e in np.eye(2)
+    ]
+    z = np.linalg.eigvals(np.array(columns).T)
+    expected = rules.pole(rule, complex(re, im) * period)
+    scale = max(1.0, abs(expected))
+    assert np.min(np.abs(z - expected)) < 1e-9 * scale
+
+
+def test_image_of_the_left_half_plane():
+    """Figure 1.4: forward, the half plane left of 1; backward, the disc about 1/2 of radius
+    1/2; trapezoidal, the unit disc."""
+    s = -np.logspace(-3, 3, 40)[:, None] + 1j * np.linspace(-500, 500, 81)
+    assert (rules.pole("forward", s).real < 1).all()
+    assert (np.abs(rules.pole("forward", s)) > 1).any()
+    assert (np.abs(rules.pole("backward", s) - 0.5) < 0.5).all()
+    assert (np.abs(rules.pole("trapezoidal", s)) < 1).all()
+    edge = 1j * np.linspace(-500, 500, 81)
+    np.testing.assert_allclose(np.abs(rules.pole("backward", edge) - 0.5), 0.5, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(rules.pole("trapezoidal", edge)), 1, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("rule", "order"), [("forward", 1), ("backward", 1), ("trapezoidal", 2)])
+def test_order(rule, order):
+    steps = np.array([20, 40, 80, 160])
+    errors = []
+    for n in steps:
+        x = np.array([[1.0], [0.5]])
+        for _ in range(n):
+            x = step(rule, A, B, x, [0, 0], [0, 0], 0.2 / n)
+        errors.append(np.abs(x - expm(0.2 * A) @ [[1.0], [0.5]]).max())
+    slope = np.polyfit(np.log(0.2 / steps), np.log(errors), 1)[0]
+    assert slope == pytest.approx(order, abs=0.25)
+
+
+def test_unknown_rule_names_the_choices():
+    with pytest.raises(ValueError, match=r"'tustin'.*forward, backward, trapezoidal"):
+        rules.weight("tustin")
