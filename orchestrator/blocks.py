@@ -1,0 +1,67 @@
+"""From a scene to the FMUs of its blocks: which there are, of which settings, at which rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from hapticlink.components.specs import GraphicsCopy
+from hapticlink.fmus.blocks import build_block
+from hapticlink.fmus.errors import FmuError
+from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.ticks import Timeline
+
+
+@dataclass(frozen=True)
+class BlockPlan:
+    """A block that the scene asks for: its settings and the clock it runs at."""
+
+    name: str
+    clock: str
+    settings: dict[str, Any]
+
+
+def blocks(scene: Scene) -> tuple[BlockPlan, ...]:
+    """The blocks of `scene`, in the order of the loop."""
+    found = []
+    if scene.hand:
+        found.append(BlockPlan("hand", "haptics", {"hand": scene.hand}))
+    if scene.controller:
+        parts = ("controller", "directions", "linkage")
+        settings = {part: getattr(scene, part) for part in parts}
+        found.append(BlockPlan("controller", "haptics", settings))
+    if scene.device:
+        found.append(BlockPlan("haptic_device", "haptics", {"device": scene.device}))
+    if scene.linkage:
+        settings = {"linkage": scene.linkage, "mechanism": scene.mechanism}
+        if scene.directions_from == "mechanism":
+            settings["directions"] = scene.directions
+        found.append(BlockPlan("virtual_mechanism", scene.mechanism_at, settings))
+    if scene.linkage and scene.graphics and scene.directions_from == "graphics":
+        names = (f.name for f in fields(GraphicsCopy))
+        copy = GraphicsCopy(**{name: getattr(scene.graphics, name) for name in names})
+        settings = {"linkage": scene.linkage, "graphics": copy, "directions": scene.directions}
+        found.append(BlockPlan("virtual_environment", "graphics", settings))
+    return tuple(found)
+
+
+def fmu_files(scene: Scene, timeline: Timeline, room: Path) -> dict[str, Path]:
+    """Block name -> FMU file, from the cache, or made in `room` where the cache is off.
+
+    Raises InputFault where the settings give no FMU (a loop that does not close).
+    """
+    files = {}
+    for block in blocks(scene):
+        try:
+            files[block.name] = build_block(
+                block.name,
+                block.settings,
+                room,
+                stop_time=scene.duration,
+                step_size=timeline.seconds(timeline.clock(block.clock).longest),
+            )
+        except FmuError as error:
+            raise InputFault(str(error)) from error
+    return files

@@ -1,0 +1,61 @@
+"""One vector with all outputs, clock by clock and FMU by FMU, and after them all held values."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hapticlink.orchestrator.system import Connection, System
+
+
+class Board:
+    """Where each signal of a system stands in `values`."""
+
+    def __init__(self, system: System) -> None:
+        self._of_unit: dict[str, slice] = {}
+        self._of_clock: dict[str, slice] = {}
+        self._of_hold: dict[str, slice] = {}
+        self._of_scalar: dict[tuple[str, str], int] = {}
+        end = 0
+        for clock in system.timeline.clocks:
+            first = end
+            for unit in (u for u in system.units if u.clock == clock.name):
+                outputs = unit.description.outputs
+                self._of_unit[unit.name] = slice(end, end + len(outputs))
+                names = ((unit.name, s.name) for s in outputs)
+                self._of_scalar |= {name: end + i for i, name in enumerate(names)}
+                end += len(outputs)
+            self._of_clock[clock.name] = slice(first, end)
+        for connection in system.connections:
+            if connection.hold:
+                self._of_hold[connection.name] = slice(end, end + len(connection.inputs))
+                end += len(connection.inputs)
+        self.values = np.zeros(end)
+
+    def unit(self, name: str) -> slice:
+        return self._of_unit[name]
+
+    def clock(self, name: str) -> slice:
+        return self._of_clock[name]
+
+    def hold(self, connection: str) -> slice:
+        return self._of_hold[connection]
+
+    def scalar(self, fmu: str, variable: str) -> int:
+        return self._of_scalar[fmu, variable]
+
+    def sources(self, connection: Connection) -> list[int]:
+        """The places of a connection's source."""
+        return [self.scalar(connection.source, s.name) for s in connection.outputs]
+
+    def places(self, connection: Connection) -> list[int]:
+        """The places that its target reads: the source's, or the held value's."""
+        if connection.hold:
+            held = self.hold(connection.name)
+            return list(range(held.start, held.stop))
+        return self.sources(connection)
+
+    def columns(self, clock: str) -> list[str]:
+        """`fmu.variable` of every output of a clock, in order."""
+        span = self.clock(clock)
+        inside = (k for k, i in self._of_scalar.items() if span.start <= i < span.stop)
+        return [f"{fmu}.{variable}" for fmu, variable in inside]

@@ -1,0 +1,40 @@
+"""`hapticlink info`."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+from hapticlink.orchestrator.commands.options import Scene, Set
+
+
+def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
+    """Tell what a scene consists of: rates, FMUs, connections, holds. Without SCENE, list the
+    shipped scenes."""
+    from hapticlink.orchestrator import blocks, scene_file, stamps, system, timeline
+    from hapticlink.orchestrator.plan import Plan
+
+    if scene is None:
+        for name in scene_file.shipped():
+            print(f"{name}: {scene_file.load(name).title}")
+        return 0
+    read = scene_file.load(scene, set or ())
+    time = timeline.timeline(read)
+    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
+        made = system.from_scene(read, time, blocks.fmu_files(read, time, Path(room)))
+    print(f"{read.title}\n{read.description.strip()}".strip())
+    print(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
+    for unit in made.units:
+        timing = unit.description.timing
+        print(f"  {unit.name}: {timing}, at {unit.clock}, {len(unit.description.outputs)} outputs")
+    print("\nconnections (age of the newest sample when it is used, ms)")
+    ages = {name: asdict(age) for name, age in stamps.delays(Plan(made)).items()}
+    for connection in made.connections:
+        if connection.initial:
+            note = "once, at the start"
+        else:
+            age = ages[connection.name]
+            note = f"{age['least'] * 1e3:.3g} to {age['most'] * 1e3:.3g}"
+        print(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
+    return 0

@@ -1,0 +1,34 @@
+"""`hapticlink run`."""
+
+from __future__ import annotations
+
+import sys
+
+from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
+
+
+def run(scene: Scene, /, *, out: Out = None, set: Set = None) -> int:
+    """Run a scene: results as CSV, run.json and figures in OUT (default runs/<scene>)."""
+    from hapticlink.orchestrator import scene_file
+    from hapticlink.orchestrator.commands.progress import progress
+    from hapticlink.orchestrator.experiment import simulate
+
+    read = scene_file.load(scene, set or ())
+    folder = out or default_folder("runs", scene)
+    with progress(read.title, read.duration) as told:
+        experiment = simulate(read, folder, set or (), told)
+    outcome = experiment.outcome
+    if outcome.fault:
+        print(f"hapticlink: {outcome.fault}", file=sys.stderr)
+    figures = []
+    if outcome.end_time > 0:
+        from hapticlink.orchestrator.figures import draw
+
+        figures = draw(experiment.results)
+    speed = outcome.end_time / outcome.wall_time
+    ends = {"stop_when": f"ended by {experiment.system.ends_when}", "duration": "done"}
+    print(f"{read.title}: {ends.get(outcome.reason, outcome.reason)} at {outcome.end_time:g} s")
+    print(f"  {outcome.wall_time:.2f} s of run time, {speed:.1f} times real time")
+    tables = (f"{clock.name}.csv" for clock in experiment.system.timeline.clocks)
+    print(f"  {folder}/: {', '.join([*tables, 'run.json', *figures])}")
+    return outcome.fault.exit_status if outcome.fault else 0

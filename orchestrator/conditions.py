@@ -1,0 +1,41 @@
+"""A condition on a signal, `haptic_device.workspace_margin < 0`."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+COMPARISONS: dict[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+_PATTERN = re.compile(r"\s*(\w+)\.([\w.]+(?:\[[\d,]+\])?)\s*(<=|>=|<|>)\s*(\S+)\s*")
+
+
+@dataclass(frozen=True)
+class Condition:
+    """`fmu.variable comparison value`."""
+
+    fmu: str
+    variable: str
+    comparison: str
+    value: float
+
+    def __str__(self) -> str:
+        return f"{self.fmu}.{self.variable} {self.comparison} {self.value!r}"
+
+
+def parse_condition(text: str) -> Condition:
+    """Raises ValueError, with an example, where `text` is no condition."""
+    match = _PATTERN.fullmatch(text)
+    try:
+        if match is None:
+            raise ValueError
+        return Condition(match[1], match[2], match[3], float(match[4]))
+    except ValueError:
+        example = "haptic_device.workspace_margin < 0"
+        raise ValueError(f"{text!r}: write a signal against a number, {example!r}") from None

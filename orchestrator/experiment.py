@@ -1,0 +1,107 @@
+"""One experiment from scene to folder: build, run, `run.json`."""
+
+from __future__ import annotations
+
+import platform
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator.blocks import fmu_files
+from hapticlink.orchestrator.plan import Plan
+from hapticlink.orchestrator.results import Results, load, write_json
+from hapticlink.orchestrator.run import Outcome, Progress, run
+from hapticlink.orchestrator.scene import Scene, VariableRate
+from hapticlink.orchestrator.stamps import delays
+from hapticlink.orchestrator.system import System, from_scene
+from hapticlink.orchestrator.timeline import timeline
+
+PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
+POWER = frozenset({"N", "N.m", "m/s", "rad/s"})
+"""Units of wrenches and twists: what carries power."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A finished run: its results on disk and how it ended."""
+
+    scene: Scene
+    system: System
+    outcome: Outcome
+    folder: Path
+
+    @property
+    def results(self) -> Results:
+        return load(self.folder)
+
+
+def simulate(
+    scene: str | Scene,
+    folder: Path | str,
+    options: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Experiment:
+    """Run a scene (a name, a path, or a Scene) with `--set` options into `folder`.
+
+    Raises InputFault before anything runs; a fault of the run itself is in the outcome, and
+    its results are kept.
+    """
+    begin = perf_counter()
+    read = scene if isinstance(scene, Scene) else scene_file.load(scene, options)
+    folder = Path(folder)
+    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
+        time = timeline(read)
+        system = from_scene(read, time, fmu_files(read, time, Path(room)))
+        plan = Plan(system)
+        ages = delays(plan)  # makes all blocks: a ring of sampled blocks is found here
+        built = perf_counter() - begin
+        folder.mkdir(parents=True, exist_ok=True)
+        story = _story(read, system, options) | {"delays": {k: asdict(v) for k, v in ages.items()}}
+        write_json(folder / "run.json", story | {"end": {"reason": "running"}})
+        outcome = run(plan, folder, progress)
+    write_json(folder / "run.json", story | _ending(outcome, built))
+    return Experiment(read, system, outcome, folder)
+
+
+def _story(scene: Scene, system: System, options: Sequence[str]) -> dict[str, Any]:
+    base = system.timeline.base
+    crossing = [c for c in system.connections if c.hold]
+    power = [c.name for c in crossing if POWER & {s.unit for s in c.outputs}]
+    return {
+        "scene": asdict(scene),
+        "options": list(options),
+        "versions": {name: version(name) for name in PACKAGES}
+        | {"python": platform.python_version()},
+        "seeds": _seeds(scene),
+        "rates": [c.name for c in system.timeline.clocks],
+        "base": f"{base.numerator}/{base.denominator} s",
+        "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.units},
+        "coupling": system.coupling,
+        "connections": [c.name for c in system.connections],
+        "holds": {c.name: c.hold for c in crossing},
+        "power_across_rates": power,
+    } | ({} if power else {"energies": "none"})
+
+
+def _seeds(scene: Scene) -> dict[str, int]:
+    rate = scene.graphics.rate if scene.graphics else None
+    return {"graphics.rate": rate.seed} if isinstance(rate, VariableRate) else {}
+
+
+def _ending(outcome: Outcome, built: float) -> dict[str, Any]:
+    fault = outcome.fault
+    return {
+        "end": {"reason": outcome.reason, "time": outcome.end_time},
+        "fault": None if fault is None else {"kind": type(fault).__name__, "message": str(fault)},
+        "calls": outcome.calls,
+        "timings": {
+            "build": built,
+            "run": outcome.wall_time,
+            "steps": outcome.step_time,
+        },
+    }

@@ -1,0 +1,49 @@
+"""The report's block diagram (figures 4.1 and 4.4) as a table of connections.
+
+A row is made where both ends exist. x_start and x_ref are parameters: they are set once, in
+initialisation, so the device starts where the mechanism is. F_drift acts on the device as +
+and on the mechanism as -; the minus is the mechanism's own. The hand holds the true handle, not the
+measured one.
+"""
+
+from __future__ import annotations
+
+from hapticlink.orchestrator.scene import Scene
+
+Row = tuple[str, str]
+
+_LOOP: tuple[Row, ...] = (
+    ("virtual_mechanism.x", "haptic_device.x_start"),
+    ("virtual_mechanism.x", "controller.x_ref"),
+    ("hand.F", "haptic_device.F_hand"),
+    ("haptic_device.x_true", "hand.x"),
+    ("haptic_device.v_true", "hand.v"),
+    ("haptic_device.x", "controller.x_D"),
+    ("haptic_device.v", "controller.v_D"),
+    ("haptic_device.M", "controller.M"),
+    ("haptic_device.c", "controller.c"),
+    ("virtual_mechanism.x", "controller.x_S"),
+    ("virtual_mechanism.v", "controller.v_S"),
+    ("virtual_mechanism.a_bias", "controller.a_bias"),
+    ("virtual_mechanism.F_env", "controller.F_env"),
+    ("virtual_mechanism.x", "virtual_environment.x_ref"),
+    ("virtual_mechanism.v", "virtual_environment.v_ref"),
+    ("virtual_mechanism.q", "virtual_environment.q_ref"),
+    ("virtual_mechanism.qd", "virtual_environment.qd_ref"),
+    ("controller.F_motor", "haptic_device.F_motor"),
+    ("controller.F_drift", "virtual_mechanism.F_drift"),
+)
+
+
+def connections(scene: Scene) -> tuple[Row, ...]:
+    """(source, target) as `fmu.variable`, of every connection that the scene may have."""
+    felt = "hand.F" if scene.sensing == "ideal" else "haptic_device.F_hand_observed"
+    directions = {"graphics": "virtual_environment", "mechanism": "virtual_mechanism"}
+    giver = directions[scene.directions_from]
+    return (
+        *_LOOP,
+        (felt, "controller.F_hand"),
+        (felt, "virtual_mechanism.F_hand"),
+        (f"{giver}.Lambda_inv", "controller.Lambda_inv"),
+        (f"{giver}.P_c", "controller.P_c"),
+    )

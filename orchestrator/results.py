@@ -1,0 +1,137 @@
+"""Results on disk: one CSV per rate, streamed, and `run.json`; and reading them back."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import to_json
+
+from hapticlink.orchestrator.faults import InputFault
+
+CHUNK = 256
+"""Rows kept before they are written: half a second of a 512 Hz run."""
+
+Vector = NDArray[np.float64]
+
+
+class Recorder:
+    """Rows of one CSV: `time` and the values of a view, as the shortest text that reads back
+    to the same float. A context manager; rows left in memory are written at its end."""
+
+    def __init__(self, path: Path, columns: Sequence[str], view: Vector) -> None:
+        self._rows = np.zeros((CHUNK, 1 + len(view)))
+        self._view, self._next, self.last = view, 0, 0.0
+        self._file = path.open("wb")
+        self._file.write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
+
+    def row(self, time: float) -> None:
+        row = self._rows[self._next]
+        row[0] = self.last = time
+        row[1:] = self._view
+        self._next += 1
+        if self._next == CHUNK:
+            self.flush()
+
+    def flush(self) -> None:
+        if self._next:
+            # pydantic's JSON writes floats ten times faster than repr, and round-trips too.
+            text = to_json(self._rows[: self._next].tolist(), inf_nan_mode="constants")
+            self._file.write(text[2:-2].replace(b"],[", b"\n") + b"\n")
+            self._file.flush()
+            self._next = 0
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            self.flush()
+        finally:
+            self._file.close()
+
+
+def _quoted(name: str) -> str:
+    """Names of matrix entries hold a comma."""
+    return f'"{name}"' if "," in name else name
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write whole or not at all."""
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    unfinished.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    os.replace(unfinished, path)
+
+
+@dataclass(frozen=True)
+class Table(Mapping[str, Vector]):
+    """The columns of one rate. `table["device.x"]` stacks `device.x[1]`, `device.x[2]`, ...
+
+    into (rows, n), a matrix into (rows, n, m); a full name gives its column, (rows,).
+    """
+
+    columns: tuple[str, ...]
+    rows: Vector
+
+    def __getitem__(self, name: str) -> Vector:
+        if name in self.columns:
+            return self.rows[:, self.columns.index(name)]
+        entries = [(i, c) for i, c in enumerate(self.columns) if c.startswith(f"{name}[")]
+        if not entries:
+            raise KeyError(f"no signal {name!r}; there are {', '.join(self.columns)}")
+        last = entries[-1][1]
+        shape = tuple(int(n) for n in last[len(name) + 1 : -1].split(","))
+        return self.rows[:, [i for i, _ in entries]].reshape(-1, *shape)
+
+    def __contains__(self, name: object) -> bool:
+        return any(c == name or c.startswith(f"{name}[") for c in self.columns)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+@dataclass(frozen=True)
+class Results:
+    """A run read back: `run` is run.json, `tables` the CSVs by rate."""
+
+    folder: Path
+    run: dict[str, Any]
+    tables: dict[str, Table]
+
+    @property
+    def haptics(self) -> Table:
+        return self.tables["haptics"]
+
+    @property
+    def graphics(self) -> Table:
+        return self.tables["graphics"]
+
+
+def load(folder: Path | str) -> Results:
+    """Read a run's folder. Raises InputFault where it holds no run."""
+    folder = Path(folder)
+    try:
+        run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError) as error:
+        raise InputFault(f"{folder}: not the folder of a run: {error}") from error
+    return Results(folder, run, {name: read_table(folder / f"{name}.csv") for name in run["rates"]})
+
+
+def read_table(path: Path) -> Table:
+    """One CSV of a run."""
+    import csv
+
+    with path.open(encoding="utf-8", newline="") as file:
+        columns = tuple(next(csv.reader([file.readline()])))
+        rows = file.readlines()
+    values = np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.zeros((0, len(columns)))
+    return Table(columns, values)

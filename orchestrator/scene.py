@@ -1,0 +1,115 @@
+"""A scene: what the user wrote, as frozen records.
+
+The blocks' own tables (linkage, device, controller, ...) are the records of
+`components.specs`; this file adds rates, holds and the order of calls.
+
+A block is simulated where its table is present: [linkage] the virtual mechanism, [graphics]
+the virtual environment (not where the mechanism gives the directions itself), [device],
+[controller] and [hand] theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Discriminator, Tag
+
+from hapticlink.components.specs import (
+    ArmHand,
+    ConstantHand,
+    Controller,
+    Device,
+    Directions,
+    GraphicsCopy,
+    Linkage,
+    Mechanism,
+    ProfileHand,
+)
+
+Rate = int | float | str
+"""Hz; a fraction of whole numbers may be written as text ("30000/1001")."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VariableRate:
+    """Periods drawn uniformly between 1/max and 1/min (Hz), in whole haptic ticks."""
+
+    min: Rate
+    max: Rate
+    seed: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Haptics:
+    """The fast rate (Hz)."""
+
+    rate: Rate = 512
+
+
+@dataclass(frozen=True, kw_only=True)
+class Graphics(GraphicsCopy):
+    """The slow rate, and the graphics copy that runs at it.
+
+    rate: Hz, bounds and a seed, or the times (s) at which frames end. align "exact" ends
+    frame i at i/rate, "tick" at the first haptic tick at or after it; None is "exact" for a
+    fixed rate, and rates that vary are always on ticks.
+    """
+
+    rate: Rate | VariableRate | tuple[float, ...] = 30
+    align: Literal["exact", "tick"] | None = None
+
+
+def _hand_type(table: Any) -> str:
+    return table.get("type", "constant") if isinstance(table, dict) else table.type
+
+
+Hand = Annotated[
+    Annotated[ConstantHand, Tag("constant")]
+    | Annotated[ProfileHand, Tag("profile")]
+    | Annotated[ArmHand, Tag("arm")],
+    Discriminator(_hand_type),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """Everything a run needs. duration in s; see the field's own records for the tables.
+
+    sensing "ideal" gives controller and mechanism the hand's wrench and the true pose,
+    "encoders" the observer's (it stands here, not in [device]). mechanism_at: the rate of the
+    virtual mechanism. directions_from: who computes Lambda_inv and P_c, the graphics copy or
+    the mechanism itself. hold is the default where a connection crosses rates; holds gives
+    others by source (`virtual_environment.P_c`), target or `source -> target`. stop_when, a
+    signal against a number, ends the run in good order: None takes the device's workspace where
+    there is a device, "" is never.
+    """
+
+    __pydantic_config__ = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    title: str
+    description: str = ""
+    duration: float
+    hold: str = "zoh"
+    holds: Mapping[str, str] = field(default_factory=dict)
+    coupling: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
+    sensing: Literal["ideal", "encoders"] = "ideal"
+    mechanism_at: Literal["haptics", "graphics"] = "haptics"
+    directions_from: Literal["graphics", "mechanism"] = "graphics"
+    stop_when: str | None = None
+    haptics: Haptics = field(default_factory=Haptics)
+    graphics: Graphics | None = None
+    linkage: Linkage | None = None
+    mechanism: Mechanism = field(default_factory=Mechanism)
+    directions: Directions = field(default_factory=Directions)
+    device: Device | None = None
+    controller: Controller | None = None
+    hand: Hand | None = None
+
+    @property
+    def ends_when(self) -> str:
+        """The condition in force, "" where there is none."""
+        if self.stop_when is None:
+            return "haptic_device.workspace_margin < 0" if self.device else ""
+        return self.stop_when

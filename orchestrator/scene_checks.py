@@ -1,0 +1,182 @@
+"""What the shape of a scene cannot say: names that must exist, numbers that must be positive,
+tables that need each other. Each check yields (path in the file, message with remedy)."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Iterator
+
+from hapticlink.components.specs import Linkage
+from hapticlink.orchestrator.conditions import parse_condition
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.scene import Rate, Scene, VariableRate
+from hapticlink.orchestrator.ticks import exact
+from hapticlink.orchestrator.toml_lines import Path
+
+Problem = tuple[Path, str]
+
+
+def check(scene: Scene) -> list[Problem]:
+    """Every fault found, in the order of the file's sections."""
+    found = [*_numbers(scene), *_rates(scene), *_holds(scene), *_blocks(scene)]
+    if scene.linkage:
+        found += _linkage(scene.linkage)
+    return found
+
+
+def _unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    known = list(known)
+    near = difflib.get_close_matches(name, known, 1)
+    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known) or 'none'}"
+    return f"no {kind} {name!r}; {hint}"
+
+
+def _numbers(scene: Scene) -> Iterator[Problem]:
+    if scene.duration <= 0:
+        yield ("duration",), f"{scene.duration} s: a run takes more than 0 s"
+    if scene.stop_when:
+        try:
+            parse_condition(scene.stop_when)
+        except ValueError as error:
+            yield ("stop_when",), str(error)
+    for table in ("mechanism", "graphics", "device"):
+        record = getattr(scene, table)
+        if record and record.substeps < 1:
+            yield (table, "substeps"), f"{record.substeps}: at least 1 substep"
+
+
+def _rate(path: Path, rate: Rate) -> Iterator[Problem]:
+    try:
+        good = exact(rate) > 0
+    except (ValueError, ZeroDivisionError):
+        yield path, f"{rate!r}: write a rate as 30, 29.97 or '30000/1001' (Hz)"
+        return
+    if not good:
+        yield path, f"{rate} Hz: a rate is more than 0"
+
+
+def _rates(scene: Scene) -> Iterator[Problem]:
+    yield from _rate(("haptics", "rate"), scene.haptics.rate)
+    if scene.graphics is None:
+        return
+    rate = scene.graphics.rate
+    path: Path = ("graphics", "rate")
+    if isinstance(rate, VariableRate):
+        bounds = [*_rate((*path, "min"), rate.min), *_rate((*path, "max"), rate.max)]
+        yield from bounds
+        if not bounds and exact(rate.min) > exact(rate.max):
+            yield (*path, "min"), f"{rate.min} Hz is above max = {rate.max} Hz: swap them"
+        if rate.seed < 0:
+            yield (*path, "seed"), f"{rate.seed}: a seed is 0 or more"
+    elif isinstance(rate, tuple):
+        if not rate or rate[-1] < scene.duration:
+            yield path, f"the frame times end before duration = {scene.duration} s: add frames"
+        if any(b <= a for a, b in zip((0.0, *rate), rate, strict=False) if b != 0.0):
+            yield path, "frame times must rise: sort them and drop repeated ones"
+    else:
+        yield from _rate(path, rate)
+    if scene.graphics.align == "exact" and not isinstance(rate, int | float | str):
+        yield ("graphics", "align"), "'exact' needs a fixed rate: rates that vary are on ticks"
+
+
+def _holds(scene: Scene) -> Iterator[Problem]:
+    if scene.hold not in HOLDS:
+        yield ("hold",), _unknown("hold", scene.hold, HOLDS)
+    for connection, hold in scene.holds.items():
+        if hold not in HOLDS:
+            yield ("holds", connection), _unknown("hold", hold, HOLDS)
+
+
+def _blocks(scene: Scene) -> Iterator[Problem]:
+    if not scene.linkage and not scene.device:
+        yield ("linkage",), "nothing to simulate: give a [linkage], or a [device] at least"
+    if not scene.linkage:
+        for table in ("graphics", "controller"):
+            if getattr(scene, table):
+                yield (table,), f"[{table}] needs a [linkage]: add one, or take [{table}] out"
+    if scene.controller and not scene.device:
+        yield ("controller",), "[controller] moves a device: add [device], or take it out"
+    if scene.hand and not scene.device:
+        yield ("hand",), "[hand] holds the device's handle: add [device], or take it out"
+    if scene.sensing == "encoders" and not scene.device:
+        yield ("sensing",), "'encoders' are the device's: add [device], or take sensing out"
+    if not scene.graphics:
+        if scene.mechanism_at == "graphics":
+            yield ("mechanism_at",), "there is no graphics rate: add [graphics] with its rate"
+        if scene.controller and scene.directions_from == "graphics":
+            yield (
+                ("directions_from",),
+                "the controller needs Lambda_inv and P_c: add [graphics], or take "
+                "directions_from = 'mechanism'",
+            )
+
+
+def _linkage(linkage: Linkage) -> Iterator[Problem]:
+    here: Path = ("linkage",)
+    bodies = [b.name for b in linkage.body]
+    frames = ["ground", *bodies]
+    for i, body in enumerate(linkage.body):
+        path: Path = (*here, "body", i)
+        if body.name in frames[: i + 1]:
+            yield (*path, "name"), f"{body.name!r} is taken: name each body once, none 'ground'"
+        if body.mass <= 0:
+            yield (*path, "mass"), f"{body.mass} kg: a mass is more than 0"
+        if body.inertia < 0:
+            yield (*path, "inertia"), f"{body.inertia} kg.m2: an inertia is 0 or more"
+    yield from _tree(linkage, frames)
+    for i, loop in enumerate(linkage.loop):
+        for k, name in enumerate(loop.bodies):
+            if name not in frames:
+                yield (*here, "loop", i, "bodies", k), _unknown("body", name, frames)
+        if loop.bodies[0] == loop.bodies[1]:
+            yield (*here, "loop", i, "bodies"), "a loop joins two different bodies"
+    if linkage.operational_point.body not in bodies:
+        message = _unknown("body", linkage.operational_point.body, bodies)
+        yield (*here, "operational_point", "body"), message
+    types = {j.name: j.type for j in linkage.joint}
+    for table in ("start", "start_velocity"):
+        for name, value in getattr(linkage, table).items():
+            if name not in types:
+                yield (*here, table, name), _unknown("joint", name, types)
+            elif isinstance(value, tuple) != (types[name] == "free"):
+                wanted = "three numbers" if types[name] == "free" else "one number"
+                yield (*here, table, name), f"{value!r}: a {types[name]} joint takes {wanted}"
+            elif isinstance(value, float) and not math.isfinite(value):
+                yield (*here, table, name), f"{value!r} is not finite"
+
+
+def _tree(linkage: Linkage, frames: list[str]) -> Iterator[Problem]:
+    """Every body hangs on ground by exactly one joint of each body on the way."""
+    parents: dict[str, str] = {}
+    names: set[str] = set()
+    for i, joint in enumerate(linkage.joint):
+        path: Path = ("linkage", "joint", i)
+        if joint.name in names:
+            yield (*path, "name"), f"{joint.name!r} is taken: name each joint once"
+        names.add(joint.name)
+        for end in ("parent", "child"):
+            if getattr(joint, end) not in frames:
+                yield (*path, end), _unknown("body", getattr(joint, end), frames)
+        if joint.child == "ground":
+            yield (*path, "child"), "ground cannot be a child: turn the joint around"
+        elif joint.child in parents:
+            yield (
+                (*path, "child"),
+                f"{joint.child!r} hangs on {parents[joint.child]!r} already: close loops "
+                "with [[linkage.loop]]",
+            )
+        else:
+            parents[joint.child] = joint.parent
+        if joint.type == "prismatic" and joint.axis is None:
+            yield (*path, "axis"), "a prismatic joint needs its direction (rad)"
+    for i, name in enumerate(frames[1:]):
+        seen: set[str] = set()
+        at = name
+        while at in parents and at not in seen:
+            seen.add(at)
+            at = parents[at]
+        if name not in parents:
+            yield ("linkage", "body", i), "no joint holds this body: give it one as child"
+        elif at in seen:
+            yield ("linkage", "body", i), "its joints run in a circle: start the tree at 'ground'"

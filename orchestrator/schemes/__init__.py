@@ -1,0 +1,17 @@
+"""A scheme orders the operations of an event. One scheme a file.
+
+All keep to FMI 2.0.5 section 4.2.4: no get after a set without a doStep between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hapticlink.orchestrator.schemes import gauss_seidel, jacobi
+from hapticlink.orchestrator.schemes.operations import Event, Operation
+from hapticlink.orchestrator.system import System
+
+SCHEMES: dict[str, Callable[[System, Event], tuple[Operation, ...]]] = {
+    "gauss-seidel": gauss_seidel.block,
+    "jacobi": jacobi.block,
+}

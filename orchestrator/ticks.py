@@ -1,0 +1,118 @@
+"""Exact time: every instant is a whole number of ticks of one base.
+
+The base is the greatest common divisor of all periods (512 Hz and 30 Hz: 1/7680 s), so rates
+that do not divide each other never meet a rounded float.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+
+def exact(number: int | float | str) -> Fraction:
+    """The rational that a number is written as: 29.97 is 2997/100, "30000/1001" itself."""
+    return Fraction(str(number))
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When the steps of a rate start, in ticks; each ends where the next starts.
+
+    The last entry ends a step at or after the end of the run.
+    """
+
+    name: str
+    starts: Sequence[int]
+
+    @property
+    def longest(self) -> int:
+        """The longest step (ticks)."""
+        if isinstance(self.starts, range):
+            return self.starts.step
+        return max(b - a for a, b in zip(self.starts, self.starts[1:], strict=False))
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """The base (s), the last tick, and the clocks; the first clock is the haptic one."""
+
+    base: Fraction
+    end: int
+    clocks: tuple[Clock, ...]
+
+    @cached_property
+    def seconds(self) -> Callable[[int], float]:
+        """The correctly rounded time of a tick (true division of integers rounds once)."""
+        numerator, denominator = self.base.numerator, self.base.denominator
+        return lambda tick: tick * numerator / denominator
+
+    def clock(self, name: str) -> Clock:
+        return next(c for c in self.clocks if c.name == name)
+
+
+def common_base(periods: Sequence[Fraction]) -> Fraction:
+    """The greatest common divisor of `periods`."""
+    denominator = math.lcm(*(p.denominator for p in periods))
+    return Fraction(math.gcd(*(int(p * denominator) for p in periods)), denominator)
+
+
+def periodic(period: Fraction, base: Fraction, end: int) -> range:
+    """0, 1, 2, ... periods, to two past the end so that every step at the end has one."""
+    ticks = period / base
+    if ticks.denominator != 1:
+        raise ValueError(f"a period of {period} s is not a whole number of ticks of {base} s")
+    return range(0, end + 2 * int(ticks) + 1, int(ticks))
+
+
+def aligned(period: Fraction, base: Fraction, end: int) -> tuple[int, ...]:
+    """Frame i at the first tick at or after i periods: ceil(i period / base).
+
+    Raises ValueError for a period shorter than a tick: two frames would fall on one.
+    """
+    if period < base:
+        raise ValueError(f"{1 / period} Hz on ticks of {base} s: take align = 'exact'")
+    frames = math.ceil(end * base / period) + 2
+    return tuple(math.ceil(i * period / base) for i in range(frames + 1))
+
+
+def variable(
+    slowest: Fraction, fastest: Fraction, seed: int, base: Fraction, end: int
+) -> tuple[int, ...]:
+    """Whole-tick periods drawn uniformly between 1/fastest and 1/slowest (rates, Hz).
+
+    The generator is numpy's PCG64 with `seed`. Raises ValueError where no whole number of
+    ticks lies between the bounds.
+    """
+    import numpy as np
+
+    low, high = math.ceil(1 / (fastest * base)), math.floor(1 / (slowest * base))
+    if not 1 <= low <= high:
+        raise ValueError(f"no period between {fastest} and {slowest} Hz is a whole haptic tick")
+    generator = np.random.Generator(np.random.PCG64(seed))
+    starts = [0]
+    while starts[-1] <= end + high:
+        starts.append(starts[-1] + int(generator.integers(low, high, endpoint=True)))
+    return tuple(starts)
+
+
+def listed(times: Sequence[Fraction], base: Fraction) -> tuple[int, ...]:
+    """Frame times (s), each at the first tick at or after it; a first frame starts at 0.
+
+    Raises ValueError where two fall on one tick or come in the wrong order.
+    """
+    starts = [0]
+    for time in times:
+        tick = math.ceil(time / base)
+        if time == 0 and starts == [0]:
+            continue
+        if tick <= starts[-1]:
+            raise ValueError(
+                f"frame time {float(time)} s falls on tick {tick}, not after tick {starts[-1]} of "
+                f"the frame before: keep frames at least {float(base)} s apart, in order"
+            )
+        starts.append(tick)
+    return tuple(starts)

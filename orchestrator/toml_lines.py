@@ -1,0 +1,89 @@
+"""On which line of a TOML file a key stands."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+Path = tuple[str | int, ...]
+
+_TOKEN = re.compile(
+    r'"""(?:\\.|[^\\])*?"""(?:"{0,2})'  # multi-line strings may hold anything
+    r"|'''.*?'''(?:'{0,2})"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'"
+    r"|#[^\n]*"
+    r"|[\[\]{}\n]",
+    re.DOTALL,
+)
+_ASSIGNMENT = re.compile(r"""\s*((?:[\w-]+|"(?:\\.|[^"\\])*"|'[^']*'|\s*\.\s*)+)\s*=""")
+
+
+def _statements(text: str) -> list[tuple[int, str]]:
+    """(line number, text) of each header or assignment, values over several lines in one."""
+    found, start, depth = [], 0, 0
+    for token in _TOKEN.finditer(text + "\n"):
+        if token[0] in "[{":
+            depth += 1
+        elif token[0] in "]}":
+            depth -= 1
+        elif token[0] == "\n" and depth <= 0:
+            found.append((text.count("\n", 0, start) + 1, text[start : token.start()]))
+            start, depth = token.end(), 0
+    return found
+
+
+def _parts(dotted: str) -> tuple[str, ...]:
+    """The names of a dotted key, quoted ones too."""
+    node = tomllib.loads(f"{dotted} = 0")
+    names = []
+    while isinstance(node, dict):
+        name, node = next(iter(node.items()))
+        names.append(name)
+    return tuple(names)
+
+
+def key_lines(text: str) -> dict[Path, int]:
+    """Line numbers by path; entries of [[arrays]] of tables have their index in the path.
+
+    `text` has been parsed as TOML without an error.
+    """
+    lines: dict[Path, int] = {}
+    counts: dict[Path, int] = {}
+    table: Path = ()
+
+    def resolve(names: tuple[str, ...]) -> Path:
+        path: Path = ()
+        for name in names:
+            path = (*path, name)
+            if path in counts:
+                path = (*path, counts[path] - 1)
+        return path
+
+    for number, statement in _statements(text):
+        stripped = statement.split("\n")[0].strip()
+        if stripped.startswith("[["):
+            names = _parts(stripped[2 : stripped.index("]]")])
+            array = (*resolve(names[:-1]), names[-1])
+            counts[array] = counts.get(array, 0) + 1
+            table = (*array, counts[array] - 1)
+            lines.setdefault(array, number)
+            lines[table] = number
+        elif stripped.startswith("["):
+            table = resolve(_parts(stripped[1 : stripped.rindex("]")]))
+            lines.setdefault(table, number)
+        elif match := _ASSIGNMENT.match(statement):
+            path = table
+            for name in _parts(match[1]):
+                path = (*path, name)
+                lines.setdefault(path, number)
+    return lines
+
+
+def line_of(path: Path, lines: dict[Path, int]) -> int | None:
+    """The line of `path`, or of the nearest table that holds it."""
+    while path:
+        if path in lines:
+            return lines[path]
+        path = path[:-1]
+    return None

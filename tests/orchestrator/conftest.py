@@ -1,0 +1,98 @@
+"""Small systems for tests: real FMUs built from components whose signals carry their stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import casadi as ca
+import pytest
+from pythonfmu.builder import FmuBuilder
+
+from hapticlink.components.component import Block, Component, Variable
+from hapticlink.fmus.build import build
+from hapticlink.orchestrator.description import describe
+from hapticlink.orchestrator.system import System, Unit, connect
+from hapticlink.orchestrator.ticks import Timeline
+
+
+def clock(name: str, timing: str, inputs: Sequence[str]) -> Component:
+    """A block that puts out the stamp of its output, and `seen_<input>`: what its last step
+    read. Connected stamp to input, every run shows its own causality."""
+    seen = [f"seen_{i}" for i in inputs]
+    block = Block(
+        inputs=[Variable(i, (), "s") for i in inputs],
+        states=[Variable(n, (), "s") for n in ["now", *seen]],
+        outputs=[Variable(n, (), "s") for n in ["stamp", *seen]],
+    )
+    t, u, x = block.t, block.u, block.x
+    if timing == "continuous":
+        step = {"now": t + block.h, **{f"seen_{i}": u[i] for i in inputs}}
+        output = {"stamp": x["now"], **{s: x[s] for s in seen}}
+    else:
+        step = {"now": t, **{s: x[s] for s in seen}}
+        output = {"stamp": t, **{f"seen_{i}": u[i] for i in inputs}}
+    initial = dict.fromkeys(["now", *seen], ca.SX(0))
+    return block.component(name, "stamps", timing, initial=initial, step=step, output=output)  # type: ignore[arg-type]
+
+
+BLOCKS = {
+    "device": ("continuous", ["f"]),
+    "controller": ("sampled", ["d", "m", "g"]),
+    "hand": ("sampled", ["d"]),
+    "mechanism": ("continuous", ["f"]),
+    "graphics": ("continuous", ["m"]),
+}
+ROWS = [
+    ("device.stamp", "hand.d"),
+    ("device.stamp", "controller.d"),
+    ("mechanism.stamp", "controller.m"),
+    ("graphics.stamp", "controller.g"),
+    ("controller.stamp", "device.f"),
+    ("controller.stamp", "mechanism.f"),
+    ("mechanism.stamp", "graphics.m"),
+]
+
+
+@pytest.fixture(scope="session")
+def stamped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Timeline, str], System]:
+    """(timeline, coupling) -> a loop like the report's, of blocks that show their stamps."""
+    folder = tmp_path_factory.mktemp("stamped")
+    described = {n: describe(build(clock(n, t, i), folder)) for n, (t, i) in BLOCKS.items()}
+
+    def make(timeline: Timeline, coupling: str) -> System:
+        units = tuple(
+            Unit(n, d, "graphics" if n == "graphics" else "haptics") for n, d in described.items()
+        )
+        return System(units, tuple(connect(units, ROWS, "zoh", {})), timeline, coupling)
+
+    return make
+
+
+SLAVE = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.y = 0.0
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def do_step(self, time, size):
+        time += size
+        self.y = time
+        {body}
+        return True
+"""
+
+
+@pytest.fixture
+def slave(tmp_path: Path) -> Callable[..., Unit]:
+    """(name, body of do_step) -> a Python FMU at the haptic rate, not one of ours."""
+
+    def make(name: str, body: str = "pass") -> Unit:
+        script = tmp_path / f"{name}.py"
+        script.write_text(SLAVE.format(name=name, body=body))
+        return Unit(name, describe(FmuBuilder.build_FMU(script, dest=tmp_path)), "haptics")
+
+    return make

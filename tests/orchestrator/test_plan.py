@@ -1,0 +1,120 @@
+"""Order of calls and causality of plans, without running an FMU."""
+
+from collections.abc import Callable
+from fractions import Fraction
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.plan import Plan
+from hapticlink.orchestrator.schemes import SCHEMES
+from hapticlink.orchestrator.schemes.operations import Get, Record, Set, Step
+from hapticlink.orchestrator.stamps import delays, uses
+from hapticlink.orchestrator.system import System, connect
+from hapticlink.orchestrator.ticks import Timeline
+
+from .timelines import fixed, single, varying
+
+Make = Callable[[Timeline, str], System]
+shared = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40)
+timelines = st.one_of(
+    st.builds(
+        fixed,
+        st.fractions(100, 1000, max_denominator=7),
+        st.fractions(5, 100, max_denominator=7),
+        st.integers(1, 120),
+        st.sampled_from(["exact", "tick"]),
+    ),
+    st.builds(
+        varying,
+        st.just(Fraction(512)),
+        st.just(Fraction(10)),
+        st.just(Fraction(60)),
+        st.integers(0, 99),
+        st.integers(1, 200),
+    ),
+)
+couplings = st.sampled_from(sorted(SCHEMES))
+
+
+@shared
+@given(timelines, couplings)
+def test_no_get_after_set_without_a_step_between(
+    stamped: Make, timeline: Timeline, coupling: str
+) -> None:
+    plan = Plan(stamped(timeline, coupling))
+    dirty: set[str] = set()
+    for _, event in plan:
+        for operation in plan.block(event):
+            match operation:
+                case Set(fmu):
+                    dirty.add(fmu)
+                case Step(fmu, _):
+                    dirty.discard(fmu)
+                case Get(fmu):
+                    assert fmu not in dirty
+
+
+@shared
+@given(timelines, couplings)
+def test_every_fmu_is_stepped_without_gap_or_overlap(
+    stamped: Make, timeline: Timeline, coupling: str
+) -> None:
+    plan = Plan(stamped(timeline, coupling))
+    reached = dict.fromkeys(plan.system.unit, 0)
+    rows = {c.name: 0 for c in timeline.clocks}
+    for tick, event in plan:
+        assert tick <= timeline.end
+        for operation in plan.block(event):
+            if isinstance(operation, Step):
+                assert reached[operation.fmu] == tick
+                reached[operation.fmu] = tick + operation.dticks
+            elif isinstance(operation, Record):
+                rows[operation.clock] += 1
+    for unit in plan.system.units:
+        assert (reached[unit.name] > timeline.end) == unit.sampled
+    for clock in timeline.clocks:
+        assert rows[clock.name] == sum(1 for start in clock.starts if start <= timeline.end)
+
+
+@shared
+@given(timelines, couplings)
+def test_nothing_reads_the_future_and_holds_give_the_newest(
+    stamped: Make, timeline: Timeline, coupling: str
+) -> None:
+    plan = Plan(stamped(timeline, coupling))
+    frames = timeline.clock("graphics").starts
+    for tick, connection, stamp in uses(plan):
+        assert stamp <= tick
+        if connection == "graphics.stamp -> controller.g":
+            assert stamp == max(f for f in frames if f <= tick)
+
+
+def test_gauss_seidel_delays_nothing_and_jacobi_the_sampled_by_one_period(stamped: Make) -> None:
+    timeline = fixed(Fraction(512), Fraction(30), 512)
+    period = 1 / 512
+    for coupling, late in (("gauss-seidel", 0.0), ("jacobi", period)):
+        ages = delays(Plan(stamped(timeline, coupling)))
+        for name in ("controller.stamp -> device.f", "controller.stamp -> mechanism.f"):
+            assert (ages[name].least, ages[name].most) == (late, late)
+        assert ages["device.stamp -> controller.d"].most == 0.0
+        # 30 Hz: the oldest frame in use is one tick of 1/7680 s short of 1/30 s plus.
+        assert ages["graphics.stamp -> controller.g"].most < 1 / 30
+
+
+def test_an_event_of_one_kind_shares_its_block(stamped: Make) -> None:
+    plan = Plan(stamped(fixed(Fraction(512), Fraction(30), 1536), "gauss-seidel"))
+    blocks = {id(plan.block(event)) for _, event in plan}
+    assert len(blocks) <= 8
+
+
+def test_a_ring_of_sampled_blocks_is_named(stamped: Make) -> None:
+    units = stamped(single(512, 4), "gauss-seidel").units[:3]
+    rows = [("controller.stamp", "hand.d"), ("hand.stamp", "controller.d")]
+    ring = System(units, tuple(connect(units, rows, "zoh", {})), single(512, 4), "gauss-seidel")
+    with pytest.raises(InputFault, match="ring: controller -> hand -> controller"):
+        list(delays(Plan(ring)))
+    as_jacobi = System(units, ring.connections, ring.timeline, "jacobi")
+    assert delays(Plan(as_jacobi))["hand.stamp -> controller.d"].most == 1 / 512

@@ -1,0 +1,63 @@
+"""CSV files give back the very floats."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.results import CHUNK, Recorder, load, read_table
+
+
+@given(st.lists(st.floats(allow_nan=False), min_size=3, max_size=3))
+def test_every_float_reads_back_to_the_bit(
+    tmp_path_factory: pytest.TempPathFactory, values: list[float]
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "floats.csv"
+    with Recorder(path, ["a.x", "a.P[1,1]", "a.P[1,2]"], np.array(values)) as recorder:
+        recorder.row(1 / 3)
+    table = read_table(path)
+    assert table["time"].tolist() == [1 / 3]
+    assert [float(v).hex() for v in (table["a.x"][0], *table["a.P"].ravel())] == [
+        v.hex() for v in values
+    ]
+
+
+def test_rows_are_on_disk_before_the_end_and_after_an_exception(tmp_path: Path) -> None:
+    path, view = tmp_path / "rows.csv", np.zeros(1)
+
+    def record_and_break() -> None:
+        with Recorder(path, ["y"], view) as recorder:
+            for k in range(CHUNK + 5):
+                view[0] = k
+                recorder.row(k / 512)
+            assert len(read_table(path)["y"]) == CHUNK
+            raise RuntimeError("broken")
+
+    with pytest.raises(RuntimeError, match="broken"):
+        record_and_break()
+    assert read_table(path)["y"].tolist() == list(range(CHUNK + 5))
+
+
+def test_vectors_and_matrices_stack(tmp_path: Path) -> None:
+    path = tmp_path / "m.csv"
+    columns = [f"e.L[{i},{j}]" for i in (1, 2) for j in (1, 2, 3)]
+    with Recorder(path, columns, np.arange(6.0)) as recorder:
+        recorder.row(0.0)
+    assert read_table(path)["e.L"].tolist() == [[[0, 1, 2], [3, 4, 5]]]
+    with pytest.raises(KeyError, match=r"no signal 'e.K'"):
+        read_table(path)["e.K"]
+
+
+def test_nan_is_written_as_such(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "n.csv", ["y"], np.array([math.nan])) as recorder:
+        recorder.row(0.0)
+    assert math.isnan(read_table(tmp_path / "n.csv")["y"][0])
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputFault, match="not the folder of a run"):
+        load(tmp_path)

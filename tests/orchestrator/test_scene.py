@@ -1,0 +1,146 @@
+"""Scenes with faults are refused with all of them, by their place in the file."""
+
+import pytest
+
+from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator.faults import InputFault, SceneFault
+from hapticlink.orchestrator.scene import VariableRate
+from hapticlink.orchestrator.toml_lines import key_lines
+
+GOOD = """title = "A bar"
+duration = 1.0
+[haptics]
+rate = 512
+[graphics]
+rate = 30
+[linkage]
+operational_point = { body = "bar", at = [0.1, 0.0] }
+start.pivot = 0.5
+
+[[linkage.body]]
+name = "bar"
+mass = 1.0
+inertia = 0.01
+
+[[linkage.joint]]
+name = "pivot"
+child = "bar"
+
+[device]
+[controller]
+[hand]
+wrench = [
+  1.0, # N
+  0.0,
+  0.0,
+]
+"""
+
+
+def findings(text: str, *options: str) -> dict[str, tuple[int | None, str]]:
+    with pytest.raises(SceneFault) as refused:
+        scene_file.read(text, options)
+    assert refused.value.exit_status == 2
+    return {f.key: (f.line, f.message) for f in refused.value.findings}
+
+
+def test_a_good_scene_is_read() -> None:
+    scene = scene_file.read(GOOD)
+    assert scene.hand is not None
+    assert scene.hand.type == "constant"
+    assert scene.ends_when == "haptic_device.workspace_margin < 0"
+
+
+def test_all_faults_at_once_with_line_and_remedy() -> None:
+    text = GOOD.replace("mass = 1.0", "mas = 1.0").replace('child = "bar"', 'child = "bra"')
+    text = text.replace("rate = 30", "rate = -3").replace("duration = 1.0", 'duration = "1"')
+    found = findings(text + "[holds]\nx = 'zog'\n")
+    assert found["duration"] == (2, "'1' should be a valid number")
+    assert found["linkage.body[0] (bar).mass"] == (11, "is missing")
+    assert found["linkage.body[0] (bar).mas"] == (13, "unknown key; did you mean 'mass'?")
+    assert found["linkage.joint[0] (pivot).child"] == (18, "no body 'bra'; did you mean 'bar'?")
+    assert found["graphics.rate"] == (6, "-3 Hz: a rate is more than 0")
+    assert found["holds.x"] == (29, "no hold 'zog'; did you mean 'zoh'?")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "message"),
+    [
+        ('body = "bar", at', 'body = "rod", at', "linkage.operational_point.body", "no body 'rod'"),
+        ("start.pivot", "start.pvot", "linkage.start.pvot", "did you mean 'pivot'"),
+        ("mass = 1.0", "mass = -1.0", "linkage.body[0] (bar).mass", "more than 0"),
+        ("mass = 1.0", "mass = inf", "linkage.body[0] (bar).mass", "finite"),
+        ("[device]\n", "", "hand", "add [device]"),
+        ("[graphics]\nrate = 30\n", "", "directions_from", "add [graphics]"),
+        ("rate = 30", "rate = { min = 60, max = 10 }", "graphics.rate.min", "swap them"),
+        ("rate = 30", "rate = [0.5, 0.2]", "graphics.rate", "must rise"),
+        ("[controller]", "[controller]\ntopology = 3", "controller.topology", "boolean"),
+        ("[controller]", "[controller]\ntopology.stif = 3", "controller.topology.stif", "unknown"),
+        ("[hand]", "[hand]\ntype = 'arm'", "hand.wrench", "unknown key"),
+        ("[haptics]", "stop_when = 'x = 3'\n[haptics]", "stop_when", "write a signal"),
+        ('name = "pivot"', 'name = "pivot"\nparent = "bar"', "linkage.body[0] (bar)", "circle"),
+    ],
+)
+def test_one_fault(old: str, new: str, key: str, message: str) -> None:
+    assert old in GOOD
+    found = findings(GOOD.replace(old, new))
+    assert message in found[key][1]
+
+
+def test_options_change_the_scene_and_are_named_in_faults() -> None:
+    options = [
+        "controller.topology=false",
+        "graphics.rate={min=10, max=60, seed=4}",
+        "linkage.body.bar.mass=2.5",
+        "title=two words",
+    ]
+    scene = scene_file.read(GOOD, options)
+    assert scene.controller is not None
+    assert scene.controller.topology is False
+    assert scene.graphics is not None
+    assert scene.graphics.rate == VariableRate(min=10, max=60, seed=4)
+    assert scene.linkage is not None
+    assert scene.linkage.body[0].mass == 2.5
+    assert scene.title == "two words"
+    with pytest.raises(SceneFault) as refused:
+        scene_file.read(GOOD, ["linkage.body.0.mass=-1", "sensing=encoder"])
+    told = str(refused.value)
+    assert "--set linkage.body.0.mass=-1: linkage.body[0] (bar).mass" in told
+    with pytest.raises(SceneFault, match=r"--set duration.x=1: duration: \{'x': 1\} should be"):
+        scene_file.read(GOOD, ["duration.x=1"])
+    assert "--set sensing=encoder: sensing: 'encoder' should be 'ideal' or 'encoders'" in told
+
+
+@pytest.mark.parametrize("option", ["novalue", "=3", "linkage.body.bax.mass=1"])
+def test_options_that_cannot_be_applied(option: str) -> None:
+    with pytest.raises(InputFault, match=f"--set {option}"):
+        scene_file.read(GOOD, [option])
+
+
+def test_sensing_reaches_the_device() -> None:
+    device = scene_file.read(GOOD, ["sensing=encoders"]).device
+    assert device is not None
+    assert device.sensing == "encoders"
+
+
+def test_every_shipped_scene_is_good_and_found_by_name() -> None:
+    assert "closed-loop" in scene_file.shipped()
+    for name in scene_file.shipped():
+        assert scene_file.load(name).title
+    with pytest.raises(InputFault, match="did you mean closed-loop"):
+        scene_file.load("closed-lop")
+
+
+def test_not_toml() -> None:
+    with pytest.raises(SceneFault, match="line 1, column"):
+        scene_file.read("title = =")
+
+
+def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:
+    text = 'a = """\n[x]\nb = 1\n"""\nc.d = [\n  1, # ]\n  2]\n'
+    text += '[t]\ne = {f = 1}\n[[s]]\n[[s]]\n"g.h"=1\n'
+    lines = key_lines(text)
+    assert lines == {
+        ("a",): 1, ("c",): 5, ("c", "d"): 5, ("t",): 8, ("t", "e"): 9,
+        ("s",): 10, ("s", 0): 10, ("s", 1): 11, ("s", 1, "g.h"): 12,
+    }  # fmt: skip

@@ -1,0 +1,91 @@
+"""Time is exact."""
+
+import math
+from fractions import Fraction
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator.ticks import (
+    Timeline,
+    aligned,
+    common_base,
+    exact,
+    listed,
+    periodic,
+    variable,
+)
+
+rates = st.fractions(min_value=Fraction(1, 10), max_value=5000, max_denominator=1001)
+
+
+def test_report_rates_meet_on_1_over_7680_s() -> None:
+    assert common_base([Fraction(1, 512), Fraction(1, 30)]) == Fraction(1, 7680)
+
+
+def test_a_rate_is_the_rational_that_was_written() -> None:
+    assert exact(29.97) == Fraction(2997, 100)
+    assert exact("30000/1001") == Fraction(30000, 1001)
+
+
+@given(rates, rates)
+def test_base_divides_every_period_and_no_coarser_one_does(a: Fraction, b: Fraction) -> None:
+    base = common_base([1 / a, 1 / b])
+    ticks = [1 / a / base, 1 / b / base]
+    assert all(t.denominator == 1 for t in ticks)
+    assert math.gcd(*map(int, ticks)) == 1
+
+
+@given(rates, st.integers(0, 10**7))
+def test_seconds_round_the_exact_time_once(rate: Fraction, tick: int) -> None:
+    base = 1 / rate
+    assert Timeline(base, tick, ()).seconds(tick) == float(tick * base)
+
+
+@given(rates, st.fractions(Fraction(1, 50), 1, max_denominator=997), st.integers(1, 300))
+def test_aligned_frames_end_on_the_first_tick_at_or_after(
+    fast: Fraction, ratio: Fraction, end: int
+) -> None:
+    base, slow = 1 / fast, fast * ratio
+    frames = aligned(1 / slow, base, end)
+    for i, tick in enumerate(frames):
+        assert tick * base >= i / slow > (tick - 1) * base
+    assert frames[-1] > end
+
+
+@pytest.mark.parametrize("rate", [60, 30, 24, 10])
+def test_frames_of_512_hz_and_a_graphics_rate(rate: int) -> None:
+    frames = aligned(Fraction(1, rate), Fraction(1, 512), 1536)
+    assert (
+        frames[:60] == tuple(math.ceil(Fraction(512 * i, rate)) for i in range(60))[: len(frames)]
+    )
+
+
+@given(st.integers(0, 2**32), st.integers(1, 2000))
+def test_variable_periods_stay_in_their_bounds_and_follow_the_seed(seed: int, end: int) -> None:
+    base = Fraction(1, 512)
+    starts = variable(Fraction(10), Fraction(60), seed, base, end)
+    periods = [b - a for a, b in pairwise(starts)]
+    assert starts[0] == 0
+    assert starts[-1] > end
+    assert all(Fraction(1, 60) <= p * base <= Fraction(1, 10) for p in periods)
+    assert starts == variable(Fraction(10), Fraction(60), seed, base, end)
+
+
+def test_bounds_without_a_whole_tick_between_them_are_refused() -> None:
+    with pytest.raises(ValueError, match="no period between"):
+        variable(Fraction(60), Fraction(60), 0, Fraction(1, 512), 10)
+
+
+def test_listed_times_go_to_ticks_and_two_on_one_are_refused() -> None:
+    base = Fraction(1, 512)
+    assert listed([Fraction(0), Fraction(1, 30), Fraction(1, 10)], base) == (0, 18, 52)
+    with pytest.raises(ValueError, match="falls on tick 18"):
+        listed([Fraction(1, 30), Fraction(171, 5130) + Fraction(1, 9999)], base)
+
+
+def test_a_period_off_the_base_is_refused() -> None:
+    with pytest.raises(ValueError, match="not a whole number of ticks"):
+        periodic(Fraction(1, 30), Fraction(1, 512), 10)
