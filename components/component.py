@@ -78,6 +78,7 @@ ACCELERATION = ("m/s2", "m/s2", "rad/s2")
 WRENCH = ("N", "N", "N.m")
 STIFFNESS = ("N/m", "N/m", "N.m/rad")
 DAMPING = ("N.s/m", "N.s/m", "N.m.s/rad")
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 INERTIA = ("kg", "kg", "kg.m", "kg", "kg", "kg.m", "kg.m", "kg.m", "kg.m2")
 MOBILITY = ("1/kg", "1/kg", "1/(kg.m)") * 2 + ("1/(kg.m)", "1/(kg.m)", "1/(kg.m2)")
 

@@ -14,6 +14,7 @@ from hapticlink.components import impedance, specs, teleoperation, topology
 from hapticlink.components.component import (
     ACCELERATION,
     DAMPING,
+    IDENTITY,
     INERTIA,
     MOBILITY,
     POSE,
@@ -40,12 +41,12 @@ def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variabl
         ),
         Variable("F_hand", (3,), WRENCH, description="wrench of the hand"): spec.impedance,
         Variable("F_env", (3,), WRENCH, description="wrench of all contacts"): spec.contact,
-        Variable("M", (3, 3), INERTIA, description="inertia of the device"): bool(
+        Variable("M", (3, 3), INERTIA, IDENTITY, "inertia of the device"): bool(
             spec.impedance or law
         ),
         Variable("c", (3,), WRENCH, description="device's velocity term C_d v"): spec.impedance,
         Variable(
-            "Lambda_inv", (3, 3), MOBILITY, description="inverse inertia of the mechanism"
+            "Lambda_inv", (3, 3), MOBILITY, IDENTITY, "inverse inertia of the mechanism"
         ): spec.impedance,
         Variable("P_c", (3, 3), description="projector on the resisted directions"): bool(law),
         Variable(

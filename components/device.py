@@ -126,7 +126,7 @@ def haptic_device(device: specs.Device) -> Component:
     plant, motion = _plant(block), ca.vertcat(pose, velocity)
     for i in range(device.substeps):
         motion = integrators.step(
-            "rk4",
+            "heun",
             plant,
             motion,
             ca.vertcat(tau, u["F_hand"]),

@@ -84,11 +84,35 @@ def _arm(spec: specs.ArmHand) -> Component:
     )
 
 
+def _spring(spec: specs.SpringHand) -> Component:
+    """F = K (x_t - x) + B (x_t' - v)."""
+    damped = spec.damping is not None
+    parameters = [Variable("stiffness", (3,), STIFFNESS, spec.stiffness, "to target path")]
+    if spec.damping is not None:
+        parameters.append(Variable("damping", (3,), DAMPING, spec.damping, "to target path"))
+    block = Block(inputs=[_X, _V] if damped else [_X], parameters=parameters, outputs=[_F])
+    F = block.p["stiffness"] * (interpolate(spec.target, block.t, "hand.target") - block.u["x"])
+    if damped:
+        F += block.p["damping"] * (slope(spec.target, block.t) - block.u["v"])
+    return block.component(
+        "hand",
+        "Hand: a spring to a target path",
+        "sampled",
+        initial={},
+        step={},
+        output={"F": F},
+        documentation=hand.__doc__ or "",
+    )
+
+
 def hand(spec: specs.Hand) -> Component:
     """The hand that `spec` describes.
 
     Constant or profile: F = F(t) - B v; x is no input, and v only where there is damping.
     Arm: a mass held to a target path, F through the spring and damper of the grip, the
     handle's x and v held over each step. It starts at the handle's x and v with F = 0.
+    Spring: an arm without a mass.
     """
-    return _arm(spec) if isinstance(spec, specs.ArmHand) else _wrench(spec)
+    if isinstance(spec, specs.ArmHand):
+        return _arm(spec)
+    return _spring(spec) if isinstance(spec, specs.SpringHand) else _wrench(spec)

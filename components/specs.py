@@ -148,11 +148,13 @@ class Mechanism:
     """Time integration of the virtual mechanism.
 
     alpha (1/s) and beta are Baumgarte's; None takes dead beat for semi-implicit Euler
-    (alpha h = 1, beta = 1/2), which needs no number from the user.
+    (alpha h = 1, beta = 1/2), which needs no number from the user. directions adds the outputs
+    Lambda_inv, P_c and n_constraints at the mechanism's own rate.
     """
 
     integrator: Literal["semi-implicit-euler", "rk4"] = "rk4"
     stabilization: Literal["none", "baumgarte", "projection"] = "projection"
+    directions: bool = False
     alpha: float | None = None
     beta: float | None = None
     substeps: int = 1
@@ -292,4 +294,15 @@ class ArmHand:
     target: tuple[tuple[float, float, float, float], ...]
 
 
-Hand = ConstantHand | ProfileHand | ArmHand
+@dataclass(frozen=True, kw_only=True)
+class SpringHand:
+    """A massless hand: spring and damper (N/m, N/m, N.m/rad; N.s/m, ...) to a target path,
+    rows (t s, x m, y m, theta rad), linear, held after."""
+
+    type: Literal["spring"] = "spring"
+    stiffness: Vector3
+    damping: Vector3 | None = None
+    target: tuple[tuple[float, float, float, float], ...] = ((0.0, 0.0, 0.0, 0.0),)
+
+
+Hand = ConstantHand | ProfileHand | ArmHand | SpringHand

@@ -36,7 +36,7 @@ def blocks(scene: Scene) -> tuple[BlockPlan, ...]:
         found.append(BlockPlan("haptic_device", "haptics", {"device": scene.device}))
     if scene.linkage:
         settings = {"linkage": scene.linkage, "mechanism": scene.mechanism}
-        if scene.directions_from == "mechanism":
+        if scene.directions_from == "mechanism" or scene.mechanism.directions:
             settings["directions"] = scene.directions
         found.append(BlockPlan("virtual_mechanism", scene.mechanism_at, settings))
     if scene.linkage and scene.graphics and scene.directions_from == "graphics":

@@ -2,8 +2,8 @@
 
 A row is made where both ends exist. x_start and x_ref are parameters: they are set once, in
 initialisation, so the device starts where the mechanism is. F_drift acts on the device as +
-and on the mechanism as -; the minus is the mechanism's own. The hand holds the true handle, not the
-measured one.
+and on the mechanism as -; the minus is the mechanism's own. The hand holds the true handle, not
+the measured one; without a device it holds the operational point itself.
 """
 
 from __future__ import annotations
@@ -16,8 +16,6 @@ _LOOP: tuple[Row, ...] = (
     ("virtual_mechanism.x", "haptic_device.x_start"),
     ("virtual_mechanism.x", "controller.x_ref"),
     ("hand.F", "haptic_device.F_hand"),
-    ("haptic_device.x_true", "hand.x"),
-    ("haptic_device.v_true", "hand.v"),
     ("haptic_device.x", "controller.x_D"),
     ("haptic_device.v", "controller.v_D"),
     ("haptic_device.M", "controller.M"),
@@ -40,8 +38,13 @@ def connections(scene: Scene) -> tuple[Row, ...]:
     felt = "hand.F" if scene.sensing == "ideal" else "haptic_device.F_hand_observed"
     directions = {"graphics": "virtual_environment", "mechanism": "virtual_mechanism"}
     giver = directions[scene.directions_from]
+    held = ("haptic_device.x_true", "haptic_device.v_true")
+    if not scene.device:
+        held = ("virtual_mechanism.x", "virtual_mechanism.v")
     return (
         *_LOOP,
+        (held[0], "hand.x"),
+        (held[1], "hand.v"),
         (felt, "controller.F_hand"),
         (felt, "virtual_mechanism.F_hand"),
         (f"{giver}.Lambda_inv", "controller.Lambda_inv"),

@@ -26,6 +26,7 @@ from hapticlink.components.specs import (
     Linkage,
     Mechanism,
     ProfileHand,
+    SpringHand,
 )
 
 Rate = int | float | str
@@ -68,7 +69,8 @@ def _hand_type(table: Any) -> str:
 Hand = Annotated[
     Annotated[ConstantHand, Tag("constant")]
     | Annotated[ProfileHand, Tag("profile")]
-    | Annotated[ArmHand, Tag("arm")],
+    | Annotated[ArmHand, Tag("arm")]
+    | Annotated[SpringHand, Tag("spring")],
     Discriminator(_hand_type),
 ]
 
@@ -83,7 +85,8 @@ class Scene:
     the mechanism itself. hold is the default where a connection crosses rates; holds gives
     others by source (`virtual_environment.P_c`), target or `source -> target`. stop_when, a
     signal against a number, ends the run in good order: None takes the device's workspace where
-    there is a device, "" is never.
+    there is a device, "" is never. A file may also say `extends`, a scene over which its own tables
+    are laid.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)

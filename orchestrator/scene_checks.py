@@ -97,8 +97,8 @@ def _blocks(scene: Scene) -> Iterator[Problem]:
                 yield (table,), f"[{table}] needs a [linkage]: add one, or take [{table}] out"
     if scene.controller and not scene.device:
         yield ("controller",), "[controller] moves a device: add [device], or take it out"
-    if scene.hand and not scene.device:
-        yield ("hand",), "[hand] holds the device's handle: add [device], or take it out"
+    if scene.hand and not scene.device and not scene.linkage:
+        yield ("hand",), "[hand] holds a device or a linkage: add one, or take it out"
     if scene.sensing == "encoders" and not scene.device:
         yield ("sensing",), "'encoders' are the device's: add [device], or take sensing out"
     if not scene.graphics:

@@ -52,10 +52,7 @@ def load(scene: str, options: Sequence[str] = ()) -> Scene:
 def read(text: str, options: Sequence[str] = (), name: str = "scene") -> Scene:
     """The scene that `text` writes. Raises SceneFault with every finding, InputFault for an
     option that cannot be applied."""
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneFault(name, [Finding("", f"not TOML: {error}")]) from error
+    data = _document(text, name)
     lines = key_lines(text)
     set_by = {overrides.apply(data, option): option for option in options}
     if isinstance(data.get("holds"), dict):
@@ -81,6 +78,34 @@ def read(text: str, options: Sequence[str] = (), name: str = "scene") -> Scene:
     if found.device and found.device.sensing != found.sensing:
         found = replace(found, device=replace(found.device, sensing=found.sensing))
     return found
+
+
+def _document(text: str, name: str, above: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The tables of a scene, laid over those of the scene that it `extends`."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneFault(name, [Finding("", f"not TOML: {error}")]) from error
+    base = data.pop("extends", None)
+    if base is None:
+        return data
+    if base in above:
+        raise InputFault(f"{name}: `extends` runs in a circle: {' -> '.join((*above, base))}")
+    if not isinstance(base, str):
+        raise SceneFault(name, [Finding("extends", f"{base!r}: write a scene's name or path")])
+    return _laid_over(_document(find(base)[1], base, (*above, base)), data)
+
+
+def _laid_over(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables merge key by key; anything else of `top`, and a table that names another `type`,
+    takes the place of the base's."""
+    merged = dict(base)
+    for key, value in top.items():
+        below = base.get(key)
+        both = isinstance(below, dict) and isinstance(value, dict)
+        alike = both and value.get("type", below.get("type")) == below.get("type")
+        merged[key] = _laid_over(below, value) if alike else value
+    return merged
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> typing.Iterator[tuple[str, Any]]:

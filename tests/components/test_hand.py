@@ -79,3 +79,21 @@ def test_arm_settles_between_target_and_handle():
     for _ in range(4000):
         running.step(0.002)
     assert running.y["F"][0] == pytest.approx(0.1 * 300 * 2000 / 2300, rel=1e-9)
+
+
+def test_a_spring_pulls_to_its_moving_target():
+    block = Running(
+        hand(
+            specs.SpringHand(
+                stiffness=(100.0, 200.0, 3.0),
+                damping=(1.0, 2.0, 0.1),
+                target=((0.0, 0.0, 0.0, 0.0), (1.0, 0.1, 0.2, 0.3)),
+            )
+        )
+    )
+    block.t = 0.5
+    x, v = np.array([0.01, -0.02, 0.3]), np.array([0.5, 0.0, -1.0])
+    block.set(x=x, v=v)
+    rate = np.array([0.1, 0.2, 0.3])
+    expected = [100, 200, 3] * (0.5 * rate - x) + [1, 2, 0.1] * (rate - v)
+    np.testing.assert_allclose(block.y["F"], expected, rtol=1e-13)

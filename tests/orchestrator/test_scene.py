@@ -144,3 +144,21 @@ def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:
         ("a",): 1, ("c",): 5, ("c", "d"): 5, ("t",): 8, ("t", "e"): 9,
         ("s",): 10, ("s", 0): 10, ("s", 1): 11, ("s", 1, "g.h"): 12,
     }  # fmt: skip
+
+
+def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
+    base, top = tmp_path / "base.toml", tmp_path / "top.toml"
+    base.write_text(scene_file.find("closed-loop")[1])
+    top.write_text(f'extends = "{base}"\nduration = 1.0\n[hand]\nwrench = [1.0, 0.0, 0.0]\n')
+    scene = scene_file.load(str(top))
+    assert scene.duration == 1.0
+    assert scene.hand.wrench == (1.0, 0.0, 0.0)
+    assert scene.linkage == scene_file.load("closed-loop").linkage
+
+
+def test_scenes_that_extend_each_other_are_refused(tmp_path):
+    one, two = tmp_path / "one.toml", tmp_path / "two.toml"
+    one.write_text(f'extends = "{two}"\n')
+    two.write_text(f'extends = "{one}"\n')
+    with pytest.raises(InputFault, match="circle"):
+        scene_file.load(str(one))
