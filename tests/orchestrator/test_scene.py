@@ -70,7 +70,7 @@ def test_all_faults_at_once_with_line_and_remedy() -> None:
         ("start.pivot", "start.pvot", "linkage.start.pvot", "did you mean 'pivot'"),
         ("mass = 1.0", "mass = -1.0", "linkage.body[0] (bar).mass", "more than 0"),
         ("mass = 1.0", "mass = inf", "linkage.body[0] (bar).mass", "finite"),
-        ("[device]\n", "", "hand", "add [device]"),
+        ("[device]\n", "", "controller", "add [device]"),
         ("[graphics]\nrate = 30\n", "", "directions_from", "add [graphics]"),
         ("rate = 30", "rate = { min = 60, max = 10 }", "graphics.rate.min", "swap them"),
         ("rate = 30", "rate = [0.5, 0.2]", "graphics.rate", "must rise"),
