@@ -14,7 +14,7 @@ from hapticlink.components.closure import ClosedLoopSolver
 from hapticlink.components.linkage import LinkageModel
 from hapticlink.components.tree import TreeInertia
 
-REPEATS = 2
+REPEATS = 3
 
 
 def project(model: LinkageModel, q: ca.SX, qd: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -31,5 +31,6 @@ def project(model: LinkageModel, q: ca.SX, qd: ca.SX) -> tuple[ca.SX, ca.SX]:
     W_closed = W(closed, p)
     for _ in range(REPEATS):
         rate = rate - solver.constrain(W_closed @ rate)
-    moved = ca.Function("project", [model.q, model.qd, p], [closed, rate])
-    return moved(q, qd, p)
+    moved = ca.Function("project", [model.q, model.qd, p], [closed, rate], {"cse": True})
+    closed, rate = moved(q, qd, p)
+    return closed, rate

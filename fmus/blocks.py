@@ -49,12 +49,17 @@ def _hand(s: Settings, step_s: float) -> Component:
     return _components("hand").hand(s["hand"])
 
 
+def _discrete_equivalent(s: Settings, step_s: float) -> Component:
+    return _components("discrete_equivalent").discrete_equivalent(s["rule"])
+
+
 BLOCKS: dict[str, Callable[[Settings, float], Component]] = {
     "virtual_mechanism": _virtual_mechanism,
     "virtual_environment": _virtual_environment,
     "haptic_device": _haptic_device,
     "controller": _controller,
     "hand": _hand,
+    "discrete_equivalent": _discrete_equivalent,
 }
 
 

@@ -18,6 +18,7 @@ _COMMANDS = {
     "run": "Run a scene: results, run.json and figures.",
     "build": "Build the FMUs of a scene.",
     "info": "Tell what a scene consists of, or which scenes there are.",
+    "reproduce": "Make the report's figures and a page of what was found.",
 }
 for _name, _help in _COMMANDS.items():
     app.command(f"{__name__}.{_name}:{_name}", name=_name, help=_help)

@@ -1,0 +1,20 @@
+"""`hapticlink reproduce`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from hapticlink.orchestrator.commands.options import Out
+
+
+def reproduce(*, out: Out = None) -> int:
+    """Make the report's figures from runs of the FMUs, and a page of what was found, in OUT
+    (default results/report)."""
+    from hapticlink.orchestrator.report import reproduce as make
+
+    def tell(what: str) -> None:
+        print(what, file=sys.stderr)
+
+    print(make(out or Path("results/report"), tell))
+    return 0

@@ -1,0 +1,25 @@
+"""The report's figures from runs of the FMUs, and a page that sets found beside stated."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from hapticlink.orchestrator.report import chapter1, chapter3, chapter6, page, section_b6
+from hapticlink.orchestrator.report.entry import Entry, Runs
+
+CHAPTERS = (chapter1, chapter3, chapter6, section_b6)
+
+
+def reproduce(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Path:
+    """Write figures and README.md into `folder`; `tell` hears what is being made."""
+    folder.mkdir(parents=True, exist_ok=True)
+    entries: list[Entry] = []
+    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
+        runs = Runs(Path(room), tell)
+        for chapter in CHAPTERS:
+            for entry in chapter.entries(runs, folder):
+                tell(f"{entry.title}: {entry.figure}")
+                entries.append(entry)
+    return page.write(folder, entries)

@@ -1,0 +1,27 @@
+"""The look that all figures of the report share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#777777"
+
+
+def panels(count: int, *, width: float = 4.6, height: float = 3.8, **options: Any) -> Any:
+    """(figure, axes) side by side."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width * count, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(1, count, squeeze=False, **options)[0]
+    for each in axes:
+        each.grid(alpha=0.3)
+    return figure, axes
+
+
+def save(figure: Any, folder: Path, name: str) -> str:
+    # Without the software's version and date the same run gives the same bytes.
+    figure.savefig(folder / name, dpi=130, metadata={"Software": None})
+    return name

@@ -1,0 +1,43 @@
+"""What a chapter gives to the page, and the runs that chapters share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import Results
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A figure of the report: what the report states of it, and what was found."""
+
+    title: str
+    figure: str
+    stated: str
+    found: str
+    command: str
+
+
+@dataclass
+class Runs:
+    """Runs by scene and options, each made once, in a folder that goes with them."""
+
+    room: Path
+    tell: Callable[[str], None]
+    _made: dict[tuple[str, ...], Results] = field(default_factory=dict)
+
+    def __call__(self, scene: str, *options: str) -> Results:
+        key = (scene, *options)
+        if key not in self._made:
+            self.tell(f"running {command(scene, *options)}")
+            folder = self.room / str(len(self._made))
+            self._made[key] = simulate(scene, folder, options).results
+        return self._made[key]
+
+
+def command(scene: str, *options: str) -> str:
+    """What a user types for that run."""
+    return " ".join(["hapticlink run", scene, *(f"--set {o}" for o in options)])

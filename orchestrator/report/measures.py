@@ -1,0 +1,106 @@
+"""Numbers that the page gives of a haptic run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hapticlink.orchestrator.results import Results, Vector
+
+
+def held(results: Results, signal: str) -> Vector:
+    """A graphics-rate signal at the haptic samples, zero-order held."""
+    times = results.graphics["time"]
+    frame = np.searchsorted(times, results.haptics["time"] + 1e-12, side="right") - 1
+    return np.asarray(results.graphics[signal][frame])
+
+
+def rms(values: Vector) -> Vector:
+    return np.asarray(np.sqrt(np.mean(np.square(values), axis=0)))
+
+
+@dataclass(frozen=True)
+class Neglected:
+    """RMS of what (B.7) calls negligible: translation (m/s2), rotation (rad/s2), and F_drift."""
+
+    bias: tuple[float, float]
+    rendered: tuple[float, float]
+    drift_force: float
+    largest_drift: float
+    hand_force: float
+
+
+def neglected(results: Results) -> Neglected:
+    haptics = results.haptics
+    bias = haptics["virtual_mechanism.a_bias"]
+    wrench = haptics["hand.F"]
+    drift = haptics["controller.F_drift"]
+    mobility = held(results, "virtual_environment.Lambda_inv")
+    rendered = np.einsum("kij,kj->ki", mobility, wrench + drift)
+
+    def parts(a: Vector) -> tuple[float, float]:
+        return float(np.hypot(*rms(a[:, :2]))), float(rms(a[:, 2]))
+
+    return Neglected(
+        parts(bias),
+        parts(rendered),
+        float(rms(np.hypot(drift[:, 0], drift[:, 1]))),
+        float(np.hypot(drift[:, 0], drift[:, 1]).max()),
+        float(np.hypot(*wrench[0, :2])),
+    )
+
+
+def episodes(time: Vector, count: Vector) -> list[tuple[float, float]]:
+    """(begin, end) in s of each stretch with two resisted directions."""
+    two = np.r_[False, count >= 2, False]
+    edges = np.flatnonzero(np.diff(two.astype(int)))
+    last = len(time) - 1
+    return [(time[a], time[min(b, last)]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+@dataclass(frozen=True)
+class Count:
+    """How the frames' number of resisted directions agrees with the mechanism's own."""
+
+    frames: int
+    wrong: int
+    episodes: tuple[tuple[float, float], ...]
+    unseen: int
+    fold: float  # rad, largest angle between links 3 and 4 while two directions are resisted
+
+
+def count(results: Results) -> Count:
+    haptics, graphics = results.haptics, results.graphics
+    own = haptics["virtual_mechanism.n_constraints"]
+    seen = graphics["virtual_environment.n_constraints"]
+    at = np.searchsorted(haptics["time"], graphics["time"] - 1e-12)
+    wrong = int(np.sum(own[np.minimum(at, len(own) - 1)] != seen))
+    times = graphics["time"][seen >= 2]
+    found = episodes(haptics["time"], own)
+    unseen = sum(not np.any((times >= a) & (times <= b)) for a, b in found)
+    fold = folding(haptics["virtual_mechanism.q"][:, 3])[own >= 2]
+    return Count(len(seen), wrong, tuple(found), unseen, float(fold.max(initial=0.0)))
+
+
+def folding(q4: Vector) -> Vector:
+    """Angle (rad) between links 3 and 4, 0 where they line up."""
+    return np.asarray(np.abs(np.arctan2(np.sin(2 * q4), np.cos(2 * q4))) / 2)
+
+
+def acceleration_error(results: Results) -> float:
+    """Device acceleration at t = 0 against Lambda^-1 F_h, relative."""
+    haptics = results.haptics
+    wrench = haptics["hand.F"][0]
+    force = haptics["controller.F_motor"][0] + wrench - haptics["haptic_device.c"][0]
+    device = np.linalg.solve(haptics["haptic_device.M"][0], force)
+    wanted = held(results, "virtual_environment.Lambda_inv")[0] @ wrench
+    return float(np.abs(device - wanted).max() / np.abs(wanted).max())
+
+
+def free_work(results: Results, length_scale: float) -> float:
+    """Largest part of F_T on free motion, (1 - P_c) S^-1 F_T, relative to the largest F_T."""
+    scaled = results.haptics["controller.F_constraint"] / (1, 1, length_scale)
+    P = held(results, "virtual_environment.P_c")
+    free = scaled - np.einsum("kij,kj->ki", P, scaled)
+    return float(np.abs(free).max() / np.abs(scaled).max())
