@@ -19,11 +19,13 @@ x0 = initialize(u, p), of the values set so far.
 from __future__ import annotations
 
 import array
+import atexit
 import ctypes
 import functools
 import json
 import math
 import os
+import sys
 import typing
 
 from pythonfmu import Fmi2Slave, enums
@@ -54,8 +56,11 @@ class HapticlinkSlave(Fmi2Slave):
         dict
     ] = {}  # functions by way of evaluation, read once for all instances
 
+    _released: typing.ClassVar[list] = []
+
     def __init__(self, **kwargs: typing.Any) -> None:
         super().__init__(**kwargs)
+        self._release_at_exit()
         with open(os.path.join(self.resources, "component.json"), encoding="utf-8") as file:
             self._about = about = json.load(file)
         n_u, n_p, n_y, n_x = (about[k] for k in ("n_inputs", "n_parameters", "n_outputs", "n_x"))
@@ -75,6 +80,26 @@ class HapticlinkSlave(Fmi2Slave):
         self._evaluate_x0 = self._bind("initialize", (u, p), x)
         self._evaluate_y = self._bind("output", (x, u, p, t), y)
         self._evaluate_step = self._bind("step", (trial, u, p, t, h), after)
+
+    def _release_at_exit(self) -> None:
+        """Have pythonfmu's library let go of its interpreter before its own destructors run.
+
+        pythonfmu 0.7 destroys the static that holds the interpreter and then, in the library's
+        destructor, drops it once more: memory is corrupted as the process ends. Dropped while
+        Python still runs, it is null by then. In a process that is no Python program, where
+        the library owns the interpreter, there is nothing to let go of.
+        """
+        if os.name != "posix" or self._released or not getattr(sys, "orig_argv", None):
+            return
+        folder = os.path.join(os.path.dirname(self.resources), "binaries", "linux64")
+        try:
+            for name in os.listdir(folder):
+                path = os.path.join(folder, name)
+                library = ctypes.CDLL(path, mode=os.RTLD_NOLOAD | os.RTLD_LAZY)
+                atexit.register(library.finalizePythonInterpreter)
+                self._released.append(library)
+        except OSError:  # not loaded from there: nothing of ours to let go of
+            return
 
     # --- the component's functions ------------------------------------------------------
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
+import os
 import shutil
 import subprocess
 import sys
@@ -324,3 +325,18 @@ def test_an_fmu_without_sense_in_its_start_values_is_found_out(tmp_path):
     )
     findings = check_fmu(build(component, tmp_path))
     assert findings == ["alone: not finite from its own start values: ratio"]
+
+
+def test_process_ends_whole_after_a_simulation(fmus, tmp_path):
+    """As a user types it: memory damaged at teardown would show in the exit status."""
+    command = [sys.executable, "-m", "fmpy.cli", "simulate", str(fmus["spring"])]
+    environment = os.environ | {"MALLOC_CHECK_": "3", "MALLOC_PERTURB_": "165"}
+    done = subprocess.run(
+        [*command, "--output-file", str(tmp_path / "out.csv")],
+        capture_output=True,
+        text=True,
+        env=environment,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "out.csv").read_text().count("\n") > 2
