@@ -32,9 +32,12 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     at = LinkageModel(model.linkage, model.p, *symbols)
     least = ClosedLoopSolver(UnitInertia(n), at.W)
     parameters = model.p.vector
-    newton = ca.Function("newton", [symbols[0], parameters], [symbols[0] - least.constrain(at.h)])
+    shared = {"cse": True}
+    newton = ca.Function(
+        "newton", [symbols[0], parameters], [symbols[0] - least.constrain(at.h)], shared
+    )
     project = ca.Function(
-        "project", [*symbols, parameters], [symbols[1] - least.constrain(at.W @ symbols[1])]
+        "project", [*symbols, parameters], [symbols[1] - least.constrain(at.W @ symbols[1])], shared
     )
     for _ in range(STEPS):
         q = newton(q, parameters)

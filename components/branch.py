@@ -13,15 +13,18 @@ import numpy as np
 from hapticlink.components.linkage import LinkageModel
 
 
-def dependent_coordinates(model: LinkageModel, start: np.ndarray) -> tuple[list[int], list[int]]:
+def dependent_coordinates(
+    model: LinkageModel, start: np.ndarray, unseen_first: bool = True
+) -> tuple[list[int], list[int]]:
     """(rows of W, columns of W) of a regular block W_d at the start pose, by elimination.
 
-    start: flat parameters' defaults and pose as (q, p). Redundant rows are left out.
+    start: flat parameters' defaults and pose as (q, p). Redundant rows are left out. Without
+    unseen_first the largest pivots alone choose, for a block far from singular.
     """
     n = model.q.numel()
     W = ca.Function("W", [model.q, model.p.vector], [model.W])
     A = np.array(W(start[:n], start[n:]), dtype=float)
-    unseen = [not model.J_h[:, j].nnz() for j in range(n)]
+    unseen = [unseen_first and not model.J_h[:, j].nnz() for j in range(n)]
     smallest = 1e-9 * np.abs(A).max()
     chosen: list[int] = []
     columns: list[int] = []

@@ -16,18 +16,21 @@ from typing import Protocol
 
 import casadi as ca
 
+from hapticlink.components.tree import symmetric
+
 MU = 1e-8  # relative to trace(S)/m
-PROXIMAL_STEPS = 2
+PROXIMAL_STEPS = 1
 
 
 class Inertia(Protocol):
-    """D as an operator on n x r columns."""
+    """D as an operator on n x r columns, D^-1 = outward d_inv inward with outward = inward'."""
 
     n: int
+    d_inv: ca.SX
 
-    def solve(self, b: ca.SX) -> ca.SX: ...
+    def inward(self, b: ca.SX) -> ca.SX: ...
 
-    def apply(self, a: ca.SX) -> ca.SX: ...
+    def outward(self, u: ca.SX) -> ca.SX: ...
 
 
 class UnitInertia:
@@ -35,12 +38,13 @@ class UnitInertia:
 
     def __init__(self, n: int) -> None:
         self.n = n
+        self.d_inv = ca.SX.ones(n)
 
-    def solve(self, b: ca.SX) -> ca.SX:
+    def inward(self, b: ca.SX) -> ca.SX:
         return b
 
-    def apply(self, a: ca.SX) -> ca.SX:
-        return a
+    def outward(self, u: ca.SX) -> ca.SX:
+        return u
 
 
 class ClosedLoopSolver:
@@ -50,9 +54,11 @@ class ClosedLoopSolver:
         self.inertia, self.W = inertia, W
         self.m = W.shape[0]
         if self.m:
-            self._Y = inertia.solve(W.T)  # D^-1 W'
-            S = W @ self._Y
+            self._Z = inertia.inward(W.T)
+            self._Y = ca.diag(inertia.d_inv) @ self._Z
+            S = symmetric(self._Z.T @ self._Y)
             self._mu = MU * ca.trace(S) / self.m
+            self.S = S
             self._S_factor = ca.ldl(ca.sparsify(S + self._mu * ca.SX.eye(self.m)), False)
 
     def _multipliers(self, residual: ca.SX) -> ca.SX:
@@ -61,21 +67,17 @@ class ClosedLoopSolver:
             multipliers = ca.ldl_solve(residual + self._mu * multipliers, *self._S_factor)
         return multipliers
 
-    def _solve_once(self, b: ca.SX, c: ca.SX) -> tuple[ca.SX, ca.SX]:
-        free = self.inertia.solve(b)
-        multipliers = self._multipliers(c - self.W @ free)
-        return free + self._Y @ multipliers, multipliers
-
     def solve(self, b: ca.SX, c: ca.SX) -> tuple[ca.SX, ca.SX]:
         """(a, lambda) for right-hand sides b (n x r) and c (m x r)."""
+        free = ca.diag(self.inertia.d_inv) @ self.inertia.inward(b)
         if not self.m:
-            return self.inertia.solve(b), ca.SX(0, b.shape[1])
-        a, multipliers = self._solve_once(b, c)
-        left = b - self.inertia.apply(a) + self.W.T @ multipliers
-        da, dl = self._solve_once(left, c - self.W @ a)
-        return a + da, multipliers + dl
+            return self.inertia.outward(free), ca.SX(0, b.shape[1])
+        multipliers = self._multipliers(c - self._Z.T @ free)
+        a = self.inertia.outward(free + self._Y @ multipliers)
+        left = self._multipliers(c - self.W @ a)
+        return a + self.inertia.outward(self._Y @ left), multipliers + left
 
     def constrain(self, c: ca.SX) -> ca.SX:
         """The least change a (in the metric D) with W a = c, unrefined: for iterations that
         correct themselves."""
-        return self._Y @ self._multipliers(c)
+        return self.inertia.outward(self._Y @ self._multipliers(c))

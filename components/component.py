@@ -191,11 +191,16 @@ class Block:
         output: Mapping[str, ca.SX],
         substeps: int = 1,
         documentation: str = "",
+        shared: bool = False,
     ) -> Component:
-        """step and output are expressions in this block's symbols; initial in u and p only."""
+        """step and output are expressions in this block's symbols; initial in u and p only.
+
+        shared: step and initial are built of functions whose common terms are shared already;
+        looking again costs most of the build of a large graph.
+        """
         x, u, p, t, h = self.x.vector, self.u.vector, self.p.vector, self.t, self.h
         x1 = pack(self.x.variables, step) if isinstance(step, Mapping) else ca.densify(step)
-        options = {"cse": True}
+        once, options = {"cse": not shared}, {"cse": True}
         return Component(
             name=name,
             description=description,
@@ -205,10 +210,10 @@ class Block:
             states=self.x.variables,
             outputs=self.outputs,
             initialize=ca.Function(
-                "initialize", [u, p], [pack(self.x.variables, initial)], ["u", "p"], ["x0"], options
+                "initialize", [u, p], [pack(self.x.variables, initial)], ["u", "p"], ["x0"], once
             ),
             step=ca.Function(
-                "step", [x, u, p, t, h], [x1], ["x", "u", "p", "t", "h"], ["x1"], options
+                "step", [x, u, p, t, h], [x1], ["x", "u", "p", "t", "h"], ["x1"], once
             ),
             output=ca.Function(
                 "output",

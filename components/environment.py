@@ -9,7 +9,8 @@ report's gains, B_g on an inertia of about 0.002 kg.m2 is stiff far beyond any e
     W qd+ = 0,   q+ = q + h qd+, then projected on the closures
 
 It computes what the haptic side is too busy for: Lambda^-1 (B.13), the projector on the resisted
-directions (in place of B.14) and their number, and whether it is on the mechanism's branch.
+directions (in place of B.14) and their number, the contact geometry, and whether it is on the
+mechanism's branch.
 """
 
 from __future__ import annotations
@@ -17,25 +18,45 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from hapticlink.components import branch, resisted
+from hapticlink.components import branch, contact
+from hapticlink.components import local_model as held_matrices
 from hapticlink.components.assembly import assemble, require_closed
 from hapticlink.components.closure import ClosedLoopSolver
 from hapticlink.components.component import POSE, TWIST, Block, Component, Variable
+from hapticlink.components.contact_specs import Contacts
 from hapticlink.components.linkage import LinkageModel, coordinate_units, coordinates, parameters
-from hapticlink.components.mechanism import (
+from hapticlink.components.mechanism_variables import (
     direction_outputs,
     direction_parameters,
+    length_parameter,
+    mobility_output,
     start_parameters,
+    states,
 )
 from hapticlink.components.operational_space import OperationalSpace
 from hapticlink.components.projection import project
+from hapticlink.components.resisted_output import resisted_directions
 from hapticlink.components.specs import Directions, GraphicsCopy, Linkage
-from hapticlink.components.tree import TreeInertia, to_point
+from hapticlink.components.tree import TreeInertia
 
 
-def virtual_environment(linkage: Linkage, copy: GraphicsCopy, directions: Directions) -> Component:
-    """The FMU `virtual_environment`. Raises AssemblyError where a loop does not close."""
+def virtual_environment(
+    linkage: Linkage,
+    copy: GraphicsCopy,
+    directions: Directions | None,
+    contacts: Contacts | None = None,
+    *,
+    mobility: bool = True,
+    local_model: bool = False,
+) -> Component:
+    """The FMU `virtual_environment`, of what is asked: `mobility` is Lambda_inv, `directions` P_c
+    and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h (B.15).
+
+    Raises AssemblyError where a loop does not close.
+    """
     joint_sync = copy.sync == "joint"
+    if contacts and not contact.places(linkage, contacts):
+        contacts = None
     units = coordinate_units(linkage)
     rates = tuple(f"{u}/s" for u in units)
     n = len(units)
@@ -54,48 +75,43 @@ def virtual_environment(linkage: Linkage, copy: GraphicsCopy, directions: Direct
             *parameters(linkage),
             *start_parameters(linkage),
             *_gains(copy),
-            *direction_parameters(linkage, directions),
+            *(_direction_parameters(linkage, directions) if directions else []),
+            *(contact.detection_parameters(linkage, contacts) if contacts else []),
         ],
-        states=[Variable("q", (n,), units), Variable("qd", (n,), rates), Variable("n_resisted")],
-        outputs=_outputs(linkage, units),
+        states=[*states(linkage), *([Variable("n_resisted")] if directions else [])],
+        outputs=[
+            *_outputs(linkage, units),
+            *([mobility_output()] if mobility else []),
+            *(direction_outputs() if directions else []),
+            *_branch_outputs(linkage),
+            *([contact.contact_port(linkage, contacts)] if contacts else []),
+            *(held_matrices.ports(linkage) if local_model else []),
+        ],
     )
     model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
-    S = resisted.scaling(block.p["length_scale"])
-    resistance = (block.p["rank_tolerance"], block.p["hysteresis"])
-
     q1, qd1 = _pulled(block, model, joint_sync)
-    scaled = ca.Function(
-        "scaled", [model.q, block.p.vector], [S @ OperationalSpace(model).Lambda_inv @ S]
-    )
-    after, _ = resisted.eigen(scaled(q1, block.p.vector))
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
-    first, _ = resisted.eigen(scaled(q0, block.p.vector))
-    values, vectors = resisted.eigen(scaled(model.q, block.p.vector))
-
-    output = {
-        "x": model.x_h,
-        "v": model.v_h,
-        "q": model.q,
-        "Lambda_inv": OperationalSpace(model).Lambda_inv,
-        "P_c": resisted.projector(values, vectors, block.x["n_resisted"]),
-        "n_constraints": block.x["n_resisted"],
-    }
+    initial, step = {"q": q0, "qd": qd0}, {"q": q1, "qd": qd1}
+    output = {"x": model.x_h, "v": model.v_h, "q": model.q}
+    space = OperationalSpace(model)
+    if mobility:
+        output["Lambda_inv"] = space.Lambda_inv
+    if directions:
+        resisted = resisted_directions(block, space, q0, q1)
+        initial["n_resisted"], step["n_resisted"] = resisted.first, resisted.after
+        output |= resisted.output
     if linkage.loop:
         output |= _branch(block, model)
+    if contacts:
+        output["contacts"] = contact.detected(model, contacts)
+    if local_model:
+        output |= held_matrices.values(model)
     component = block.component(
         "virtual_environment",
         "Graphics-rate copy of the linkage, its mobility and resisted directions",
         "continuous",
-        initial={
-            "q": q0,
-            "qd": qd0,
-            "n_resisted": resisted.count(first, ca.SX(0), *resistance),
-        },
-        step={
-            "q": q1,
-            "qd": qd1,
-            "n_resisted": resisted.count(after, block.x["n_resisted"], *resistance),
-        },
+        initial=initial,
+        step=step,
         output=output,
         substeps=copy.substeps,
         documentation=__doc__ or "",
@@ -117,17 +133,26 @@ def _gains(copy: GraphicsCopy) -> list[Variable]:
     ]
 
 
+def _direction_parameters(linkage: Linkage, directions: Directions) -> list[Variable]:
+    length = length_parameter(linkage, directions.length_scale)
+    return [length, *direction_parameters(directions)]
+
+
 def _outputs(linkage: Linkage, units: tuple[str, ...]) -> list[Variable]:
-    found = [
+    return [
         Variable("x", (3,), POSE, description="pose of the copy's operational point"),
         Variable("v", (3,), TWIST, description="its velocity"),
         Variable("q", (len(units),), units, description="the copy's coordinates"),
-        *direction_outputs(),
     ]
-    if linkage.loop:
-        found.append(Variable("branch_ok", description="1 on the mechanism's branch, 0 folded"))
-        found.append(Variable("q_error", (), "1", description="norm of q_ref - q"))
-    return found
+
+
+def _branch_outputs(linkage: Linkage) -> list[Variable]:
+    if not linkage.loop:
+        return []
+    return [
+        Variable("branch_ok", description="1 on the mechanism's branch, 0 folded"),
+        Variable("q_error", (), "1", description="norm of q_ref - q"),
+    ]
 
 
 def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX, ca.SX]:
@@ -139,8 +164,8 @@ def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX,
         pull = D.apply(p["K_g"] * (u["q_ref"] - q) + p["B_g"] * u["qd_ref"])
         weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
-        K_g, B_g, X = ca.diag(p["K_g"]), ca.diag(p["B_g"]), to_point(model.x_h)
-        held = {model.linkage.operational_point.body: X.T @ (h * B_g + h**2 * K_g) @ X}
+        K_g, B_g = ca.diag(p["K_g"]), ca.diag(p["B_g"])
+        held = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
         solver = ClosedLoopSolver(TreeInertia(model, held), model.W)
         pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
         weight = ca.SX(1)

@@ -80,6 +80,10 @@ def parameters(linkage: Linkage) -> tuple[Variable, ...]:
     if linkage.operational_point.at is not None:
         at, body = linkage.operational_point.at, linkage.operational_point.body
         found.append(fixed("operational_point.at", "m", at, f"operational point on {body}"))
+    for point in linkage.point:
+        if point.at is not None:
+            text = f"{point.name} on {point.body}"
+            found.append(fixed(f"{point.name}.at", "m", point.at, text))
     return (*found, *forces.parameters(linkage))
 
 
@@ -175,23 +179,23 @@ class LinkageModel:
         """World position of the joint's point of the parent, m."""
         return self.frames[joint.parent].point(self.p.get(f"{joint.name}.at_parent"))
 
-    def twists(self, joint: Joint) -> list[ca.SX]:
-        """(omega, v_x, v_y at the world's origin) of a unit rate of each of its coordinates."""
-        R = self.frames[joint.parent].rotation
+    def twists(self, joint: Joint) -> tuple[ca.SX, list[ca.SX]]:
+        """The joint's point in the world (m), and (omega, v_x, v_y) there of a unit rate of each
+        of its coordinates."""
+        R, at = self.frames[joint.parent].rotation, self._pivot(joint)
+        turn = ca.sparsify(ca.SX([1, 0, 0]))
 
         def slide(direction: ca.SX) -> ca.SX:
-            return ca.vertcat(0, direction)
-
-        def turn(about: ca.SX) -> ca.SX:
-            return ca.vertcat(1, about[1], -about[0])
+            return ca.vertcat(ca.SX(1, 1), direction)
 
         if joint.type == "revolute":
-            return [turn(self._pivot(joint))]
+            return at, [turn]
         if joint.type == "prismatic":
             axis = self.p[f"{joint.name}.axis"]
-            return [slide(R @ ca.vertcat(ca.cos(axis), ca.sin(axis)))]
-        moved = self._pivot(joint) + R @ self._of(joint)[:2]
-        return [slide(R[:, 0]), slide(R[:, 1]), turn(moved)]
+            along = R @ ca.vertcat(ca.cos(axis), ca.sin(axis))
+            return at + along * self._of(joint), [slide(along)]
+        moved = at + R @ self._of(joint)[:2]
+        return moved, [slide(R[:, 0]), slide(R[:, 1]), turn]
 
     def _child(self, joint: Joint, parent: Frame, q: ca.SX) -> Frame:
         def at(end: str) -> ca.SX | None:
@@ -304,8 +308,12 @@ class LinkageModel:
     @cached_property
     def x_h(self) -> ca.SX:
         """Pose (x, y, theta) of the operational point (2.16)."""
-        frame = self.frames[self.linkage.operational_point.body]
-        return ca.vertcat(frame.point(self.p.get("operational_point.at")), frame.angle)
+        return self.pose(self.linkage.operational_point.body, "operational_point.at")
+
+    def pose(self, body: str, at: str) -> ca.SX:
+        """(x, y, theta) of the point of a body that parameter `at` gives, or of its origin."""
+        frame = self.frames[body]
+        return ca.vertcat(frame.point(self.p.get(at)), frame.angle)
 
     @cached_property
     def J_h(self) -> ca.SX:

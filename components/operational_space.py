@@ -9,42 +9,67 @@ and drift wrench, from velocities, gravity, springs and drives.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 
-from hapticlink.components.closure import ClosedLoopSolver
+from hapticlink.components.closure import ClosedLoopSolver, Inertia
 from hapticlink.components.linkage import LinkageModel
 from hapticlink.components.tree import TreeInertia
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The terms of (B.6): D as an operator, W, w, J_h, Jdot_h qd, and the efforts Q - C qd."""
+
+    inertia: Inertia
+    W: ca.SX
+    w: ca.SX
+    J_h: ca.SX
+    Jdot_qd: ca.SX
+    efforts: ca.SX
+
+
+def own_terms(model: LinkageModel) -> Terms:
+    """At the model's own pose and velocity."""
+    efforts = model.Q - model.C_qd
+    return Terms(TreeInertia(model), model.W, model.w, model.J_h, model.Jdot_qd, efforts)
 
 
 class OperationalSpace:
     """Shares one factorisation of the linkage's D and W among all that the hand needs."""
 
-    def __init__(self, model: LinkageModel) -> None:
+    def __init__(self, model: LinkageModel, terms: Terms | None = None) -> None:
         self.model = model
-        self.solver = ClosedLoopSolver(TreeInertia(model), model.W)
+        self.terms = own_terms(model) if terms is None else terms
+        self.solver = ClosedLoopSolver(self.terms.inertia, self.terms.W)
 
-    @cached_property
-    def _forced(self) -> tuple[ca.SX, ca.SX]:
-        J = self.model.J_h
-        return self.solver.solve(J.T, ca.SX(self.solver.m, 3))
+    def mobility(self, J: ca.SX) -> ca.SX:
+        """J D^-1 (J' - W' (W D^-1 W')^-1 W D^-1 J') of the points whose Jacobian is J, k x k."""
+        forced, _ = self.solver.solve(J.T, ca.SX(self.solver.m, J.shape[0]))
+        mobility = J @ forced
+        return 0.5 * (mobility + mobility.T)
 
     @cached_property
     def _bias(self) -> tuple[ca.SX, ca.SX]:
-        return self.solver.solve(self.model.Q - self.model.C_qd, -self.model.w)
+        return self.solver.solve(self.terms.efforts, -self.terms.w)
 
     @cached_property
     def Lambda_inv(self) -> ca.SX:
         """3 x 3, symmetric; 1/kg, 1/(kg.m), 1/(kg.m2)."""
-        mobility = self.model.J_h @ self._forced[0]
-        return 0.5 * (mobility + mobility.T)
+        return self.mobility(self.terms.J_h)
 
     @cached_property
     def a_bias(self) -> ca.SX:
         """3 x 1: m/s2, m/s2, rad/s2."""
-        return self.model.J_h @ self._bias[0] + self.model.Jdot_qd
+        return self.terms.J_h @ self._bias[0] + self.terms.Jdot_qd
 
-    def motion(self, F: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """(qdd, lambda) under the wrench F at the operational point (B.6)."""
-        return self._bias[0] + self._forced[0] @ F, self._bias[1] + self._forced[1] @ F
+    def response(self, Q: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """What generalised forces Q (n x 1) add to (qdd, lambda)."""
+        return self.solver.solve(Q, ca.SX(self.solver.m, 1))
+
+    def motion(self, Q: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """(qdd, lambda) under generalised forces Q beside the linkage's own (B.6)."""
+        qdd, multipliers = self.response(Q)
+        return self._bias[0] + qdd, self._bias[1] + multipliers

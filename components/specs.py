@@ -17,12 +17,17 @@ Vector3 = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A rigid body: mass (kg), inertia about its centre of mass (kg.m2), centre (m)."""
+    """A rigid body: mass (kg), inertia about its centre of mass (kg.m2), centre (m).
+
+    Where it can touch: a capsule of `radius` (m) between the two points `capsule` (m, in its
+    frame), or a disc about one point."""
 
     name: str
     mass: float
     inertia: float
     center: Point | None = None
+    radius: float | None = None
+    capsule: tuple[Point, ...] = ((0.0, 0.0),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,8 +117,16 @@ class OperationalPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
+class FurtherPoint(OperationalPoint):
+    """Another operational point, for a hand of its own."""
+
+    name: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Linkage:
-    """Bodies, a tree of joints, and the cut joints that close loops.
+    """Bodies, a tree of joints, and the cut joints that close loops; `point` are further
+    operational points, for more hands than one.
 
     gravity (m/s2) acts on every body. start and start_velocity give joint coordinates by joint
     name (rad or m; a free joint takes three numbers); what is missing is 0.
@@ -122,6 +135,7 @@ class Linkage:
     body: tuple[Body, ...]
     joint: tuple[Joint, ...]
     operational_point: OperationalPoint
+    point: tuple[FurtherPoint, ...] = ()
     loop: tuple[Loop, ...] = ()
     spring: tuple[Spring, ...] = ()
     gravity: Point | None = None
@@ -147,14 +161,20 @@ class Directions:
 class Mechanism:
     """Time integration of the virtual mechanism.
 
-    alpha (1/s) and beta are Baumgarte's; None takes dead beat for semi-implicit Euler
-    (alpha h = 1, beta = 1/2), which needs no number from the user. directions adds the outputs
-    Lambda_inv, P_c and n_constraints at the mechanism's own rate.
+    formulation says how loops enter (section B.2): by multipliers with a stabilization, or by
+    independent coordinates alone, which need none. alpha (1/s) and beta are Baumgarte's; None
+    takes the integrator's own, which needs no number from the user. directions adds the outputs
+    Lambda_inv, P_c and n_constraints at the mechanism's own rate; diagnostics adds rank and
+    condition of the closures.
     """
 
-    integrator: Literal["semi-implicit-euler", "rk4"] = "rk4"
+    integrator: Literal[
+        "semi-implicit-euler", "heun", "linearly-implicit", "rk4", "dormand-prince-8"
+    ] = "rk4"
+    formulation: Literal["multipliers", "partitioning", "embedding"] = "multipliers"
     stabilization: Literal["none", "baumgarte", "projection"] = "projection"
     directions: bool = False
+    diagnostics: bool = False
     alpha: float | None = None
     beta: float | None = None
     substeps: int = 1

@@ -26,13 +26,14 @@ def _components(module: str) -> Any:
 
 def _virtual_mechanism(s: Settings, step_s: float) -> Component:
     factory = _components("mechanism").virtual_mechanism
-    parts = {k: s[k] for k in ("directions", "contacts", "length_scale") if k in s}
+    parts = {k: s[k] for k in ("directions", "contacts", "length_scale", "frame_s") if k in s}
     return factory(s["linkage"], s["mechanism"], **parts, step_s=step_s)
 
 
 def _virtual_environment(s: Settings, step_s: float) -> Component:
     factory = _components("environment").virtual_environment
-    return factory(s["linkage"], s["graphics"], s["directions"], s.get("contacts"))
+    parts = {k: s[k] for k in ("contacts", "mobility", "local_model") if k in s}
+    return factory(s["linkage"], s["graphics"], s["directions"], **parts)
 
 
 def _haptic_device(s: Settings, step_s: float) -> Component:

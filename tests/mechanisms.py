@@ -48,7 +48,7 @@ def open_arm(linkage):
 
 
 @st.composite
-def linkages(draw, max_bodies=6, max_loops=3):
+def linkages(draw, max_bodies=6, max_loops=3, prismatic=True):
     """(linkage, q, qd): a random tree of revolute and prismatic joints whose loops close at q."""
     number = draw(st.integers(1, max_bodies))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
@@ -60,7 +60,7 @@ def linkages(draw, max_bodies=6, max_loops=3):
     bodies, joints, frames, q = [], [], {"ground": (np.zeros(2), 0.0)}, []
     for i, name in enumerate(names):
         parent = ["ground", *names][rng.integers(0, i + 1)]
-        kind = "prismatic" if rng.random() < 0.25 else "revolute"
+        kind = "prismatic" if prismatic and rng.random() < 0.25 else "revolute"
         a, b, axis = point(), point(), float(rng.uniform(-3, 3))
         value = float(rng.uniform(-0.3, 0.3) if kind == "prismatic" else rng.uniform(-3, 3))
         bodies.append(

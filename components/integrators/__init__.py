@@ -10,15 +10,17 @@ from collections.abc import Sequence
 
 import casadi as ca
 
+from hapticlink.components.integrators import dormand_prince_8, heun, rk4
 from hapticlink.components.integrators.base import Integrator
-from hapticlink.components.integrators.runge_kutta import RungeKutta
+from hapticlink.components.integrators.linearly_implicit import LinearlyImplicit
 from hapticlink.components.integrators.semi_implicit_euler import SemiImplicitEuler
-from hapticlink.components.integrators.tableaus import HEUN, RK4
 
 METHODS: dict[str, Integrator] = {
     "semi-implicit-euler": SemiImplicitEuler(),
-    "heun": RungeKutta("heun", HEUN),
-    "rk4": RungeKutta("rk4", RK4),
+    "heun": heun.METHOD,
+    "linearly-implicit": LinearlyImplicit(),
+    "rk4": rk4.METHOD,
+    "dormand-prince-8": dormand_prince_8.METHOD,
 }
 
 

@@ -24,11 +24,9 @@ class Tableau:
 
 
 class RungeKutta(Integrator):
-    # Far inside the stability limit alpha h < 2.6 of RK4, and near the least drift.
-    baumgarte = Baumgarte(alpha_h=0.1, beta=1.0)
-
-    def __init__(self, name: str, tableau: Tableau) -> None:
+    def __init__(self, name: str, tableau: Tableau, baumgarte: Baumgarte) -> None:
         self.name = name
+        self.baumgarte = baumgarte
         self.tableau = tableau
         self.order = tableau.order
 

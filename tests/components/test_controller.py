@@ -187,7 +187,7 @@ def test_constraint_wrench_does_no_work_on_free_motion(vectors, pull, motion):
     free = np.linalg.solve(S, (np.eye(3) - P) @ motion)
     F_T = constraint_map(P) @ pull
     size = np.linalg.norm(motion) * np.linalg.norm(S @ pull)  # of parts that may cancel
-    assert abs(F_T @ free) <= 1e-12 * size
+    assert abs(F_T @ free) <= 1e-12 * size + 1e-300  # below it numbers have lost their digits
 
 
 def test_plain_form_leaks_onto_free_motion_and_depends_on_the_scale():

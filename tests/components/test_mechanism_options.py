@@ -1,0 +1,169 @@
+"""What a scene can ask of the mechanism: more hands, rank of the closures, a local model."""
+
+import dataclasses
+import math
+
+import appendix_a
+import numpy as np
+import pytest
+from blocks import Running
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mechanisms import TABLE_6_1, WRENCH, five_bar, linkages
+
+from hapticlink.components.environment import virtual_environment
+from hapticlink.components.mechanism import virtual_mechanism
+from hapticlink.components.specs import Directions, FurtherPoint, GraphicsCopy, Mechanism
+from hapticlink.orchestrator import scene_file
+
+M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
+
+
+def mechanism(linkage, directions=None, frame_s=None, **settings):
+    return virtual_mechanism(
+        linkage, Mechanism(**settings), directions, frame_s=frame_s, step_s=1 / 512
+    )
+
+
+def two_handed(at=(0.03, 0.0)):
+    point = FurtherPoint(name="left", body="link4", at=at)
+    return dataclasses.replace(five_bar(), point=(point,))
+
+
+def left(q, at=0.03):
+    """Pose of the point of link 4."""
+    theta = q[2] + q[3]
+    return np.array(
+        [
+            L[2] * math.cos(q[2]) + at * math.cos(theta),
+            L[2] * math.sin(q[2]) + at * math.sin(theta),
+            theta,
+        ]
+    )
+
+
+def test_two_hands_on_one_mechanism():
+    """Accelerations and mobilities against Appendix A with both Jacobians."""
+    block = Running(mechanism(two_handed(), Directions()))
+    block.put(qd=appendix_a_velocity(block.state["q"]))
+    q, qd = block.state["q"], block.state["qd"]
+    second = (0.2, -0.4, 0.001)
+    block.set(**{"F_hand": WRENCH, "left.F_hand": second})
+    J_left = np.array([(left(q + 1e-6 * d) - left(q - 1e-6 * d)) / 2e-6 for d in np.eye(4)]).T
+    D, W, J_h = appendix_a.D(q, M, L, J, F), appendix_a.W(q, L), appendix_a.J_h(q, L, F)
+    D_inv = np.linalg.inv(D)
+    kept = D_inv - D_inv @ W.T @ np.linalg.solve(W @ D_inv @ W.T, W @ D_inv)
+    free, _ = appendix_a.acceleration(q, qd, np.array(WRENCH), M, L, J, F)
+    y = block.y
+    np.testing.assert_allclose(y["qdd"], free + kept @ J_left.T @ second, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(y["left.x"], left(q), rtol=1e-14)
+    np.testing.assert_allclose(y["left.v"], J_left @ qd, atol=1e-8)
+    for name, of in (("Lambda_inv", J_h), ("left.Lambda_inv", J_left)):
+        np.testing.assert_allclose(y[name], of @ kept @ of.T, atol=1e-7 * np.abs(y[name]).max())
+
+
+def appendix_a_velocity(q):
+    """A velocity that the closures allow."""
+    return np.linalg.svd(appendix_a.W(q, L))[2][2:].T @ (2.0, -1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "rank"),
+    [
+        ("five-bar", 2),
+        ("parallelogram", 3),
+        ("six-bar", 4),
+        ("remote-centre", 4),
+        ("n-four-bar", 4),
+    ],
+)
+def test_rank_of_shipped_linkages(name, rank):
+    """Coordinates minus degrees of freedom: 2, 1, 1, 2 and 1 of them."""
+    linkage = scene_file.load(name).linkage
+    y = Running(mechanism(linkage, diagnostics=True)).y
+    assert y["rank"] == rank
+    assert y["condition"] >= 1
+
+
+def test_rank_drops_where_the_rods_line_up():
+    linkage = scene_file.load("n-four-bar", ["linkage.n=1"]).linkage
+    block = Running(mechanism(linkage, diagnostics=True))
+    assert block.y["rank"] == 2
+    block.put(q=(0.0, 0.0, 0.0))
+    assert block.y["rank"] == 1
+
+
+@settings(max_examples=40, deadline=None)
+@given(linkages(), st.data())
+def test_rank_and_condition_against_singular_values(drawn, data):
+    linkage, _, _ = drawn
+    if not linkage.loop:
+        return
+    block = Running(mechanism(linkage, diagnostics=True))
+    y, q = block.y, block.state["q"]
+    W, D = closures(linkage, q)
+    scaled = W @ np.linalg.inv(np.linalg.cholesky(D)).T
+    values = np.linalg.svd(scaled, compute_uv=False) ** 2
+    ratios = values / values[0]
+    if np.any((ratios > 1e-13) & (ratios < 1e-6)):
+        return  # neither of rank nor not
+    assert y["rank"] == np.sum(ratios > 1e-9)
+    if y["rank"] == len(W):
+        assert 1 - 1e-9 <= y["condition"] <= values[0] / values[-1] * (1 + 1e-9)
+
+
+def closures(linkage, q):
+    """(W, D) through the local model's ports, which start at the assembled pose."""
+    starts = {
+        v.name: np.reshape(v.starts, v.shape) for v in mechanism(linkage, frame_s=1 / 64).inputs
+    }
+    return starts["W"], starts["D"]
+
+
+def coupled(**settings):
+    """(copy, mechanism) of the five-bar, the mechanism on the copy's matrices."""
+    copy = virtual_environment(
+        five_bar(), GraphicsCopy(sync="joint"), Directions(), local_model=True
+    )
+    held = mechanism(five_bar(), frame_s=1 / 64, stabilization="baumgarte", **settings)
+    return Running(copy), Running(held)
+
+
+def test_the_local_model_holds_the_matrices_of_appendix_a():
+    copy, held = coupled()
+    q = copy.state["q"]
+    y = copy.y
+    np.testing.assert_allclose(y["D"], appendix_a.D(q, M, L, J, F), rtol=1e-13)
+    np.testing.assert_allclose(y["W"], appendix_a.W(q, L), atol=1e-16)
+    np.testing.assert_allclose(y["J_h"], appendix_a.J_h(q, L, F), atol=1e-16)
+    starts = {v.name: np.reshape(v.starts, v.shape) for v in held.component.inputs}
+    for name in ("D", "W", "w", "J_h"):
+        np.testing.assert_allclose(starts[name], y[name], rtol=1e-13, atol=1e-15)
+
+
+def test_fresh_matrices_and_no_velocity_give_the_mechanisms_own_acceleration():
+    copy, held = coupled()
+    own = Running(mechanism(five_bar()))
+    for block in (held, own):
+        block.set(F_hand=WRENCH)
+    held.set(**{name: copy.y[name] for name in ("D", "W", "w", "J_h")})
+    for name in ("qdd", "lambda"):
+        np.testing.assert_allclose(held.y[name], own.y[name], rtol=1e-11)
+
+
+def test_matrices_held_over_a_frame_keep_the_loop_closed_to_a_millimetre():
+    """60 Hz frames of 0.25 s; the closures themselves are fresh at every tick."""
+    copy, held = coupled(integrator="semi-implicit-euler")
+    own = Running(mechanism(five_bar()))
+    for block in (held, own):
+        block.set(F_hand=WRENCH)
+    for k in range(128):
+        if k % 8 == 0:
+            copy.set(q_ref=held.state["q"], qd_ref=held.state["qd"])
+            copy.step(1 / 64)
+            held.set(**{name: copy.y[name] for name in ("D", "W", "w", "J_h")})
+        held.step(1 / 512)
+        own.step(1 / 512)
+        assert held.y["closure_error"] < 1e-3
+    error = np.linalg.norm(held.y["x"][:2] - own.y["x"][:2])
+    assert 1e-6 < error < 5e-3  # it is an approximation, and a near one
