@@ -1,0 +1,90 @@
+"""The local model (B.15) against the mechanism's own matrices: cost of a step and error of the tip.
+
+python benchmarks/local_model.py
+
+The five-bar of Table 6.1 alone under the wrench of chapter 6, matrices from a joint-synchronised
+copy. Cost: instructions of a step, and the least time of 20 repetitions of 2000 steps.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from hapticlink.components.component import Component
+from hapticlink.components.mechanism import virtual_mechanism
+from hapticlink.components.specs import Mechanism
+from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator.experiment import simulate
+
+STEP = 1 / 512
+HELD = ("local_model=true", "mechanism.stabilization=baumgarte")
+
+
+def microseconds(block: Component) -> float:
+    """Least mean time of a step, on preallocated memory."""
+    u, p = np.array(block.start_inputs), np.array(block.start_parameters)
+    x = np.array(block.initialize(u, p)).ravel()
+    arguments = [x, u, p, np.zeros(1), np.array([STEP])]
+    buffer, trigger = block.step.buffer()
+    for i, values in enumerate(arguments):
+        buffer.set_arg(i, memoryview(values))
+    buffer.set_res(0, memoryview(np.empty_like(x)))
+    times = []
+    for _ in range(20):
+        start = perf_counter()
+        for _ in range(2000):
+            trigger()
+        times.append((perf_counter() - start) / 2000)
+    return min(times) * 1e6
+
+
+def costs() -> None:
+    linkage = scene_file.load("five-bar").linkage
+    assert linkage is not None
+    print("| matrices | integrator | stabilisation | instructions | us a step |")
+    print("|---|---|---|---|---|")
+    for name, frame, stabilization in (
+        ("own", None, "projection"),
+        ("own", None, "baumgarte"),
+        ("held", 1 / 60, "baumgarte"),
+    ):
+        for integrator in ("semi-implicit-euler", "rk4"):
+            spec = Mechanism(integrator=integrator, stabilization=stabilization)  # type: ignore[arg-type]
+            block = virtual_mechanism(linkage, spec, step_s=STEP, frame_s=frame)
+            print(
+                f"| {name} | {integrator} | {stabilization} | {block.step.n_instructions()} "
+                f"| {microseconds(block):.1f} |"
+            )
+
+
+def tip(folder: Path, *options: str) -> tuple[np.ndarray, float]:
+    """(the operational point's way, the largest gap of the loop), m."""
+    found = simulate("five-bar", folder, options).results.haptics
+    way = np.column_stack([found[f"virtual_mechanism.x[{i}]"] for i in (1, 2)])
+    return way, float(found["virtual_mechanism.closure_error"].max())
+
+
+def errors() -> None:
+    print("\n| integrator | frames | .25 s | .5 s | 1 s | closure, 1 s |")
+    print("|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as room:
+        own, _ = tip(Path(room) / "own", "duration=1.0")
+        for integrator in ("semi-implicit-euler", "rk4"):
+            for rate in (10, 30, 60, 512):
+                options = [*HELD, "duration=1.0", f"mechanism.integrator={integrator}"]
+                options.append(f"graphics={{rate={rate}, sync='joint'}}")
+                folder = Path(room) / f"{integrator}-{rate}"
+                held, opened = tip(folder, *options)
+                gap = np.linalg.norm(held - own[: len(held)], axis=1) * 1e3
+                at = [gap[: round(t * 512) + 1].max() for t in (0.25, 0.5, 1.0)]
+                shown = " | ".join(f"{e:.3g} mm" for e in (*at, opened * 1e3))
+                print(f"| {integrator} | {rate} Hz | {shown} |")
+
+
+if __name__ == "__main__":
+    costs()
+    errors()

@@ -1,0 +1,237 @@
+"""Run time against error on three mechanisms: our integrators and three multibody codes.
+
+Every code starts from the same assembled pose and rates, and takes steps of equal length; only
+stepping is timed. Runs are interleaved round by round and the least of the rounds counts. The
+tip's error is taken at the end time, against the closed form (N-four-bar) or against two
+formulations under DOP853, whose difference is the floor.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import mechanisms, reference
+from benchmarks.ours import COMPILER, Ours
+from benchmarks.rows import Rows
+from hapticlink.components.integrators import METHODS
+from hapticlink.components.specs import Linkage, Mechanism
+
+PEERS = ("mujoco_peer", "pinocchio_peer", "exudyn_peer")
+EVALUATIONS = {
+    "dormand-prince-8": 12,
+    "rk4": 4,
+    "heun": 2,
+    "linearly-implicit": 2,
+    "semi-implicit-euler": 1,
+}
+COLUMNS = ("case", "code", "method", "rate", "round", "seconds", "x", "y")
+LOST = 0.1  # m; an error above is a mechanism that was lost
+SLOW = 3.0  # s; a run this long is not repeated
+NATIVE, MACHINE = "ours, C", "ours, CasADi VM"
+Run = Callable[[int], tuple[float, float, float]]
+
+
+@dataclass(frozen=True)
+class Case:
+    name: str
+    linkage: Linkage
+    end: float
+    rates: tuple[int, ...]
+    exact: Callable[[], tuple[np.ndarray, float]]
+    wrench: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    settings: tuple[tuple[str, str], ...] = ()
+    skip: tuple[tuple[str, str], ...] = field(default=())
+
+
+ALL = (
+    *((i, s) for i in METHODS for s in ("none", "baumgarte", "projection")),
+    ("rk4", "partitioning"),
+    ("rk4", "embedding"),
+)
+FEW = (("semi-implicit-euler", "baumgarte"), ("heun", "projection"), ("rk4", "projection"))
+
+
+def setting(integrator: str, closing: str) -> Mechanism:
+    """closing: a stabilisation of the multipliers, or a formulation that needs none."""
+    named = "formulation" if closing in ("partitioning", "embedding") else "stabilization"
+    return Mechanism(integrator=integrator, **{named: closing})  # type: ignore[arg-type]
+
+
+def cases(quick: bool) -> list[Case]:
+    def closed_form(N: int) -> Callable[[], tuple[np.ndarray, float]]:
+        # The root of the elliptic integral is good to a few units in the last place.
+        return lambda: (np.array(mechanisms.n_four_bar_tip(N, 10.0)), 1e-14)
+
+    wrench = (-0.5, 0.0, -0.0025)
+    bar = mechanisms.five_bar()
+    start = Ours(bar, wrench, Mechanism(), 1 / 512)
+    found = [
+        Case(
+            "five-bar, 3 s",
+            bar,
+            3.0,
+            (128, 512, 2048) if quick else (128, 256, 512, 1024, 2048, 4096),
+            lambda: reference.tip(start, 3.0),
+            wrench,
+            ALL,
+        ),
+        Case(
+            "N-four-bar, N = 2, 10 s",
+            mechanisms.n_four_bar(2),
+            10.0,
+            (250, 1000) if quick else (125, 250, 500, 1000, 2000, 4000),
+            closed_form(2),
+            settings=ALL,
+        ),
+    ]
+    if not quick:
+        python_loop = ("Pinocchio", "rk4, projected (Python loop)")  # 7 ms a step
+        found.append(
+            Case(
+                "N-four-bar, N = 40, 10 s",
+                mechanisms.n_four_bar(40),
+                10.0,
+                (250, 500, 1000),
+                closed_form(40),
+                settings=FEW,
+                skip=(python_loop,),
+            )
+        )
+    return found
+
+
+def peers(missing: list[str]) -> list:
+    """The installed peers; names of the others are added to `missing`."""
+    found = []
+    for name in PEERS:
+        try:
+            found.append(importlib.import_module(f"benchmarks.peers.{name}"))
+        except ImportError as error:
+            missing.append(f"{name.removesuffix('_peer')}: not installed ({error.name})")
+    return found
+
+
+def tasks(
+    case: Case, codes: list, folder: Path
+) -> Iterator[tuple[str, str, int, Callable[[], Run]]]:
+    """(code, method, rate, prepare) of one case."""
+    start = Ours(case.linkage, case.wrench, Mechanism(), 1 / 512).start
+    q, qd = np.split(start, 2)
+
+    @cache
+    def ours(integrator: str, stabilization: str, rate: int) -> Ours:
+        return Ours(case.linkage, case.wrench, setting(integrator, stabilization), 1 / rate)
+
+    for rate in case.rates:
+        for integrator, stabilization in case.settings:
+            name, key = f"{integrator}, {stabilization}", (integrator, stabilization, rate)
+            if COMPILER:
+                yield NATIVE, name, rate, lambda k=key: ours(*k).native(folder)
+            yield MACHINE, name, rate, lambda k=key: ours(*k).virtual_machine()
+        for peer in codes:
+            for method in peer.METHODS:
+                if (peer.NAME, method) not in case.skip:
+                    yield (
+                        peer.NAME,
+                        method,
+                        rate,
+                        lambda p=peer, m=method, r=rate: p.prepare(
+                            case.linkage, np.array(case.wrench), q, qd, m, 1 / r
+                        ),
+                    )
+
+
+def measure(
+    out: Path, quick: bool, told: Callable[[str, int, int], None]
+) -> tuple[dict[str, list[dict]], list[str]]:
+    """Run what is missing in runs.csv; gives the aggregated rows by case, and who is missing."""
+    rows = Rows(out / "runs.csv", COLUMNS, keys=5)
+    missing: list[str] = []
+    codes, found = peers(missing), {}
+    for case in cases(quick):
+        listed = list(tasks(case, codes, out / ".compiled"))
+        prepared: dict[tuple, Run] = {}
+        rounds = 2 if quick else 5
+        for number in range(rounds):
+            for k, (code, method, rate, prepare) in enumerate(listed):
+                told(
+                    f"{case.name}: {code}, {method}", number * len(listed) + k, rounds * len(listed)
+                )
+                key = (case.name, code, method, rate)
+                first = rows.rows.get(tuple(map(str, (*key, 0))))
+                if (*key, number) in rows or (first and float(first["seconds"]) > SLOW):
+                    continue
+                run = prepared.get(key) or prepared.setdefault(key, prepare())
+                x, y, seconds = run(round(case.end * rate))
+                rows.add(*key, number, float(seconds), float(x), float(y))
+        exact, floor = _exact(case, out)
+        found[case.name] = _aggregate(rows, case, exact, floor)
+    return found, missing
+
+
+def _exact(case: Case, out: Path) -> tuple[np.ndarray, float]:
+    """The reference tip and its floor, kept in references.json."""
+    path = out / "references.json"
+    kept = json.loads(path.read_text()) if path.exists() else {}
+    if case.name not in kept:
+        tip, floor = case.exact()
+        kept[case.name] = [*map(float, tip), floor]
+        path.write_text(json.dumps(kept, indent=1))
+    *tip, floor = kept[case.name]
+    return np.array(tip), floor
+
+
+def _aggregate(rows: Rows, case: Case, exact: np.ndarray, floor: float) -> list[dict]:
+    groups: dict[tuple[str, str, int], list[dict[str, str]]] = {}
+    for row in rows.rows.values():
+        if row["case"] == case.name:
+            groups.setdefault((row["code"], row["method"], int(row["rate"])), []).append(row)
+    found = []
+    for (code, method, rate), runs in groups.items():
+        x, y = float(runs[0]["x"]), float(runs[0]["y"])
+        error = math.hypot(x - exact[0], y - exact[1])
+        least = min(float(r["seconds"]) for r in runs)
+        found.append(
+            {
+                "code": code,
+                "method": method,
+                "rate": rate,
+                "evaluations": EVALUATIONS.get(method.split(",")[0], "") if "ours" in code else "",
+                "us_per_step": least / (case.end * rate) * 1e6,
+                "ms_per_s": least / case.end * 1e3,
+                "error": error,
+                "floor": floor,
+                "rounds": len(runs),
+            }
+        )
+    return found
+
+
+def advantage(rows: list[dict], peer: str) -> list[tuple[float, float, float]]:
+    """(error, ms per simulated s, that over ours at this error or less) of each of the peer's rows
+    that no other of its rows beats; nan where none of ours is as good."""
+    mine = [r for r in rows if r["code"] == NATIVE and r["error"] > 10 * r["floor"]]
+    # Bare calls of the same RK4 have no error of their own: ours with projection stands in.
+    stand_in = {r["rate"]: r["error"] for r in mine if r["method"] == "rk4, projection"}
+    theirs = [
+        r | {"error": stand_in.get(r["rate"], math.nan)} if "calls" in r["method"] else r
+        for r in rows
+        if r["code"] == peer
+    ]
+    theirs = [r for r in theirs if r["error"] < LOST]
+    found = []
+    for row in theirs:
+        if any(o["error"] <= row["error"] and o["ms_per_s"] < row["ms_per_s"] for o in theirs):
+            continue
+        as_good = [r["ms_per_s"] for r in mine if r["error"] <= row["error"]]
+        ratio = row["ms_per_s"] / min(as_good) if as_good else math.nan
+        found.append((row["error"], row["ms_per_s"], ratio))
+    return found

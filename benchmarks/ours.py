@@ -1,0 +1,162 @@
+"""Our virtual mechanism, run two ways: CasADi's virtual machine, as a Python FMU does, and the
+same function as generated C in a loop in C, as a native FMU does (needs a C compiler)."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import shutil
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from hapticlink.components.component import Component
+from hapticlink.components.mechanism import virtual_mechanism
+from hapticlink.components.specs import Linkage, Mechanism
+
+COMPILER = shutil.which("gcc") or shutil.which("cc")
+# Straight-line code of 1e5 lines takes -O2 minutes and gains a tenth.
+OPTIMISE = "-O1"
+
+_DRIVER = """
+void run(long steps, double* x, double* y, const double* u, const double* p,
+         const double* h, casadi_int* iw, double* w) {
+  double t = 0;
+  const double* arg[ARGUMENTS] = {0};
+  double* res[RESULTS] = {0};
+  for (long k = 0; k < steps; ++k) {
+    t = k * *h;
+    arg[0] = x; arg[1] = u; arg[2] = p; arg[3] = &t; arg[4] = h;
+    res[0] = y;
+    step(arg, res, iw, w, 0);
+    double* z = x; x = y; y = z;
+  }
+}
+"""
+
+
+@dataclass(frozen=True)
+class Ours:
+    """One linkage under one integrator and stabilisation, at one step h (s)."""
+
+    linkage: Linkage
+    wrench: tuple[float, float, float]
+    mechanism: Mechanism
+    h: float
+
+    @cached_property
+    def component(self) -> Component:
+        return virtual_mechanism(self.linkage, self.mechanism, step_s=self.h)
+
+    @cached_property
+    def p(self) -> np.ndarray:
+        return np.array(self.component.start_parameters)
+
+    @cached_property
+    def u(self) -> np.ndarray:
+        return np.array([*self.wrench, 0.0, 0.0, 0.0])
+
+    @cached_property
+    def start(self) -> np.ndarray:
+        """(q, qd), assembled."""
+        return np.array(self.component.initialize(self.u, self.p)).ravel()
+
+    def outputs(self, x: np.ndarray) -> dict[str, np.ndarray]:
+        flat = np.array(self.component.output(x, self.u, self.p, 0.0)).ravel()
+        found, offset = {}, 0
+        for v in self.component.outputs:
+            found[v.name] = flat[offset : offset + v.size]
+            offset += v.size
+        return found
+
+    def virtual_machine(self) -> Callable[[int], tuple[float, float, float]]:
+        def run(steps: int) -> tuple[float, float, float]:
+            x = self.start.copy()
+            buffer, trigger = self.component.step.buffer()
+            after, t, h = np.zeros_like(x), np.zeros(1), np.array([self.h])
+            for i, a in enumerate((x, self.u, self.p, t, h)):
+                buffer.set_arg(i, memoryview(a))
+            buffer.set_res(0, memoryview(after))
+            began = time.perf_counter()
+            for k in range(steps):
+                t[0] = k * self.h
+                trigger()
+                x[:] = after
+            seconds = time.perf_counter() - began
+            return (*self._tip(x), seconds)
+
+        return run
+
+    def native(self, folder: Path) -> Callable[[int], tuple[float, float, float]]:
+        """As C. Raises RuntimeError without a C compiler."""
+        advance = self.advance(folder)
+
+        def run(steps: int) -> tuple[float, float, float]:
+            x, began = self.start.copy(), time.perf_counter()
+            x = advance(x, steps)
+            seconds = time.perf_counter() - began
+            return (*self._tip(x), seconds)
+
+        return run
+
+    def advance(self, folder: Path) -> Callable[[np.ndarray, int], np.ndarray]:
+        """(state, steps) -> state, compiled; overwrites the state given."""
+        step = self.component.step
+        call = ctypes.CDLL(str(_compiled(step, folder))).run
+        double = ctypes.POINTER(ctypes.c_double)
+        iw, w = np.zeros(step.sz_iw() + 1, dtype=np.int64), np.zeros(step.sz_w() + 1)
+        h, y = np.array([self.h]), np.zeros_like(self.start)
+
+        def run(x: np.ndarray, steps: int) -> np.ndarray:
+            pointers = [a.ctypes.data_as(double) for a in (x, y, self.u, self.p, h)]
+            work = iw.ctypes.data_as(ctypes.c_void_p), w.ctypes.data_as(double)
+            call(ctypes.c_long(steps), *pointers, *work)
+            return (y if steps % 2 else x).copy()
+
+        return run
+
+    def _tip(self, x: np.ndarray) -> tuple[float, float]:
+        if not np.isfinite(x).all():
+            return np.nan, np.nan
+        found = self.outputs(x)["x"]
+        return float(found[0]), float(found[1])
+
+
+def _compiled(step, folder: Path) -> Path:
+    """A shared library with `run`, kept under the hash of its source."""
+    if COMPILER is None:
+        raise RuntimeError("no C compiler: install gcc or another `cc`")
+    folder.mkdir(parents=True, exist_ok=True)
+    import casadi as ca
+
+    generator = ca.CodeGenerator("step", {"with_header": False})
+    generator.add(step)
+    sizes = f"#define ARGUMENTS {step.sz_arg()}\n#define RESULTS {step.sz_res()}\n"
+    source = generator.dump() + sizes + _DRIVER
+    library = folder / f"{hashlib.sha256(source.encode()).hexdigest()[:16]}.so"
+    if not library.exists():
+        text, made = library.with_suffix(".c"), library.with_suffix(".part")
+        text.write_text(source)
+        subprocess.run(
+            [
+                COMPILER,
+                OPTIMISE,
+                "-march=native",
+                "-shared",
+                "-fPIC",
+                "-Wl,-Bsymbolic",
+                "-o",
+                made,
+                text,
+                "-lm",
+            ],
+            check=True,
+        )
+        made.rename(library)
+        text.unlink()
+    return library

@@ -1,0 +1,149 @@
+"""Exudyn: bodies in absolute coordinates, joints and loops as RevoluteJoint2D constraints.
+
+Its implicit second-order integrators solve index 2 (trapezoidal) and index 3 (generalised alpha)
+with Newton iterations inside its C++ solver; its explicit integrators take no joints. Built as its
+own N-four-bar example is: modified Newton, no files. The "fast" build of the module is used.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from hapticlink.components.specs import Linkage
+
+sys.exudynFast = True  # the build without range checks, as its documentation advises
+import exudyn as exu  # noqa: E402
+import exudyn.itemInterface as item  # noqa: E402
+
+NAME = "Exudyn"
+METHODS = ("trapezoidal, index 2", "generalised alpha (0.9), index 3")
+SPARSE_FROM = 30  # bodies
+
+
+def _states(linkage: Linkage, q: np.ndarray, qd: np.ndarray) -> dict[str, tuple]:
+    """(origin, angle, its velocity, rate) of every body, from the joint coordinates."""
+    found = {"ground": (np.zeros(2), 0.0, np.zeros(2), 0.0)}
+    waiting = list(zip(linkage.joint, q, qd, strict=True))
+    while waiting:
+        joint, value, rate = next(w for w in waiting if w[0].parent in found)
+        waiting.remove((joint, value, rate))
+        if joint.type != "revolute":
+            raise ValueError(f"joint `{joint.name}`: this converter knows revolute joints only")
+        origin, angle, velocity, omega = found[joint.parent]
+        offset = _turn(angle) @ (joint.at_parent or (0.0, 0.0))
+        pivot, drift = origin + offset, velocity + omega * np.array([-offset[1], offset[0]])
+        angle, omega = angle + value, omega + rate
+        back = _turn(angle) @ (joint.at_child or (0.0, 0.0))
+        found[joint.child] = (
+            pivot - back,
+            angle,
+            drift - omega * np.array([-back[1], back[0]]),
+            omega,
+        )
+    return found
+
+
+def _turn(angle: float) -> np.ndarray:
+    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+
+
+def prepare(
+    linkage: Linkage, wrench: np.ndarray, q: np.ndarray, qd: np.ndarray, method: str, h: float
+) -> Callable[[int], tuple[float, float, float]]:
+    start = _states(linkage, q, qd)
+    settings = _settings(method, h, len(linkage.body))
+
+    def run(steps: int) -> tuple[float, float, float]:
+        system, mbs, sensor = _build(linkage, wrench, start)
+        settings.timeIntegration.numberOfSteps = steps
+        settings.timeIntegration.endTime = steps * h
+        solver = exu.MainSolverImplicitSecondOrder()
+        solver.InitializeSolver(mbs, settings)
+        began = time.perf_counter()
+        done = solver.SolveSteps(mbs, settings)
+        seconds = time.perf_counter() - began
+        x, y = mbs.GetSensorValues(sensor)[:2] if done else (math.nan, math.nan)
+        solver.FinalizeSolver(mbs, settings)
+        system.Reset()
+        return x, y, seconds
+
+    return run
+
+
+def _build(linkage: Linkage, wrench: np.ndarray, start: dict[str, tuple]) -> tuple:
+    """(system container, assembled system, sensor at the operational point)."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    centers = {b.name: np.array(b.center or (0.0, 0.0)) for b in linkage.body} | {
+        "ground": np.zeros(2)
+    }
+    numbers = {"ground": mbs.AddObject(item.ObjectGround())}
+    for b in linkage.body:
+        origin, angle, velocity, omega = start[b.name]
+        arm = _turn(angle) @ centers[b.name]
+        node = mbs.AddNode(
+            item.NodeRigidBody2D(
+                referenceCoordinates=[*(origin + arm), angle],
+                initialCoordinates=[0.0, 0.0, 0.0],
+                initialVelocities=[*(velocity + omega * np.array([-arm[1], arm[0]])), omega],
+            )
+        )
+        numbers[b.name] = mbs.AddObject(
+            item.ObjectRigidBody2D(physicsMass=b.mass, physicsInertia=b.inertia, nodeNumber=node)
+        )
+        if linkage.gravity is not None:
+            weight = mbs.AddMarker(item.MarkerBodyMass(bodyNumber=numbers[b.name]))
+            mbs.AddLoad(
+                item.LoadMassProportional(markerNumber=weight, loadVector=[*linkage.gravity, 0.0])
+            )
+
+    def marker(body: str, at: tuple[float, float] | None) -> int:
+        local = np.array(at or (0.0, 0.0)) - centers[body]
+        return mbs.AddMarker(
+            item.MarkerBodyRigid(bodyNumber=numbers[body], localPosition=[*local, 0.0])
+        )
+
+    pins = [((j.parent, j.at_parent), (j.child, j.at_child)) for j in linkage.joint]
+    pins += [tuple(zip(loop.bodies, loop.at, strict=True)) for loop in linkage.loop]
+    for ends in pins:
+        mbs.AddObject(item.ObjectJointRevolute2D(markerNumbers=[marker(*end) for end in ends]))
+    op = linkage.operational_point
+    hand = marker(op.body, op.at)
+    if np.any(wrench):
+        mbs.AddLoad(item.LoadForceVector(markerNumber=hand, loadVector=[*wrench[:2], 0.0]))
+        mbs.AddLoad(item.LoadTorqueVector(markerNumber=hand, loadVector=[0.0, 0.0, wrench[2]]))
+    sensor = mbs.AddSensor(
+        item.SensorMarker(
+            markerNumber=hand, outputVariableType=exu.OutputVariableType.Position, writeToFile=False
+        )
+    )
+    mbs.Assemble()
+    return container, mbs, sensor
+
+
+def _settings(method: str, h: float, bodies: int) -> exu.SimulationSettings:
+    settings = exu.SimulationSettings()
+    settings.solutionSettings.writeSolutionToFile = False
+    settings.solutionSettings.sensorsStoreAndWriteFiles = False
+    settings.solutionSettings.coordinatesSolutionFileName = ""
+    settings.timeIntegration.verboseMode = 0
+    settings.displayStatistics = False
+    settings.timeIntegration.newton.useModifiedNewton = True
+    settings.timeIntegration.newton.relativeTolerance = 1e-8
+    trapezoidal = method == METHODS[0]
+    settings.timeIntegration.generalizedAlpha.useIndex2Constraints = trapezoidal
+    settings.timeIntegration.generalizedAlpha.useNewmark = trapezoidal
+    settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9
+    settings.timeIntegration.adaptiveStep = False
+    settings.linearSolver.solverType = (
+        exu.LinearSolverType.EigenSparse
+        if bodies >= SPARSE_FROM
+        else exu.LinearSolverType.EigenDense
+    )
+    settings.linearSolver.ignoreSingularJacobian = bodies < SPARSE_FROM
+    return settings

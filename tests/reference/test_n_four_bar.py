@@ -1,0 +1,84 @@
+"""The N-four-bar through its singular poses against its closed form.
+
+IFToMM library of computational benchmark problems, A02: all rods stay parallel, so the mechanism is
+one pendulum. With a = g ((N+1)/2 + N) / ((N+1)/3 + N), phi from the top and phi'(0) = 1 rad/s,
+
+    phi'^2 = 1 + 2 a (1 - cos phi),   t = 2 F(phi/2 | m = -4a)
+
+The pose is singular each time that the rods line up (N = 2: ten times in 10 s).
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipkinc
+
+from hapticlink.components.mechanism import virtual_mechanism
+from hapticlink.orchestrator import scene_file
+
+G = 9.81
+
+
+def exact_tip(n, t):
+    """B0 at t."""
+    a = G * ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
+    turn = 2 * ellipkinc(math.pi, -4 * a)
+    most = 2 * math.pi * (t / turn + 1)
+    phi = brentq(lambda phi: 2 * ellipkinc(phi / 2, -4 * a) - t, 0, most, xtol=1e-14)
+    return np.array([math.sin(phi), math.cos(phi)])
+
+
+class Fast:
+    """A component on preallocated memory, at its defaults."""
+
+    def __init__(self, component, h):
+        self.component = component
+        self.u = np.array(component.start_inputs)
+        self.p = np.array(component.start_parameters)
+        self.x = np.array(component.initialize(self.u, self.p)).ravel()
+        self._after = np.empty_like(self.x)
+        self._held = [self.x, self.u, self.p, np.zeros(1), np.array([h])]
+        self._buffer, self.trigger = component.step.buffer()
+        for i, values in enumerate(self._held):
+            self._buffer.set_arg(i, memoryview(values))
+        self._buffer.set_res(0, memoryview(self._after))
+
+    def step(self):
+        self.trigger()
+        self.x[:] = self._after
+
+    def output(self, name):
+        flat = np.array(self.component.output(self.x, self.u, self.p, 0.0)).ravel()
+        names = [v.name for v in self.component.outputs for _ in range(v.size)]
+        return flat[[i for i, found in enumerate(names) if found == name]]
+
+
+def mechanism(n, rate):
+    scene = scene_file.load("n-four-bar", [f"linkage.n={n}"])
+    return Fast(virtual_mechanism(scene.linkage, scene.mechanism, step_s=1 / rate), 1 / rate)
+
+
+def test_closed_form_at_published_times():
+    assert exact_tip(2, 1.0) == pytest.approx([-0.19502030194943509, -0.98079920566217383])
+    assert exact_tip(2, 10.0) == pytest.approx([0.32845811154081538, 0.94451853817860096])
+
+
+def test_two_windows_at_512_hz():
+    block = mechanism(2, 512)
+    start = block.output("energy")
+    worst = 0.0
+    for k in range(5120):
+        block.step()
+        if k % 8 == 0:
+            worst = max(worst, abs(block.output("energy") - start)[0])
+    assert np.abs(block.output("x")[:2] - exact_tip(2, 10.0)).max() < 1e-8
+    assert worst < 1e-8
+
+
+def test_forty_windows_at_1024_hz():
+    block = mechanism(40, 1024)
+    for _ in range(10240):
+        block.step()
+    assert np.abs(block.output("x")[:2] - exact_tip(40, 10.0)).max() < 1e-5

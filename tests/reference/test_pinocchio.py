@@ -1,0 +1,114 @@
+"""Accelerations, multipliers and mobility of moving linkages against Pinocchio's terms.
+
+Pinocchio gives D, bias forces, closure Jacobians and their rates; NumPy solves
+[D -W'; W 0] densely, by least norm where closures are redundant.
+"""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from blocks import Running
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from mechanisms import five_bar, linkages
+
+from benchmarks.mechanisms import chain, n_four_bar
+from benchmarks.peers import pinocchio_peer
+from hapticlink.components.component import Signals
+from hapticlink.components.linkage import LinkageModel, parameters
+from hapticlink.components.mechanism import virtual_mechanism
+from hapticlink.components.operational_space import OperationalSpace
+from hapticlink.components.specs import Mechanism
+
+
+def ours(linkage, q, qd, F):
+    """(qdd, lambda, W' lambda, Lambda^-1, a_bias) by the components."""
+    variables = parameters(linkage)
+    p, n = Signals("p", variables), len(q)
+    symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
+    model = LinkageModel(linkage, p, *symbols)
+    space = OperationalSpace(model)
+    qdd, multipliers = space.motion(model.J_h.T @ ca.DM(F))
+    found = [qdd, multipliers, model.W.T @ multipliers, space.Lambda_inv, space.a_bias]
+    f = ca.Function("f", [*symbols, p.vector], found)
+    return [np.array(v).squeeze() for v in f(q, qd, [s for v in variables for s in v.starts])]
+
+
+def theirs(linkage, q, qd, F):
+    at = pinocchio_peer.Terms(linkage).at(q, qd)
+    D, W, J, n, m = at["D"], at["W"], at["J_h"], len(q), len(at["w"])
+    K = np.block([[D, -W.T], [W, np.zeros((m, m))]])
+    right = np.zeros((n + m, 5))
+    right[:n, 0], right[n:, 0] = J.T @ F - at["nle"], -at["w"]
+    right[:n, 1], right[n:, 1] = -at["nle"], -at["w"]
+    right[:n, 2:] = J.T
+    found = np.linalg.lstsq(K, right, rcond=1e-12)[0]
+    bias = J @ found[:n, 1] + at["Jdot_qd"]
+    return found[:n, 0], found[n:, 0], W.T @ found[n:, 0], J @ found[:n, 2:], bias
+
+
+def close(a, b, tolerance=1e-9, least=1e-3):
+    np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * np.abs(b).max(initial=least))
+
+
+def open_tree(linkage, q, qd, F):
+    """Sizes of (qdd, lambda, W' lambda, Lambda^-1, a_bias) before the closures take their part:
+    where these leave nothing, it is nothing against those."""
+    at = pinocchio_peer.Terms(linkage).at(q, qd)
+    D_inv, J = np.linalg.inv(at["D"]), at["J_h"]
+    free, drift = D_inv @ (J.T @ F - at["nle"]), -D_inv @ at["nle"]
+    sizes = [free, J.T @ F - at["nle"], J.T @ F - at["nle"], J @ D_inv @ J.T, J @ drift]
+    return [np.abs(size).max(initial=1e-3) for size in sizes]
+
+
+def regular(linkage, q, qd):
+    """Closures of full rank, told apart from nearly singular ones: cond(W D^-1 W') < 1e6."""
+    if not linkage.loop:
+        return True
+    at = pinocchio_peer.Terms(linkage).at(q, qd)
+    return np.linalg.cond(at["W"] @ np.linalg.solve(at["D"], at["W"].T)) < 1e6
+
+
+@settings(max_examples=60, deadline=None)
+@given(linkages(max_bodies=8), st.integers(0, 2**31))
+def test_random_linkages_in_motion(drawn, seed):
+    linkage, q, qd = drawn
+    assume(regular(linkage, q, qd))
+    F = np.random.default_rng(seed).normal(size=3)
+    mine, reference = ours(linkage, q, qd, F), theirs(linkage, q, qd, F)
+    for a, b, scale in zip(mine, reference, open_tree(linkage, q, qd, F), strict=True):
+        close(a, b, least=scale)
+
+
+@pytest.mark.parametrize("linkage", [five_bar(), chain(12)], ids=["five-bar", "chain of 12"])
+def test_known_linkages_in_motion(linkage):
+    start = Running(virtual_mechanism(linkage, Mechanism(), step_s=1 / 512)).state["q"]
+    qd = np.random.default_rng(2).uniform(-3, 3, len(start))
+    F = np.array([-0.5, 0.3, -0.0025])
+    for a, b in zip(ours(linkage, start, qd, F), theirs(linkage, start, qd, F), strict=True):
+        close(a, b)
+
+
+@pytest.mark.parametrize("N", [2, 10])
+def test_n_four_bar_away_from_its_singular_poses(N):
+    """On its parallelogram branch; W' lambda rather than lambda, of which 1/sigma is left."""
+    linkage = n_four_bar(N)
+    angle = 1.0
+    q = np.array([angle] * (N + 1) + [-angle] * N)
+    qd = np.array([-2.0] * (N + 1) + [2.0] * N)
+    F = np.array([1.0, -2.0, 0.3])
+    for a, b in zip(ours(linkage, q, qd, F), theirs(linkage, q, qd, F), strict=True):
+        close(a, b)
+
+
+def test_redundant_closures_carry_the_same_force():
+    """Every loop twice: lambda is not unique, W' lambda and the motion are."""
+    linkage = five_bar()
+    linkage = replace(linkage, loop=linkage.loop * 2)
+    q = Running(virtual_mechanism(five_bar(), Mechanism(), step_s=1 / 512)).state["q"]
+    qd, F = np.array([1.0, -2.0, 0.5, 3.0]), np.array([-0.5, 0.3, -0.0025])
+    mine, reference = ours(linkage, q, qd, F), theirs(linkage, q, qd, F)
+    for k in (0, 2, 3, 4):
+        close(mine[k], reference[k])
