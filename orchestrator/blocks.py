@@ -9,6 +9,7 @@ from typing import Any
 from hapticlink.components.specs import GraphicsCopy
 from hapticlink.fmus.blocks import build_block
 from hapticlink.fmus.errors import FmuError
+from hapticlink.orchestrator import needs
 from hapticlink.orchestrator.faults import InputFault
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.ticks import Timeline
@@ -21,13 +22,23 @@ class BlockPlan:
     name: str
     clock: str
     settings: dict[str, Any]
+    kind: str = ""
+
+    @property
+    def made_by(self) -> str:
+        """The name of the block in `fmus.blocks`."""
+        return self.kind or self.name
 
 
-def blocks(scene: Scene) -> tuple[BlockPlan, ...]:
-    """The blocks of `scene`, in the order of the loop."""
+def blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
+    """The blocks of `scene`, in the order of the loop; skip=False with all that they can have."""
+    if not skip:
+        scene = needs.unskipped(scene)
     found = []
     if scene.hand:
         found.append(BlockPlan("hand", "haptics", {"hand": scene.hand}))
+    for name, hand in scene.hands.items():
+        found.append(BlockPlan(f"hand_{name}", "haptics", {"hand": hand}, "hand"))
     if scene.controller:
         parts = ("controller", "directions", "linkage")
         settings = {part: getattr(scene, part) for part in parts}
@@ -38,13 +49,32 @@ def blocks(scene: Scene) -> tuple[BlockPlan, ...]:
         settings = {"linkage": scene.linkage, "mechanism": scene.mechanism}
         if scene.directions_from == "mechanism" or scene.mechanism.directions:
             settings["directions"] = scene.directions
+        if scene.contacts:
+            settings |= {"contacts": scene.contacts, "length_scale": scene.directions.length_scale}
         found.append(BlockPlan("virtual_mechanism", scene.mechanism_at, settings))
-    if scene.linkage and scene.graphics and scene.directions_from == "graphics":
+    if scene.linkage and scene.graphics and (needs.graphics_block(scene) or not skip):
         names = (f.name for f in fields(GraphicsCopy))
         copy = GraphicsCopy(**{name: getattr(scene.graphics, name) for name in names})
-        settings = {"linkage": scene.linkage, "graphics": copy, "directions": scene.directions}
+        settings = {
+            "linkage": scene.linkage,
+            "graphics": copy,
+            "directions": (
+                scene.directions if needs.directions_from_graphics(scene) or not skip else None
+            ),
+            "contacts": scene.contacts if needs.contacts_from_graphics(scene) else None,
+            "mobility": needs.mobility_from_graphics(scene) or not skip,
+            "local_model": scene.local_model,
+        }
         found.append(BlockPlan("virtual_environment", "graphics", settings))
     return tuple(found)
+
+
+def settled(scene: Scene, block: BlockPlan, timeline: Timeline) -> dict[str, Any]:
+    """The settings of a block, with what the timeline says."""
+    if not scene.local_model or block.name != "virtual_mechanism":
+        return block.settings
+    frame = timeline.clock("graphics").longest
+    return {**block.settings, "frame_s": timeline.seconds(frame)}
 
 
 def fmu_files(scene: Scene, timeline: Timeline, room: Path) -> dict[str, Path]:
@@ -56,8 +86,8 @@ def fmu_files(scene: Scene, timeline: Timeline, room: Path) -> dict[str, Path]:
     for block in blocks(scene):
         try:
             files[block.name] = build_block(
-                block.name,
-                block.settings,
+                block.made_by,
+                settled(scene, block, timeline),
                 room,
                 stop_time=scene.duration,
                 step_size=timeline.seconds(timeline.clock(block.clock).longest),

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
-from hapticlink.orchestrator.system import Connection, System
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.system import Connection, System, Unit
+
+Vector = NDArray[np.float64]
 
 
 class Board:
@@ -42,6 +47,16 @@ class Board:
 
     def scalar(self, fmu: str, variable: str) -> int:
         return self._of_scalar[fmu, variable]
+
+    def port(self, unit: Unit, name: str) -> list[int]:
+        """The places of an output vector."""
+        return [self.scalar(unit.name, s.name) for s in unit.description.port(name, "output")]
+
+    def view(self, places: Sequence[int]) -> Vector | None:
+        """The values at `places` as a view, None where they do not stand side by side."""
+        if list(places) != list(range(places[0], places[-1] + 1)):
+            return None
+        return self.values[places[0] : places[-1] + 1]
 
     def sources(self, connection: Connection) -> list[int]:
         """The places of a connection's source."""

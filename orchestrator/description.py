@@ -2,46 +2,86 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from io import BytesIO
+from itertools import product
+from math import prod
 from pathlib import Path
-from typing import Literal
+from typing import Any
 from xml.etree import ElementTree
 
-from fmpy import read_model_description
+from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
 from hapticlink.components.component import Timing  # the contract's word, a plain Literal
+from hapticlink.orchestrator.archives import opened, read_xml
+from hapticlink.orchestrator.conversion import BASES, SAME, Linear, Unit
 from hapticlink.orchestrator.faults import InputFault
 
-Type = Literal["Real", "Integer", "Boolean"]
-TYPES: tuple[Type, ...] = ("Real", "Integer", "Boolean")
+TYPES = (
+    "Real", "Integer",
+    "Float64", "Float32", "Int64", "Int32", "Int16", "Int8", "UInt64", "UInt32", "UInt16", "UInt8",
+    "Boolean",
+)  # fmt: skip
+"""The FMI types that are numbers, by the name in their get and set functions: FMI 2.0's two,
+FMI 3.0's ten, and Boolean of both."""
+_CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
+_ENTRY = re.compile(r"\[[\d, ]+\]$")
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """One FMI variable."""
+    """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array.
+
+    `conversion` is what a connection does to a value on its way in.
+    """
 
     name: str
     reference: int
-    type: Type
+    type: str
     causality: str
     unit: str | None
+    variability: str = "continuous"
+    start: float = 0.0
+    relative: bool = False
+    entry: int = 0
+    conversion: Linear = SAME
 
     @property
     def port(self) -> str:
         """`x` of `x[1]`: the vector or matrix that the scalar is an entry of."""
-        return self.name.partition("[")[0]
+        return _ENTRY.sub("", self.name)
+
+    @property
+    def settable(self) -> bool:
+        """Whether it may be set before initialisation ends."""
+        return self.causality in ("input", "parameter") and self.variability != "constant"
 
 
 @dataclass(frozen=True)
 class Description:
-    """A co-simulation FMU, as its modelDescription.xml says."""
+    """A co-simulation FMU, as its modelDescription.xml says.
+
+    fmi is "2" or "3"; flags are the capabilities of its CoSimulation element that are true.
+    """
 
     path: Path
     guid: str
     identifier: str
     timing: Timing
     scalars: tuple[Scalar, ...]
+    fmi: str = "2"
+    units: dict[str, Unit] = field(default_factory=dict)
+    flags: frozenset[str] = frozenset()
+    step_size: str | None = None
+    dependencies: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """By output: the variables that it depends on directly. An output that is not here may depend
+    on every input."""
+    strings: tuple[Scalar, ...] = ()
+    """Variables that are text: they are set at the start, never connected."""
 
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
         """The entries of vector `name` (or the scalar of that very name), in order."""
@@ -49,32 +89,136 @@ class Description:
             s for s in self.scalars if name in (s.port, s.name) and s.causality in causalities
         )
 
-    @property
+    def follows(self, output: Scalar, inputs: Iterable[Scalar] | None = None) -> bool:
+        """Whether an output depends directly on one of `inputs`; None are all."""
+        if inputs is None:
+            inputs = (s for s in self.scalars if s.causality == "input")
+        declared = self.dependencies.get(output.name, self.dependencies.get(output.port))
+        return declared is None or any(s.name in declared or s.port in declared for s in inputs)
+
+    def unit(self, scalar: Scalar) -> Unit | None:
+        return None if scalar.unit is None else self.units.get(scalar.unit, Unit(scalar.unit))
+
+    @cached_property
     def outputs(self) -> tuple[Scalar, ...]:
-        """All outputs, reals before integers before booleans."""
+        """All outputs, type by type in the order of TYPES."""
         found = [s for s in self.scalars if s.causality == "output"]
         return tuple(sorted(found, key=lambda s: TYPES.index(s.type)))
 
 
 def describe(path: Path) -> Description:
-    """Raises InputFault where the file is no FMI 2.0 co-simulation FMU."""
-    try:
-        model = read_model_description(str(path), validate=False)
-        with zipfile.ZipFile(path) as archive:
-            tree = ElementTree.fromstring(archive.read("modelDescription.xml"))
-    except Exception as error:  # FMPy raises bare Exception for what it cannot read
-        raise InputFault(f"{path}: not a readable FMU: {error}") from error
-    if model.fmiVersion != "2.0" or model.coSimulation is None:
-        raise InputFault(
-            f"{path}: FMI {model.fmiVersion}, co-simulation: {model.coSimulation is not None}; "
-            "an FMI 2.0 co-simulation FMU is needed"
-        )
+    """Raises InputFault where the file is no co-simulation FMU of FMI 2.0 or 3.0 that can run
+    here."""
+    with opened(path, "FMU") as archive:
+        text = read_xml(archive, "modelDescription.xml")
+        tree = ElementTree.fromstring(text)
+        version = tree.get("fmiVersion") or "none"
+        if version.partition(".")[0] not in ("2", "3") or tree.find("CoSimulation") is None:
+            raise InputFault(
+                f"{path}: FMI version {version}, co-simulation: "
+                f"{tree.find('CoSimulation') is not None}; "
+                "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
+            )
+        try:
+            model = read_model_description(_only_xml(text), validate=False)
+            relative = _relative(tree)
+            scalars = tuple(
+                s for v in model.modelVariables for s in _scalars(v, version[0], v.name in relative)
+            )
+        except Exception as error:  # FMPy raises bare Exception for what it cannot read
+            raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
+        _require_binary(archive, model.coSimulation.modelIdentifier, version[0])
     block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
-    sampled = block is not None and block.get("timing") == "sampled"
-    scalars = tuple(
-        Scalar(v.name, v.valueReference, v.type, v.causality or "local", v.unit)
-        for v in model.modelVariables
-        if v.type in TYPES
+    timing: Timing = "continuous"
+    if block is not None and block.get("timing") == "sampled":
+        timing = "sampled"
+    capable = {k for k, value in tree.find("CoSimulation").items() if value == "true"}  # type: ignore[union-attr]
+    return Description(
+        path,
+        model.guid,
+        model.coSimulation.modelIdentifier,
+        timing,
+        scalars,
+        version[0],
+        {u.name: _unit(u) for u in model.unitDefinitions},
+        frozenset(capable),
+        model.defaultExperiment and model.defaultExperiment.stepSize,
+        dependencies={
+            output.variable.name: frozenset(v.name for v in output.dependencies)
+            for output in model.outputs
+            if output.dependencies is not None
+        },
+        strings=tuple(_text(v) for v in model.modelVariables if v.type == "String" and not v.shape),
     )
-    timing: Timing = "sampled" if sampled else "continuous"
-    return Description(path, model.guid, model.coSimulation.modelIdentifier, timing, scalars)
+
+
+def _only_xml(text: bytes) -> BytesIO:
+    """FMPy reads an archive or a file's name; this is an archive with nothing but the text."""
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+    return file
+
+
+def _relative(tree: ElementTree.Element) -> set[str | None]:
+    """Names of the variables that are differences; FMPy 0.3.32 overlooks the attribute."""
+    return {
+        variable.get("name")
+        for variable in tree.iterfind("./ModelVariables/*")
+        if any(e.get("relativeQuantity") == "true" for e in (variable, *variable))
+    }
+
+
+def _scalars(variable: Any, fmi: str, relative: bool) -> Iterator[Scalar]:
+    """The numbers of a variable; entries of an FMI 3.0 array row by row, named from 1."""
+    kind = _CALLED.get((fmi, variable.type), variable.type)
+    if kind not in TYPES:
+        return
+    shape = tuple(variable.shape or ())
+    starts = [_number(text) for text in (variable.start or "").split()] or [0.0]
+    if len(starts) == 1:
+        starts *= prod(shape)
+    places = product(*(range(1, n + 1) for n in shape))
+    names = [f"{variable.name}[{','.join(map(str, p))}]" if p else variable.name for p in places]
+    declared = variable.declaredType
+    for i, (name, start) in enumerate(zip(names, starts, strict=True)):
+        yield Scalar(
+            name,
+            variable.valueReference,
+            kind,
+            variable.causality or "local",
+            variable.unit or (declared and declared.unit),
+            variable.variability,
+            start,
+            relative or bool(declared and declared.relativeQuantity == "true"),
+            i,
+        )
+
+
+def _text(v: Any) -> Scalar:
+    return Scalar(v.name, v.valueReference, "String", v.causality or "local", None, v.variability)
+
+
+def _number(text: str) -> float:
+    return float(text == "true") if text in ("true", "false") else float(text)
+
+
+def _unit(unit: Any) -> Unit:
+    base = unit.baseUnit
+    if base is None:
+        return Unit(unit.name)
+    powers = tuple(int(getattr(base, b)) for b in BASES)
+    return Unit(unit.name, powers, float(base.factor), float(base.offset))
+
+
+def _require_binary(archive: zipfile.ZipFile, identifier: str, fmi: str) -> None:
+    here = platform if fmi == "2" else platform_tuple
+    wanted = f"binaries/{here}/{identifier}{sharedLibraryExtension}"
+    if wanted in archive.NameToInfo:
+        return
+    parts = (name.split("/") for name in archive.namelist() if name.startswith("binaries/"))
+    there = sorted({p[1] for p in parts if len(p) > 2 and p[2]})
+    raise InputFault(
+        f"{archive.filename}: no binary for this platform ({wanted}), only for "
+        f"{', '.join(there) or 'none'}; take an FMU that was built for {here}"
+    )

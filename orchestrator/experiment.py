@@ -11,8 +11,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator import scene_file, told
 from hapticlink.orchestrator.blocks import fmu_files
+from hapticlink.orchestrator.faults import Fault
 from hapticlink.orchestrator.plan import Plan
 from hapticlink.orchestrator.results import Results, load, write_json
 from hapticlink.orchestrator.run import Outcome, Progress, run
@@ -22,8 +23,6 @@ from hapticlink.orchestrator.system import System, from_scene
 from hapticlink.orchestrator.timeline import timeline
 
 PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
-POWER = frozenset({"N", "N.m", "m/s", "rad/s"})
-"""Units of wrenches and twists: what carries power."""
 
 
 @dataclass(frozen=True)
@@ -64,44 +63,50 @@ def simulate(
         story = _story(read, system, options) | {"delays": {k: asdict(v) for k, v in ages.items()}}
         write_json(folder / "run.json", story | {"end": {"reason": "running"}})
         outcome = run(plan, folder, progress)
-    write_json(folder / "run.json", story | _ending(outcome, built))
+    try:
+        write_json(folder / "run.json", story | _ending(system, outcome, built))
+    except OSError as error:  # the first run.json stays
+        outcome.fault = outcome.fault or Fault(f"{folder}: {error.strerror or error}")
     return Experiment(read, system, outcome, folder)
 
 
 def _story(scene: Scene, system: System, options: Sequence[str]) -> dict[str, Any]:
     base = system.timeline.base
-    crossing = [c for c in system.connections if c.hold]
-    power = [c.name for c in crossing if POWER & {s.unit for s in c.outputs}]
     return {
         "scene": asdict(scene),
         "options": list(options),
         "versions": {name: version(name) for name in PACKAGES}
         | {"python": platform.python_version()},
-        "seeds": _seeds(scene),
+        "seeds": _seeds(scene, system),
         "rates": [c.name for c in system.timeline.clocks],
         "base": f"{base.numerator}/{base.denominator} s",
         "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.units},
         "coupling": system.coupling,
         "connections": [c.name for c in system.connections],
-        "holds": {c.name: c.hold for c in crossing},
-        "power_across_rates": power,
-    } | ({} if power else {"energies": "none"})
+    } | told.holds(system)
 
 
-def _seeds(scene: Scene) -> dict[str, int]:
+def _seeds(scene: Scene, system: System) -> dict[str, int]:
     rate = scene.graphics.rate if scene.graphics else None
-    return {"graphics.rate": rate.seed} if isinstance(rate, VariableRate) else {}
+    seeds = {"graphics.rate": rate.seed} if isinstance(rate, VariableRate) else {}
+    return seeds | {c.name: c.latency.seed for c in system.connections if c.latency}
 
 
-def _ending(outcome: Outcome, built: float) -> dict[str, Any]:
+def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
     fault = outcome.fault
     return {
         "end": {"reason": outcome.reason, "time": outcome.end_time},
         "fault": None if fault is None else {"kind": type(fault).__name__, "message": str(fault)},
         "calls": outcome.calls,
+        "links": outcome.links,
+        "isolated": outcome.isolated,
+        "held_outputs": outcome.held,
+        "smaller_steps": outcome.smaller_steps,
         "timings": {
             "build": built,
             "run": outcome.wall_time,
             "steps": outcome.step_time,
         },
-    }
+        "iterations": outcome.iterations and asdict(outcome.iterations),
+        "controlled_steps": {clock: asdict(steps) for clock, steps in outcome.steps.items()},
+    } | told.energies(system, outcome.energies)

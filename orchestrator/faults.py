@@ -32,6 +32,11 @@ class Finding:
         return ": ".join(part for part in (place, self.key, self.message) if part)
 
 
+def unplaced(path: Sequence[str | int], message: str) -> Finding:
+    """A finding in a scene that no file wrote."""
+    return Finding(".".join(map(str, path)), message)
+
+
 class SceneFault(InputFault):
     """A scene that is refused, with all its findings."""
 

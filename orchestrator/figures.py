@@ -6,40 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.results import Results, Table, Vector
-
-MECHANISM, DEVICE = "virtual_mechanism.x", "haptic_device.x_true"
+from hapticlink.orchestrator.results import Results, Table
+from hapticlink.orchestrator.tracking import DEVICE, MECHANISM, table_of, tracking
 
 
 def draw(results: Results) -> list[str]:
     """Write what the run has signals for, and give the file names."""
     drawn = []
-    if _table(results, MECHANISM):
+    if table_of(results, MECHANISM):
         drawn.append(_trajectories(results))
-        if _table(results, DEVICE):
+        if table_of(results, DEVICE):
             drawn.append(_distance(results))
     counting = next((t for t in results.tables.values() if _count(t)), None)
     if counting:
         drawn.append(_constraints(results, counting))
     return drawn
-
-
-def tracking(results: Results) -> tuple[Vector, Vector]:
-    """(time s, |x_S - x_D| mm, rotation apart) at the mechanism's samples; the device, which
-    has another rate in some scenes, linear between its own."""
-    mechanism, device = _table(results, MECHANISM), _table(results, DEVICE)
-    if mechanism is None or device is None:
-        raise KeyError(f"{results.folder}: tracking needs {MECHANISM} and {DEVICE}")
-    time = mechanism["time"]
-    gaps = [
-        mechanism[MECHANISM][:, i] - np.interp(time, device["time"], device[DEVICE][:, i])
-        for i in range(2)
-    ]
-    return time, np.hypot(*gaps) * 1e3
-
-
-def _table(results: Results, signal: str) -> Table | None:
-    return next((t for t in results.tables.values() if signal in t), None)
 
 
 def _axes(title: str, x: str, y: str) -> tuple[Any, Any]:
@@ -66,7 +47,7 @@ def _trajectories(results: Results) -> str:
             (MECHANISM, "operational point", "-"),
             (DEVICE, "handle", "--"),
         )
-        if (table := _table(results, signal))
+        if (table := table_of(results, signal))
     ]
     if len(paths) == 2:
         title = f"Device and operational point part by at most {tracking(results)[1].max():.2g} mm"

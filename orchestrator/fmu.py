@@ -1,4 +1,5 @@
-"""An instance of an FMI 2.0 co-simulation FMU whose values stand in shared arrays.
+"""An instance of a co-simulation FMU whose values stand in shared arrays: FMI 2.0 here, what
+FMI 3.0 calls otherwise in `fmu3`.
 
 FMPy loads the library and instantiates; the calls of the loop go straight to the C functions,
 on pointers made once. Every status is checked, every output must be finite, and whatever the
@@ -8,6 +9,7 @@ FMU logged goes into the error.
 from __future__ import annotations
 
 import ctypes
+import os
 import shutil
 import sys
 import tempfile
@@ -20,23 +22,31 @@ import numpy as np
 from fmpy import extract, fmi2
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.conversion import SAME
 from hapticlink.orchestrator.description import TYPES, Description, Scalar
 from hapticlink.orchestrator.faults import FmuFault
-from hapticlink.orchestrator.transfer import transfers
+from hapticlink.orchestrator.foreign import Faults
+from hapticlink.orchestrator.retry import Retry, Saved
+from hapticlink.orchestrator.transfer import Transfer, transfers
+from hapticlink.orchestrator.wiring import Starts
 
 Vector = NDArray[np.float64]
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
-WARNING, ERROR, FATAL = 1, 3, 4
+WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 
 _messages: dict[int, list[str]] = {}
 _keys = count(1)
 
 
 def _log(key: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:
-    """Keep what an FMU says; it is shown when a call fails."""
-    said = _messages.get(key or 0)
+    keep(key or 0, status, message)
+
+
+def keep(key: int, status: int, message: bytes) -> None:
+    """Keep what the FMU of instance `key` says; it is shown when a call fails."""
+    said = _messages.get(key)
     if said is not None and status > 0:
-        said.append(message.decode("utf-8", "replace").strip())
+        said.append((message or b"").decode("utf-8", "replace").strip())
 
 
 _CALLBACKS = fmi2.fmi2CallbackFunctions()
@@ -48,18 +58,32 @@ _CALLBACKS.freeMemory = fmi2.defaultCallbacks.freeMemory
 class Instance:
     """A loaded FMU, from instantiation to removal; a context manager.
 
-    `outputs` is the view that `get` fills. After `connect`, `set` writes the values of
-    `board` at the connected places.
+    `outputs` is the view that `get` fills. `connect` gives what writes the values of a board at
+    the connected places. `held` counts the outputs that a policy has held at their last value.
     """
 
-    def __init__(self, name: str, description: Description, outputs: Vector) -> None:
+    def __init__(
+        self,
+        name: str,
+        description: Description,
+        outputs: Vector,
+        starts: Starts = (),
+        policy: Faults | None = None,
+        folder: str | None = None,
+    ) -> None:
         self.name, self.description, self.outputs = name, description, outputs
+        self.starts, self.policy, self.held = starts, policy or Faults(), 0
+        self._retry: Retry | None = None
+        self._saved: dict[int, Saved] = {}
+        self._saved_time: dict[int, float] = {}
+        self._good: Vector | None = None
+        self._initialized = False
         self.step_time = 0.0
         self._zeros = np.zeros(len(outputs))
         self._status = 0
         self._slave: Any = None
         self._key = next(_keys)
-        self._folder = tempfile.mkdtemp(prefix="hapticlink-")
+        self._folder = folder or tempfile.mkdtemp(prefix="hapticlink-")
 
     def __enter__(self) -> Instance:
         try:
@@ -74,47 +98,101 @@ class Instance:
 
     def _load(self) -> None:
         _messages[self._key] = []
+        before = os.getcwd()
         try:
             extract(str(self.description.path), self._folder)
-            slave = fmi2.FMU2Slave(
-                guid=self.description.guid,
-                modelIdentifier=self.description.identifier,
-                unzipDirectory=self._folder,
-                instanceName=self.name,
-            )
-            callbacks = fmi2.fmi2CallbackFunctions.from_buffer_copy(_CALLBACKS)
-            callbacks.componentEnvironment = self._key
-            slave.instantiate(callbacks=callbacks, loggingOn=True)
+            self._slave = self._instantiate()
         except Exception as error:  # FMPy raises bare Exception
-            raise self._fault(f"could not be loaded: {error}", 0.0) from error
-        self._slave = slave
-        self._gets = transfers(slave, "Get", self.description.outputs, self.outputs)
-        self._do_step = slave.dll["fmi2DoStep"]
-        self._do_step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+            said = str(error)
+            if said.startswith("Failed to instantiate"):
+                said = "its instantiation failed; its guid may not be that of its binary"
+            raise self._fault(f"could not be loaded: {said}", 0.0) from error
+        finally:
+            os.chdir(before)  # FMPy leaves it changed where a library cannot be loaded
+        self._gets = self._transfers("Get", self.description.outputs, self.outputs)
+        self._advance = self._stepper()
+        if self.policy.discard == "retry" and Retry.possible(self.description):
+            self._retry = Retry(self._slave, self.description.fmi, self._advance)
+            self._advance = self._retry.step
+
+    def _instantiate(self) -> Any:
+        slave = fmi2.FMU2Slave(
+            guid=self.description.guid,
+            modelIdentifier=self.description.identifier,
+            unzipDirectory=self._folder,
+            instanceName=self.name,
+        )
+        callbacks = fmi2.fmi2CallbackFunctions.from_buffer_copy(_CALLBACKS)
+        callbacks.componentEnvironment = self._key
+        slave.instantiate(callbacks=callbacks, loggingOn=True)
+        return slave
+
+    def _stepper(self) -> Callable[[float, float], int]:
+        """(time, size) -> status of a doStep."""
+        do_step, component = self._slave.dll["fmi2DoStep"], self._slave.component
+        do_step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+        # noSetFMUStatePriorToCurrentPoint: whoever can go back may be asked to.
+        forward = int("canGetAndSetFMUstate" not in self.description.flags)
+        return lambda time, size: do_step(component, time, size, forward)
+
+    def _transfers(self, verb: str, scalars: Sequence[Scalar], values: Vector) -> list[Transfer]:
+        return transfers(self._slave, self.description.fmi, verb, scalars, values)
 
     # --- initialisation -------------------------------------------------------------------
 
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
         """A function that takes the values at `places` of a board and sets `scalars` to them."""
         order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
-        values = np.zeros(len(scalars))
         where = np.array([places[i] for i in order], dtype=np.intp)
-        setting = transfers(self._slave, "Set", [scalars[i] for i in order], values)
+        conversions = [scalars[i].conversion for i in order]
+        plain = all(c == SAME for c in conversions)
+        factors = np.array([c.factor for c in conversions])
+        offsets = np.array([c.offset for c in conversions])
+        values, setting = self._setting([scalars[i] for i in order])
 
         def set_from(board: Vector) -> None:
             board.take(where, out=values, mode="clip")  # "raise" would copy through a buffer
-            for transfer in setting:
-                if (status := transfer.call()) > WARNING:
-                    raise self._failed(transfer.name, status)
+            if not plain:
+                values.__imul__(factors).__iadd__(offsets)
+            for call, name in setting:
+                if (status := call()) > WARNING:
+                    raise self._failed(name, status)
 
         return set_from
 
+    def _setting(
+        self, scalars: Sequence[Scalar]
+    ) -> tuple[Vector, list[tuple[Callable[[], int], str]]]:
+        """(values of `scalars`, the named calls that set them)."""
+        values = np.zeros(len(scalars))
+        return values, [(t.call, t.name) for t in self._transfers("Set", scalars, values)]
+
+    def _set_starts(self) -> None:
+        numbers = [(s, v) for s, v in self.starts if not isinstance(v, str)]
+        if numbers:
+            set_from = self.connect([s for s, _ in numbers], range(len(numbers)))
+            set_from(np.array([float(v) for _, v in numbers]))
+        for scalar, text in self.starts:
+            if isinstance(text, str):
+                self._set_text(scalar.reference, text)
+
+    def _set_text(self, reference: int, text: str) -> None:
+        one = (ctypes.c_uint * 1)(reference), 1, (ctypes.c_char_p * 1)(text.encode())
+        self._call("fmi2SetString", *one)
+
     def enter_initialization(self, stop_time: float) -> None:
         self._call("fmi2SetupExperiment", False, 0.0, 0.0, True, stop_time)
+        self._set_starts()
         self._call("fmi2EnterInitializationMode")
 
     def exit_initialization(self) -> None:
-        self._call("fmi2ExitInitializationMode")
+        self._call(f"fmi{self.description.fmi}ExitInitializationMode")
+        self._start_loop()
+
+    def _start_loop(self) -> None:
+        self._initialized = True
+        if self.policy.nan == "hold":
+            self._good = self.outputs.copy()
 
     def _call(self, name: str, *arguments: Any) -> None:
         try:
@@ -134,10 +212,23 @@ class Instance:
                 raise self._failed(transfer.name, status)
 
     def get(self) -> None:
-        """All outputs. Raises FmuFault naming the first that is not finite."""
+        """All outputs. Raises FmuFault naming the first that is not finite, unless the policy is
+        to keep its last value."""
         self.read()
         if self.outputs.dot(self._zeros) != 0.0:  # 0 x NaN and 0 x inf are NaN
-            self.require_finite()
+            if self._good is None:
+                self.require_finite()
+            else:
+                lost = ~np.isfinite(self.outputs)
+                self.outputs[lost] = self._good[lost]
+                self.held += int(lost.sum())
+        if self._good is not None:
+            self._good[:] = self.outputs
+
+    @property
+    def smaller_steps(self) -> int:
+        """How many steps were discarded and taken again in smaller ones."""
+        return self._retry.smaller if self._retry else 0
 
     def require_finite(self) -> None:
         for scalar, value in zip(self.description.outputs, self.outputs.tolist(), strict=True):
@@ -148,17 +239,34 @@ class Instance:
         """fmi2DoStep from `time` over `size`, to `end` (s)."""
         self.time = time
         begin = clock.perf_counter()
-        status = self._do_step(self._slave.component, time, size, 1)
+        status = self._advance(time, size)
         self.step_time += clock.perf_counter() - begin
         if status > WARNING:
-            raise self._failed("fmi2DoStep", status)
+            raise self._failed(f"fmi{self.description.fmi}DoStep", status)
         self.time = end
+
+    def save(self, slot: int = 0) -> None:
+        """Keep the state in a slot (fmi2GetFMUstate); a slot keeps one."""
+        if slot not in self._saved:
+            self._saved[slot] = Saved(self._slave, self.description.fmi)
+        if (status := self._saved[slot].save()) > WARNING:
+            raise self._failed(f"fmi{self.description.fmi}GetFMUstate", status)
+        self._saved_time[slot] = self.time
+
+    def rollback(self, slot: int = 0) -> None:
+        """Go back to the state in a slot, which keeps it (fmi2SetFMUstate)."""
+        if (status := self._saved[slot].restore()) > WARNING:
+            raise self._failed(f"fmi{self.description.fmi}SetFMUstate", status)
+        self.time = self._saved_time[slot]
 
     # --- ends -----------------------------------------------------------------------------
 
     def _failed(self, call: str, status: int) -> FmuFault:
         self._status = max(self._status, status)
         named = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
+        if status == DISCARD and self.policy.discard == "retry":
+            why = "in steps of 1/1024 too" if self._retry else Retry.why_not(self.description)
+            named += f" ({why})"
         return self._fault(f"{call} returned {named}", self.time)
 
     def _fault(self, what: str, time: float) -> FmuFault:
@@ -169,8 +277,13 @@ class Instance:
         slave, self._slave = self._slave, None
         try:
             if slave is not None and self._status < FATAL:
-                if self._status < ERROR:
-                    slave.dll["fmi2Terminate"](ctypes.c_void_p(slave.component))
+                if self._retry is not None:
+                    self._retry.free()
+                for saved in self._saved.values():
+                    saved.free()
+                if self._status < ERROR and self._initialized:
+                    terminate = slave.dll[f"fmi{self.description.fmi}Terminate"]
+                    terminate(ctypes.c_void_p(slave.component))
                 slave.freeInstance()
         finally:
             _messages.pop(self._key, None)

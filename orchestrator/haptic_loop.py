@@ -28,6 +28,11 @@ _LOOP: tuple[Row, ...] = (
     ("virtual_mechanism.v", "virtual_environment.v_ref"),
     ("virtual_mechanism.q", "virtual_environment.q_ref"),
     ("virtual_mechanism.qd", "virtual_environment.qd_ref"),
+    ("virtual_environment.contacts", "virtual_mechanism.contacts"),
+    ("virtual_environment.D", "virtual_mechanism.D"),
+    ("virtual_environment.W", "virtual_mechanism.W"),
+    ("virtual_environment.w", "virtual_mechanism.w"),
+    ("virtual_environment.J_h", "virtual_mechanism.J_h"),
     ("controller.F_motor", "haptic_device.F_motor"),
     ("controller.F_drift", "virtual_mechanism.F_drift"),
 )
@@ -41,8 +46,17 @@ def connections(scene: Scene) -> tuple[Row, ...]:
     held = ("haptic_device.x_true", "haptic_device.v_true")
     if not scene.device:
         held = ("virtual_mechanism.x", "virtual_mechanism.v")
+    further: list[Row] = []
+    for name in scene.hands:
+        hand, at = f"hand_{name}", f"virtual_mechanism.{name}"
+        further += [
+            (f"{hand}.F", f"{at}.F_hand"),
+            (f"{at}.x", f"{hand}.x"),
+            (f"{at}.v", f"{hand}.v"),
+        ]
     return (
         *_LOOP,
+        *further,
         (held[0], "hand.x"),
         (held[1], "hand.v"),
         (felt, "controller.F_hand"),

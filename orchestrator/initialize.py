@@ -1,13 +1,18 @@
-"""Consistent start values: inputs set and outputs read in initialisation mode until they agree."""
+"""Consistent start values: inputs set and outputs read in initialisation mode until they agree.
+
+Sweeps over all FMUs settle every chain and the feed-through loops that contract; what they do not
+settle is solved by Newton, with the values that still change as unknowns.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from hapticlink.orchestrator.board import Board
 from hapticlink.orchestrator.faults import FmuFault
+from hapticlink.orchestrator.fixed_points import Newton, Vector
 from hapticlink.orchestrator.fmu import Instance
 from hapticlink.orchestrator.system import System
 
@@ -19,7 +24,8 @@ def initialize(system: System, instances: Mapping[str, Instance], board: Board) 
     """Leave every instance in step mode, and the outputs of t = 0 on the board.
 
     Sweeps over all FMUs carry values through connections, parameters set from outputs among
-    them. Raises FmuFault where they don't agree to 1e-12 within 50 sweeps or aren't finite.
+    them. Raises FmuFault where they don't agree to 1e-12 within 50 sweeps and 50 steps of Newton,
+    or aren't finite.
     """
     timeline = system.timeline
     holds = [(board.hold(c.name), board.sources(c)) for c in system.connections if c.hold]
@@ -36,28 +42,56 @@ def initialize(system: System, instances: Mapping[str, Instance], board: Board) 
     for instance in instances.values():
         instance.read()
     values = board.values
-    for _ in range(SWEEPS):
-        before = values.copy()
+
+    def sweep() -> None:
         for instance, set_from in setters:
             for held, sources in holds:
                 values[held] = values[sources]
             set_from(values)
             instance.read()
+
+    first = values.copy()
+    for _ in range(SWEEPS):
+        before = values.copy()
+        sweep()
         agree = np.isclose(values, before, rtol=TOLERANCE, atol=TOLERANCE, equal_nan=True)
         if agree.all():
             break
     else:
-        _raise_unsettled(system, board, agree, before)
+        _solve(system, board, agree & np.isfinite(values), first, sweep)
     for instance in instances.values():
         instance.require_finite()
         instance.exit_initialization()
 
 
-def _raise_unsettled(system: System, board: Board, agree: np.ndarray, before: np.ndarray) -> None:
+def _solve(
+    system: System, board: Board, settled: np.ndarray, first: Vector, sweep: Callable[[], None]
+) -> None:
+    """Newton on the outputs that have not settled, from their first values."""
+    values = board.values
+    sources = {p for c in system.connections for p in board.sources(c)}
+    places = sorted(p for p in sources if not settled[p])
+
+    def residual(point: Vector) -> Vector:
+        values[places] = point
+        sweep()
+        return values[places] - point
+
+    found = Newton().solve(residual, first[places], TOLERANCE, SWEEPS)
+    if not found.error <= TOLERANCE:
+        agree = np.ones(len(values), bool)
+        agree[places] = np.abs(found.residual) <= TOLERANCE * (1.0 + np.abs(found.point))
+        before = values.copy()
+        before[places] = found.point
+        _raise_unsettled(system, board, agree, before)
+
+
+def _raise_unsettled(system: System, board: Board, agree: np.ndarray, before: Vector) -> None:
     for unit in system.units:
         span = board.unit(unit.name)
         for i, scalar in enumerate(unit.description.outputs, start=span.start):
             if not agree[i]:
-                what = f"output {scalar.name} does not settle in initialisation"
-                values = f"{before[i]!s} and {board.values[i]!s} in turn"
-                raise FmuFault(unit.name, f"{what}: {values}", 0.0)
+                what = f"output {scalar.name} does not settle in initialisation, nor by Newton"
+                values = f"{before[i]!s} on its way round gives {board.values[i]!s}"
+                remedy = "its feed-through loop has no start values: take a connection out of it"
+                raise FmuFault(unit.name, f"{what}: {values}; {remedy}", 0.0)

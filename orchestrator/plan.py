@@ -13,8 +13,15 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from typing import NamedTuple
 
-from hapticlink.orchestrator.schemes import SCHEMES
-from hapticlink.orchestrator.schemes.operations import Event, Firing, Operation
+from hapticlink.orchestrator.schemes import SCHEMES, controlled
+from hapticlink.orchestrator.schemes.operations import (
+    Advance,
+    Event,
+    Firing,
+    Operation,
+    Part,
+    flat,
+)
 from hapticlink.orchestrator.system import System
 from hapticlink.orchestrator.ticks import Clock, Timeline
 
@@ -31,12 +38,28 @@ class Plan:
     """The blocks of a system's events, made when an event of a new kind comes."""
 
     system: System
-    _blocks: dict[Event, Block] = field(default_factory=dict)
+    _blocks: dict[Event | Part, Block] = field(default_factory=dict)
 
-    def block(self, event: Event) -> Block:
-        if event not in self._blocks:
-            self._blocks[event] = SCHEMES[self.system.coupling](self.system, event)
-        return self._blocks[event]
+    def block(self, kind: Event | Part) -> Block:
+        if kind not in self._blocks:
+            self._blocks[kind] = self._made(kind)
+        return self._blocks[kind]
+
+    def _made(self, kind: Event | Part) -> Block:
+        scheme = SCHEMES[self.system.coupling]
+        if isinstance(kind, Part):
+            return controlled.part(self.system, kind, scheme)
+        if self.system.step_control:
+            return controlled.block(self.system, kind, scheme)
+        return scheme(self.system, kind)
+
+    def unrolled(self, event: Event) -> Iterator[Operation]:
+        """The operations of `event`: a repetition carried out once, step control in one step."""
+        for operation in flat(self.block(event)):
+            if isinstance(operation, Advance):
+                yield from flat(self.block(Part(operation.clock, operation.dticks)))
+            else:
+                yield operation
 
     def __iter__(self) -> Iterator[Moment]:
         return moments(self.system.timeline)

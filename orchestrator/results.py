@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,9 +28,9 @@ class Recorder:
 
     def __init__(self, path: Path, columns: Sequence[str], view: Vector) -> None:
         self._rows = np.zeros((CHUNK, 1 + len(view)))
-        self._view, self._next, self.last = view, 0, 0.0
-        self._file = path.open("wb")
-        self._file.write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
+        self._view, self._next, self.last, self._safe = view, 0, 0.0, 0.0
+        self._file = path.open("wb", buffering=0)
+        self._write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
 
     def row(self, time: float) -> None:
         row = self._rows[self._next]
@@ -43,9 +44,25 @@ class Recorder:
         if self._next:
             # pydantic's JSON writes floats ten times faster than repr, and round-trips too.
             text = to_json(self._rows[: self._next].tolist(), inf_nan_mode="constants")
-            self._file.write(text[2:-2].replace(b"],[", b"\n") + b"\n")
-            self._file.flush()
-            self._next = 0
+            self._next = 0  # rows that a full disk refuses are not tried again
+            self._write(text[2:-2].replace(b"],[", b"\n") + b"\n")
+            self._safe = self.last
+
+    def _write(self, text: bytes) -> None:
+        """All of `text`; or, where the disk is full, the whole lines of it that fit, and `last`
+        is the last of them."""
+        whole = self._file.tell()
+        try:
+            left = memoryview(text)
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError:
+            fit = text.rfind(b"\n", 0, self._file.tell() - whole) + 1
+            with suppress(OSError):  # what is no file, as /dev/full, has no length
+                self._file.truncate(whole + fit)
+            rows = text.count(b"\n", 0, fit)
+            self.last = float(self._rows[rows - 1, 0]) if rows else self._safe
+            raise
 
     def __enter__(self) -> Recorder:
         return self
@@ -65,8 +82,11 @@ def _quoted(name: str) -> str:
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write whole or not at all."""
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    unfinished.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-    os.replace(unfinished, path)
+    try:
+        unfinished.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,13 @@ the virtual environment (not where the mechanism gives the directions itself), [
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Tag
 
+from hapticlink.components.contact_specs import Contacts
 from hapticlink.components.specs import (
     ArmHand,
     ConstantHand,
@@ -28,6 +29,12 @@ from hapticlink.components.specs import (
     ProfileHand,
     SpringHand,
 )
+from hapticlink.orchestrator.faults import Finding, unplaced
+from hapticlink.orchestrator.foreign import Faults, ForeignFmu, Wire
+from hapticlink.orchestrator.iteration import Iteration
+from hapticlink.orchestrator.latency import Latency
+from hapticlink.orchestrator.power import PowerPort
+from hapticlink.orchestrator.step_control import StepControl
 
 Rate = int | float | str
 """Hz; a fraction of whole numbers may be written as text ("30000/1001")."""
@@ -55,10 +62,12 @@ class Graphics(GraphicsCopy):
 
     rate: Hz, bounds and a seed, or the times (s) at which frames end. align "exact" ends
     frame i at i/rate, "tick" at the first haptic tick at or after it; None is "exact" for a
-    fixed rate, and rates that vary are always on ticks.
+    fixed rate, and rates that vary are always on ticks. phase (s) is the end of the first frame
+    of a fixed rate, None a whole period. A file may give a recorded trace: `{ trace = FILE }`.
     """
 
     rate: Rate | VariableRate | tuple[float, ...] = 30
+    phase: Rate | None = None
     align: Literal["exact", "tick"] | None = None
 
 
@@ -79,14 +88,20 @@ Hand = Annotated[
 class Scene:
     """Everything a run needs. duration in s; see the field's own records for the tables.
 
-    sensing "ideal" gives controller and mechanism the hand's wrench and the true pose,
-    "encoders" the observer's (it stands here, not in [device]). mechanism_at: the rate of the
-    virtual mechanism. directions_from: who computes Lambda_inv and P_c, the graphics copy or
-    the mechanism itself. hold is the default where a connection crosses rates; holds gives
-    others by source (`virtual_environment.P_c`), target or `source -> target`. stop_when, a
-    signal against a number, ends the run in good order: None takes the device's workspace where
-    there is a device, "" is never. A file may also say `extends`, a scene over which its own tables
-    are laid.
+    sensing "ideal" gives controller and mechanism the hand's wrench and the true pose, "encoders"
+    the observer's (it stands here, not in [device]). mechanism_at: the rate of the virtual
+    mechanism. directions_from: who computes Lambda_inv and P_c, the graphics copy or the mechanism
+    itself. local_model holds the mechanism's D, W, w and J_h from the graphics rate (B.15). hands
+    are those at the further points of the linkage, by name. hold is the default from a slow rate to
+    a fast one, downsampling from a fast to a slow; holds gives others by source
+    (`virtual_environment.P_c`), target or `source -> target`. delays by the same names: a latency
+    in s, or one drawn from a seed, and losses. kinds says what a matrix or angle is where its name
+    does not. power pairs efforts with displacements of FMUs that are not the report's. substeps:
+    steps of a plant between two reads, its held inputs renewed at each. get_after_set: plants whose
+    feed-through may be read after new inputs are set, which FMI forbids between two steps.
+    stop_when, a signal against a number, ends the run in good order: None takes the device's
+    workspace where there is a device, "" is never. isolate runs every FMU in a process of its own.
+    A file may also say `extends`, a scene over which its own tables are laid.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
@@ -95,20 +110,40 @@ class Scene:
     description: str = ""
     duration: float
     hold: str = "zoh"
+    downsampling: str = "latest"
     holds: Mapping[str, str] = field(default_factory=dict)
-    coupling: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
+    delays: Mapping[str, float | Latency] = field(default_factory=dict)
+    kinds: Mapping[str, Literal["projector", "semidefinite", "angle"]] = field(default_factory=dict)
+    power: tuple[PowerPort, ...] = ()
+    substeps: Mapping[str, int] = field(default_factory=dict)
+    get_after_set: tuple[str, ...] = ()
+    coupling: Literal["gauss-seidel", "jacobi", "gauss-seidel-plants", "iterated"] = "gauss-seidel"
+    iteration: Iteration = field(default_factory=Iteration)
+    step_control: StepControl | None = None
     sensing: Literal["ideal", "encoders"] = "ideal"
     mechanism_at: Literal["haptics", "graphics"] = "haptics"
     directions_from: Literal["graphics", "mechanism"] = "graphics"
+    local_model: bool = False
     stop_when: str | None = None
     haptics: Haptics = field(default_factory=Haptics)
     graphics: Graphics | None = None
     linkage: Linkage | None = None
+    contacts: Contacts | None = None
     mechanism: Mechanism = field(default_factory=Mechanism)
     directions: Directions = field(default_factory=Directions)
     device: Device | None = None
     controller: Controller | None = None
     hand: Hand | None = None
+    hands: Mapping[str, Hand] = field(default_factory=dict)
+    fmu: tuple[ForeignFmu, ...] = ()
+    connection: tuple[Wire, ...] = ()
+    faults: Faults = field(default_factory=Faults)
+    isolate: bool = False
+
+    @property
+    def place(self) -> Callable[[tuple[str | int, ...], str], Finding]:
+        """Makes a finding at a path of the scene; where it was read from a file, with its line."""
+        return self.__dict__.get("_place", unplaced)
 
     @property
     def ends_when(self) -> str:

@@ -8,9 +8,11 @@ import math
 from collections.abc import Iterable, Iterator
 
 from hapticlink.components.specs import Linkage
+from hapticlink.orchestrator import contact_checks, coupling_checks, foreign_checks, needs, option_checks
 from hapticlink.orchestrator.conditions import parse_condition
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene import Rate, Scene, VariableRate
+from hapticlink.orchestrator.latency import Latency
+from hapticlink.orchestrator.scene import Graphics, Rate, Scene, VariableRate
 from hapticlink.orchestrator.ticks import exact
 from hapticlink.orchestrator.toml_lines import Path
 
@@ -20,8 +22,12 @@ Problem = tuple[Path, str]
 def check(scene: Scene) -> list[Problem]:
     """Every fault found, in the order of the file's sections."""
     found = [*_numbers(scene), *_rates(scene), *_holds(scene), *_blocks(scene)]
+    found += foreign_checks.check(scene)
     if scene.linkage:
         found += _linkage(scene.linkage)
+    found += contact_checks.check(scene)
+    found += coupling_checks.check(scene)
+    found += option_checks.check(scene)
     return found
 
 
@@ -76,24 +82,60 @@ def _rates(scene: Scene) -> Iterator[Problem]:
             yield path, "frame times must rise: sort them and drop repeated ones"
     else:
         yield from _rate(path, rate)
+    yield from _phase(scene.graphics)
     if scene.graphics.align == "exact" and not isinstance(rate, int | float | str):
         yield ("graphics", "align"), "'exact' needs a fixed rate: rates that vary are on ticks"
+
+
+def _phase(graphics: Graphics) -> Iterator[Problem]:
+    path: Path = ("graphics", "phase")
+    if graphics.phase is None:
+        return
+    if not isinstance(graphics.rate, int | float | str):
+        yield path, "a phase needs a fixed rate: frames of a rate that varies have none"
+        return
+    try:
+        good = exact(graphics.phase) > 0 and exact(graphics.phase) * exact(graphics.rate) <= 1
+    except (ValueError, ZeroDivisionError):
+        return  # told of already, or of the rate
+    if not good:
+        yield path, f"{graphics.phase} s: the first frame ends after 0 and within a period"
 
 
 def _holds(scene: Scene) -> Iterator[Problem]:
     if scene.hold not in HOLDS:
         yield ("hold",), _unknown("hold", scene.hold, HOLDS)
+    if scene.downsampling not in ("latest", "mean"):
+        message = _unknown("downsampling", scene.downsampling, ("latest", "mean"))
+        yield ("downsampling",), message
+    for name, steps in scene.substeps.items():
+        if steps < 1:
+            yield ("substeps", name), f"{steps}: at least 1 substep"
+    for name, late in scene.delays.items():
+        yield from _latency(("delays", name), late)
     for connection, hold in scene.holds.items():
         if hold not in HOLDS:
             yield ("holds", connection), _unknown("hold", hold, HOLDS)
 
 
+def _latency(path: Path, late: float | Latency) -> Iterator[Problem]:
+    given = late if isinstance(late, Latency) else Latency(min=late)
+    if given.min < 0:
+        yield path, f"{given.min} s: a latency is 0 or more"
+    if given.max is not None and given.max < given.min:
+        yield path, f"max = {given.max} s is below min = {given.min} s: swap them"
+    if not 0 <= given.loss <= 1:
+        yield path, f"loss = {given.loss}: a probability is between 0 and 1"
+    if given.seed < 0:
+        yield path, f"{given.seed}: a seed is 0 or more"
+
+
 def _blocks(scene: Scene) -> Iterator[Problem]:
-    if not scene.linkage and not scene.device:
-        yield ("linkage",), "nothing to simulate: give a [linkage], or a [device] at least"
+    if not scene.linkage and not scene.device and not scene.fmu:
+        yield ("linkage",), "nothing to simulate: give a [linkage], a [device] or an [[fmu]]"
     if not scene.linkage:
         for table in ("graphics", "controller"):
-            if getattr(scene, table):
+            if getattr(scene, table) and not (table == "graphics" and scene.fmu):
                 yield (table,), f"[{table}] needs a [linkage]: add one, or take [{table}] out"
     if scene.controller and not scene.device:
         yield ("controller",), "[controller] moves a device: add [device], or take it out"
@@ -104,7 +146,9 @@ def _blocks(scene: Scene) -> Iterator[Problem]:
     if not scene.graphics:
         if scene.mechanism_at == "graphics":
             yield ("mechanism_at",), "there is no graphics rate: add [graphics] with its rate"
-        if scene.controller and scene.directions_from == "graphics":
+        if scene.directions_from == "graphics" and (
+            needs.mobility_from_graphics(scene) or needs.directions_from_graphics(scene)
+        ):
             yield (
                 ("directions_from",),
                 "the controller needs Lambda_inv and P_c: add [graphics], or take "

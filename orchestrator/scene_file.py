@@ -7,15 +7,18 @@ import importlib.resources
 import tomllib
 import typing
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
 
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator import overrides, scene_checks
+from hapticlink.orchestrator import families, overrides, scene_checks
 from hapticlink.orchestrator.faults import Finding, InputFault, SceneFault
+from hapticlink.orchestrator.frame_trace import frame_times
+from hapticlink.orchestrator.latency import Latency
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.scene_problems import beyond, problems
 from hapticlink.orchestrator.toml_lines import Path, key_lines, line_of
@@ -44,19 +47,46 @@ def find(scene: str) -> tuple[str, str]:
 
 
 def load(scene: str, options: Sequence[str] = ()) -> Scene:
-    """Find, change by `options` (`key=value`) and check a scene."""
+    """Find, change by `options` (`key=value`) and check a scene: a file, a shipped one, an SSP."""
+    if scene.endswith(".ssp"):
+        from hapticlink.orchestrator import ssp_read  # its XML parsers take a while to load
+
+        data = ssp_read.tables(FilePath(scene))
+        keys = {overrides.parse(o)[0] for o in options}
+        needed = [("duration", "3")] * ("duration" not in data)
+        needed += [("haptics.rate", "100")] * ("haptics" not in data)
+        if missing := [n for n in needed if tuple(n[0].split(".")) not in keys]:
+            say = "neither it nor its FMUs' DefaultExperiment say: give e.g. --set {}={}"
+            raise SceneFault(scene, [Finding(key, say.format(key, v)) for key, v in missing])
+        return from_tables(data, options, scene, {})
     name, text = find(scene)
-    return read(text, options, name)
+    return read(text, options, name, _folder(scene))
 
 
-def read(text: str, options: Sequence[str] = (), name: str = "scene") -> Scene:
-    """The scene that `text` writes. Raises SceneFault with every finding, InputFault for an
-    option that cannot be applied."""
-    data = _document(text, name)
-    lines = key_lines(text)
-    set_by = {overrides.apply(data, option): option for option in options}
-    if isinstance(data.get("holds"), dict):
-        data["holds"] = dict(_flat(data["holds"]))
+def read(
+    text: str, options: Sequence[str] = (), name: str = "scene", folder: FilePath | None = None
+) -> Scene:
+    """The scene that `text` writes, its relative paths from `folder`. Raises SceneFault with every
+    finding, InputFault for an option that cannot be applied."""
+    return from_tables(_document(text, name, folder), options, name, key_lines(text))
+
+
+def from_tables(
+    data: dict[str, Any], options: Sequence[str], name: str, lines: dict[Path, int]
+) -> Scene:
+    """The scene of the tables `data`, whose keys stand on `lines`; faults as of `read`."""
+    which = [o for o in options if families.is_argument(overrides.parse(o)[0])]
+    set_by = {overrides.apply(data, option): option for option in which}
+    data = _with_family(data, name, lines, set_by)
+    set_by |= {overrides.apply(data, o): o for o in options if o not in which}
+    for table in ("holds", "delays", "kinds"):
+        if isinstance(data.get(table), dict):
+            data[table] = dict(_flat(data[table]))
+    if trace := _trace(data):
+        data["graphics"]["rate"] = frame_times(FilePath(trace["trace"]))
+    for fmu in _tables_of(data, "fmu"):
+        if isinstance(fmu.get("start"), dict):
+            fmu["start"] = dict(_flat(fmu["start"]))
 
     def place(path: Path, message: str) -> Finding:
         key = _dotted(path, data)
@@ -68,7 +98,7 @@ def read(text: str, options: Sequence[str] = (), name: str = "scene") -> Scene:
     try:
         # As JSON, because strict JSON takes arrays for tuples and still refuses "1" for 1.
         document = to_json(data, inf_nan_mode="constants")
-        found = pydantic.TypeAdapter(Scene).validate_json(document)
+        found = _adapter().validate_json(document)
     except pydantic.ValidationError as error:
         found_there = problems(error.errors(include_url=False), data)
         found_there += beyond(found_there, data)
@@ -77,15 +107,33 @@ def read(text: str, options: Sequence[str] = (), name: str = "scene") -> Scene:
         raise SceneFault(name, findings)
     if found.device and found.device.sensing != found.sensing:
         found = replace(found, device=replace(found.device, sensing=found.sensing))
+    object.__setattr__(found, "_place", place)
     return found
 
 
-def _document(text: str, name: str, above: tuple[str, ...] = ()) -> dict[str, Any]:
+@cache
+def _adapter() -> pydantic.TypeAdapter[Scene]:
+    """Making it takes ten times as long as a scene; sweeps read hundreds."""
+    return pydantic.TypeAdapter(Scene)
+
+
+def _folder(scene: str) -> FilePath | None:
+    return FilePath(scene).parent if FilePath(scene).is_file() else None
+
+
+def _document(
+    text: str, name: str, folder: FilePath | None, above: tuple[str, ...] = ()
+) -> dict[str, Any]:
     """The tables of a scene, laid over those of the scene that it `extends`."""
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneFault(name, [Finding("", f"not TOML: {error}")]) from error
+    for fmu in _tables_of(data, "fmu"):
+        if folder and isinstance(fmu.get("path"), str):
+            fmu["path"] = str(folder / fmu["path"])
+    if folder and (trace := _trace(data)):
+        trace["trace"] = str(folder / trace["trace"])
     base = data.pop("extends", None)
     if base is None:
         return data
@@ -93,7 +141,26 @@ def _document(text: str, name: str, above: tuple[str, ...] = ()) -> dict[str, An
         raise InputFault(f"{name}: `extends` runs in a circle: {' -> '.join((*above, base))}")
     if not isinstance(base, str):
         raise SceneFault(name, [Finding("extends", f"{base!r}: write a scene's name or path")])
-    return _laid_over(_document(find(base)[1], base, (*above, base)), data)
+    below = _document(find(base)[1], base, _folder(base), (*above, base))
+    return _laid_over(below, data)
+
+
+def _with_family(
+    data: dict[str, Any], name: str, lines: dict[Path, int], set_by: Mapping[Path, str]
+) -> dict[str, Any]:
+    """The scene with a linkage's `family` and `n` written out as bodies, joints and loops."""
+    linkage = data.get("linkage")
+    if not isinstance(linkage, dict) or "family" not in linkage:
+        return data
+    try:
+        made = families.members(linkage)
+    except families.FamilyError as error:
+        option = f"--set {set_by[error.path]}" if error.path in set_by else None
+        line = line_of(error.path, lines)
+        finding = Finding(".".join(map(str, error.path)), error.message, line, option)
+        raise SceneFault(name, [finding]) from None
+    said = {k: v for k, v in linkage.items() if k not in families.ARGUMENTS}
+    return {**data, "linkage": _laid_over(made, said)}
 
 
 def _laid_over(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
@@ -102,16 +169,37 @@ def _laid_over(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in top.items():
         below = base.get(key)
-        both = isinstance(below, dict) and isinstance(value, dict)
-        alike = both and value.get("type", below.get("type")) == below.get("type")
-        merged[key] = _laid_over(below, value) if alike else value
+        if isinstance(below, dict) and isinstance(value, dict) and _alike(below, value):
+            value = _laid_over(below, value)
+        merged[key] = value
     return merged
+
+
+def _tables_of(data: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
+    """The entries of [[key]] that are tables; what else stands there is told later."""
+    entries = data.get(key)
+    return [e for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
+
+
+def _alike(below: Mapping[str, Any], table: Mapping[str, Any]) -> bool:
+    return bool(table.get("type", below.get("type")) == below.get("type"))
+
+
+def _trace(data: Mapping[str, Any]) -> dict[str, str] | None:
+    """`graphics.rate = { trace = FILE }`, where that is what the scene says."""
+    graphics = data.get("graphics")
+    rate = graphics.get("rate") if isinstance(graphics, dict) else None
+    said = isinstance(rate, dict) and isinstance(rate.get("trace"), str) and len(rate) == 1
+    return rate if said else None
+
+
+LATENCY = {f.name for f in fields(Latency)}
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> typing.Iterator[tuple[str, Any]]:
     """[holds] written with bare dotted keys is nested; its keys are the whole names."""
     for key, value in table.items():
-        if isinstance(value, dict):
+        if isinstance(value, dict) and not value.keys() <= LATENCY:
             yield from _flat(value, f"{prefix}{key}.")
         else:
             yield prefix + key, value

@@ -69,7 +69,7 @@ def _is_needed(path: Path) -> bool:
     """Whether the key at `path` has no default."""
     records = (kind for kind in _tables(path[:-1]) if is_dataclass(kind))
     return any(
-        f.name == path[-1] and f.default is MISSING and f.default_factory is MISSING
+        f.name.rstrip("_") == path[-1] and f.default is MISSING and f.default_factory is MISSING
         for kind in records
         for f in fields(kind)
     )
@@ -90,7 +90,8 @@ def _message(error: Any, path: Path) -> str:
 
 def _keys(path: Path) -> set[str]:
     """The keys that the table at `path` may have, in any branch of a union."""
-    return {f.name for kind in _tables(path) if is_dataclass(kind) for f in fields(kind)}
+    kinds = (kind for kind in _tables(path) if is_dataclass(kind))
+    return {f.name.rstrip("_") for kind in kinds for f in fields(kind)}  # `from_` is a keyword
 
 
 def _tables(path: Path) -> list[Any]:

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from hapticlink.orchestrator.latency import Link
 from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.schemes.operations import Evaluate, Get, Push, Set
+from hapticlink.orchestrator.schemes.operations import Blend, Evaluate, Get, Push, Set
 
 
 class Use(NamedTuple):
@@ -18,23 +19,36 @@ class Use(NamedTuple):
     stamp: int
 
 
-def uses(plan: Plan) -> Iterator[Use]:
-    """Every value given to every input over the whole run, in order."""
+def uses(plan: Plan, until: int | None = None) -> Iterator[Use]:
+    """Every value given to every input over the whole run, or up to a tick, in order."""
     system = plan.system
     connections = {c.name: c for c in system.connections}
     incoming = {u.name: system.into(u.name) for u in system.units}
     got = dict.fromkeys(system.unit, 0)
     pushed = dict.fromkeys(connections, 0)
     held = dict.fromkeys(connections, 0)
+    base = system.timeline.base
+    links = {c.name: Link(c.latency, base) for c in system.connections if c.hold and c.latency}
     for tick, event in plan:
-        for operation in plan.block(event):
+        if until is not None and tick > until:
+            return
+        for operation in plan.unrolled(event):
             match operation:
-                case Get(fmu):
-                    got[fmu] = tick
-                case Push(name):
-                    pushed[name] = got[connections[name].source]
-                case Evaluate(name):
+                case Get(fmu, ahead):
+                    got[fmu] = tick + ahead
+                case Push(name, ahead):
+                    stamp = tick + ahead if ahead else got[connections[name].source]
+                    if name in links:
+                        links[name].send(stamp)
+                    else:
+                        pushed[name] = stamp
+                case Evaluate(name) | Blend(name):
+                    for _, stamp, _ in links[name].arrived(tick) if name in links else ():
+                        pushed[name] = stamp
                     held[name] = pushed[name]
+                case Set(fmu, now) if now:
+                    for c in incoming[fmu]:
+                        yield Use(tick, c.name, got[c.source])
                 case Set(fmu):
                     for c in incoming[fmu]:
                         yield Use(tick, c.name, held[c.name] if c.hold else got[c.source])

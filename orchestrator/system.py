@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 from hapticlink.orchestrator import haptic_loop
 from hapticlink.orchestrator.blocks import blocks
 from hapticlink.orchestrator.conditions import Condition, parse_condition
+from hapticlink.orchestrator.crossings import Refused, assign
 from hapticlink.orchestrator.description import Description, Scalar, describe
-from hapticlink.orchestrator.faults import Finding, InputFault, SceneFault
+from hapticlink.orchestrator.faults import InputFault, SceneFault
+from hapticlink.orchestrator.foreign import Faults
+from hapticlink.orchestrator.iteration import Iteration
+from hapticlink.orchestrator.latency import Latency
+from hapticlink.orchestrator.power import PowerPort
 from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.scene_holds import rules_of, unfit
+from hapticlink.orchestrator.step_control import StepControl
 from hapticlink.orchestrator.ticks import Timeline
+from hapticlink.orchestrator.timeline import clock_of
+from hapticlink.orchestrator.wiring import Ends, Starts, Wiring
 
 
 @dataclass(frozen=True)
@@ -23,6 +32,8 @@ class Unit:
     name: str
     description: Description
     clock: str
+    starts: Starts = ()
+    isolate: bool = False
 
     @property
     def sampled(self) -> bool:
@@ -43,6 +54,8 @@ class Connection:
     outputs: tuple[Scalar, ...]
     inputs: tuple[Scalar, ...]
     hold: str | None = None
+    latency: Latency | None = None
+    kind: str | None = None
 
     @property
     def name(self) -> str:
@@ -55,13 +68,25 @@ class Connection:
 
 @dataclass(frozen=True)
 class System:
-    """What is simulated, on which timeline, in which order of calls."""
+    """What is simulated, on which timeline, in which order of calls.
+
+    power: the ports that carry it. substeps: steps that a plant takes between two reads, its
+    held inputs renewed at each. get_after_set: plants that may be read again after new inputs
+    are set. refused: default holds that did not fit.
+    """
 
     units: tuple[Unit, ...]
     connections: tuple[Connection, ...]
     timeline: Timeline
     coupling: str
     ends_when: Condition | None = None
+    faults: Faults = field(default_factory=Faults)
+    power: tuple[PowerPort, ...] = ()
+    substeps: Mapping[str, int] = field(default_factory=dict)
+    get_after_set: tuple[str, ...] = ()
+    iteration: Iteration = field(default_factory=Iteration)
+    step_control: StepControl | None = None
+    refused: tuple[Refused, ...] = ()
 
     @cached_property
     def unit(self) -> Mapping[str, Unit]:
@@ -77,24 +102,66 @@ class System:
 
 
 def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> System:
-    """The system of `scene` with its FMUs in `files`. Raises SceneFault for names in holds and
-    stop_when that the system does not have."""
-    units = tuple(Unit(b.name, describe(files[b.name]), b.clock) for b in blocks(scene))
-    made = tuple(connect(units, haptic_loop.connections(scene), scene.hold, scene.holds))
-    findings = []
-    for key in scene.holds:
-        named = [c for c in made if key in _names(c)]
-        if not any(c.hold for c in named):
-            crossing = ", ".join(c.name for c in made if c.hold) or "none"
-            why = "does not cross rates" if named else "is no connection of this scene"
-            finding = f"{why}; connections that cross rates: {crossing}"
-            findings.append(Finding(f"holds.{key}", finding))
+    """The system of `scene` with the FMUs of its blocks in `files`. Raises SceneFault for FMUs
+    and connections that do not fit, and for names in holds and stop_when that it does not have."""
+    wiring = Wiring(scene)
+    ours = tuple(Unit(b.name, describe(files[b.name]), b.clock) for b in blocks(scene))
+    foreign = (
+        Unit(fmu.name, description, clock_of(fmu.rate, scene), starts, fmu.isolate)
+        for fmu, description, starts in wiring.fmus()
+    )
+    units = tuple(replace(u, isolate=u.isolate or scene.isolate) for u in (*ours, *foreign))
+    ends = tuple(wiring.ends({u.name: u.description for u in units}))
+    rows = _not_replaced(haptic_loop.connections(scene), ends)
+    wiring.whole(ends, {u.name: u.description for u in ours}, haptic_loop.connections(scene))
+    connected = (
+        *connect(ours, rows, scene.hold, scene.holds),
+        *(_held(e, units, scene.hold, scene.holds) for e in ends),
+    )
+    findings = wiring.findings
+    rules = rules_of(scene, {_between(e): e.hold for e in ends if e.hold})
+    made, refused = assign(units, connected, timeline, rules)
+    findings += unfit(scene, units, made, refused)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(units, condition):
-        findings.append(Finding("stop_when", f"{condition}: there is no such output"))
+        message = f"{condition}: there is no such output"
+        findings.append(scene.place(("stop_when",), message))
     if findings:
         raise SceneFault(scene.title, findings)
-    return System(units, made, timeline, scene.coupling, condition)
+    return System(
+        units,
+        made,
+        timeline,
+        scene.coupling,
+        condition,
+        scene.faults,
+        rules.power,
+        scene.substeps,
+        scene.get_after_set,
+        scene.iteration,
+        scene.step_control,
+        refused,
+    )
+
+
+def _between(e: Ends) -> str:
+    return f"{e.source}.{e.source_port} -> {e.target}.{e.target_port}"
+
+
+def _not_replaced(rows: Iterable[tuple[str, str]], ends: Iterable[Ends]) -> list[tuple[str, str]]:
+    """The loop's own connections whose target no [[connection]] feeds."""
+    fed = {f"{e.target}.{s.port}" for e in ends for s in e.inputs}
+    return [row for row in rows if row[1] not in fed]
+
+
+def _held(e: Ends, units: Iterable[Unit], hold: str, holds: Mapping[str, str]) -> Connection:
+    """The connection of `e`; its own hold goes before [holds], and that before the scene's."""
+    made = Connection(e.source, e.source_port, e.target, e.target_port, e.outputs, e.inputs)
+    clocks = {u.name: u.clock for u in units}
+    if made.initial or clocks[e.source] == clocks[e.target]:
+        return made
+    named = next((holds[key] for key in _names(made) if key in holds), hold)
+    return replace(made, hold=e.hold or named)
 
 
 def connect(

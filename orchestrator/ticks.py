@@ -45,7 +45,7 @@ class Timeline:
     clocks: tuple[Clock, ...]
 
     @cached_property
-    def seconds(self) -> Callable[[int], float]:
+    def seconds(self) -> Callable[[float], float]:
         """The correctly rounded time of a tick (true division of integers rounds once)."""
         numerator, denominator = self.base.numerator, self.base.denominator
         return lambda tick: tick * numerator / denominator
@@ -60,23 +60,35 @@ def common_base(periods: Sequence[Fraction]) -> Fraction:
     return Fraction(math.gcd(*(int(p * denominator) for p in periods)), denominator)
 
 
-def periodic(period: Fraction, base: Fraction, end: int) -> range:
-    """0, 1, 2, ... periods, to two past the end so that every step at the end has one."""
+def periodic(
+    period: Fraction, base: Fraction, end: int, first: Fraction | None = None
+) -> Sequence[int]:
+    """0, 1, 2, ... periods, to two past the end so that every step at the end has one; or 0,
+    `first` (s), and whole periods after that."""
     ticks = period / base
     if ticks.denominator != 1:
         raise ValueError(f"a period of {period} s is not a whole number of ticks of {base} s")
-    return range(0, end + 2 * int(ticks) + 1, int(ticks))
+    if first is None or first == period:
+        return range(0, end + 2 * int(ticks) + 1, int(ticks))
+    begin = first / base
+    if begin.denominator != 1:
+        raise ValueError(f"a phase of {first} s is not a whole number of ticks of {base} s")
+    return (0, *range(int(begin), end + 2 * int(ticks) + 1, int(ticks)))
 
 
-def aligned(period: Fraction, base: Fraction, end: int) -> tuple[int, ...]:
-    """Frame i at the first tick at or after i periods: ceil(i period / base).
+def aligned(
+    period: Fraction, base: Fraction, end: int, first: Fraction | None = None
+) -> tuple[int, ...]:
+    """Frame i at the first tick at or after i periods: ceil(i period / base); or at or after
+    `first` (s) and i - 1 periods.
 
     Raises ValueError for a period shorter than a tick: two frames would fall on one.
     """
     if period < base:
         raise ValueError(f"{1 / period} Hz on ticks of {base} s: take align = 'exact'")
     frames = math.ceil(end * base / period) + 2
-    return tuple(math.ceil(i * period / base) for i in range(frames + 1))
+    early = Fraction(0) if first is None else period - first
+    return (0, *(math.ceil((i * period - early) / base) for i in range(1, frames + 2)))
 
 
 def variable(

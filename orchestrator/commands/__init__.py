@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError
@@ -17,7 +19,11 @@ app = App(
 _COMMANDS = {
     "run": "Run a scene: results, run.json and figures.",
     "build": "Build the FMUs of a scene.",
+    "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
     "info": "Tell what a scene consists of, or which scenes there are.",
+    "sweep": "Run many variants of a scene in parallel: one table and figure.",
+    "study": "Study which hold suits which rate: tables, figures and a page.",
+    "bench": "Measure run time against error, beside other codes.",
     "reproduce": "Make the report's figures and a page of what was found.",
 }
 for _name, _help in _COMMANDS.items():
@@ -26,6 +32,10 @@ for _name, _help in _COMMANDS.items():
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit: 0 done, 1 the run failed (results kept), 2 bad input."""
+    before = signal.getsignal(signal.SIGTERM)
+    on_main = threading.current_thread() is threading.main_thread()
+    if on_main:  # as Ctrl-C, so that what is open is closed and temporary folders are removed
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         status = app(arguments, result_action="return_value", exit_on_error=False)
     except CycloptsError:  # cyclopts has printed it
@@ -33,7 +43,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except Fault as fault:
         print(f"hapticlink: {fault}", file=sys.stderr)
         sys.exit(fault.exit_status)
+    except OSError as error:  # a full disk, a folder that may not be written
+        print(f"hapticlink: {error}", file=sys.stderr)
+        sys.exit(1)
     except KeyboardInterrupt:
         print("hapticlink: interrupted", file=sys.stderr)
         sys.exit(1)
+    finally:
+        if on_main:
+            signal.signal(signal.SIGTERM, before)
     sys.exit(status or 0)

@@ -5,13 +5,17 @@ from __future__ import annotations
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from hapticlink.orchestrator.commands.options import Scene, Set
 
+if TYPE_CHECKING:
+    from hapticlink.orchestrator.ticks import Timeline
+
 
 def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
-    """Tell what a scene consists of: rates, FMUs, connections, holds. Without SCENE, list the
-    shipped scenes."""
+    """Tell what a scene consists of: rates, FMUs, connections, holds; what it needs and leaves out,
+    and what that saves. Without SCENE, list the shipped scenes."""
     from hapticlink.orchestrator import blocks, scene_file, stamps, system, timeline
     from hapticlink.orchestrator.plan import Plan
 
@@ -37,4 +41,32 @@ def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
             age = ages[connection.name]
             note = f"{age['least'] * 1e3:.3g} to {age['most'] * 1e3:.3g}"
         print(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
+    _needs(read, time)
     return 0
+
+
+def _needs(scene: Any, time: Timeline) -> None:
+    from hapticlink.orchestrator import costs, needs
+
+    found = list(needs.needs(scene))
+    for title, needed in (("needed", True), ("left out", False)):
+        print(f"\n{title}")
+        for need in found:
+            if need.needed == needed:
+                print(f"  {need.part}: {need.why}")
+    print("\noperations of a step and of its outputs, signals in and out")
+    rows = {}
+    for title, skip in (("as it is", True), ("nothing left out", False)):
+        rows[title] = costs.costs(scene, time, skip=skip)
+        print(f"  {title}")
+        for row in rows[title]:
+            ports = sum(row.cost.inputs.values()), sum(row.cost.outputs.values())
+            print(
+                f"    {row.name}: {row.cost.step} + {row.cost.output} operations, "
+                f"{ports[0]} + {ports[1]} signals"
+            )
+        operations, signals = (sum(getattr(r, k) for r in rows[title]) for k in _PER_TICK)
+        print(f"    a haptic tick: {operations:.0f} operations, {signals:.0f} signals")
+
+
+_PER_TICK = ("operations", "signals")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-Scene = Annotated[str, Parameter(help="Name of a shipped scene, or path of a scene file.")]
+Scene = Annotated[str, Parameter(help="Name of a shipped scene, or path of a scene file or SSP.")]
 Set = Annotated[
     list[str] | None,
     Parameter(
@@ -22,4 +22,5 @@ Out = Annotated[Path | None, Parameter(help="Folder to write to.")]
 
 def default_folder(root: str, scene: str) -> Path:
     """`runs/<scene>` for a name or a path."""
-    return Path(root) / (Path(scene).stem if scene.endswith(".toml") else Path(scene).name)
+    known = scene.endswith((".toml", ".ssp"))
+    return Path(root) / (Path(scene).stem if known else Path(scene).name)

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
 
+Explain = Annotated[
+    bool, Parameter(negative="", help="Print what runs when, from which samples; run nothing.")
+]
 
-def run(scene: Scene, /, *, out: Out = None, set: Set = None) -> int:
+
+def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain = False) -> int:
     """Run a scene: results as CSV, run.json and figures in OUT (default runs/<scene>)."""
+    if explain:
+        return _explain(scene, set or ())
     from hapticlink.orchestrator import scene_file
     from hapticlink.orchestrator.commands.progress import progress
     from hapticlink.orchestrator.experiment import simulate
@@ -32,3 +42,23 @@ def run(scene: Scene, /, *, out: Out = None, set: Set = None) -> int:
     tables = (f"{clock.name}.csv" for clock in experiment.system.timeline.clocks)
     print(f"  {folder}/: {', '.join([*tables, 'run.json', *figures])}")
     return outcome.fault.exit_status if outcome.fault else 0
+
+
+def _explain(scene: str, options: Sequence[str]) -> int:
+    """Print the plan of a run, and run nothing."""
+    import tempfile
+    from pathlib import Path
+
+    from hapticlink.orchestrator import explain, scene_file
+    from hapticlink.orchestrator.blocks import fmu_files
+    from hapticlink.orchestrator.plan import Plan
+    from hapticlink.orchestrator.system import from_scene
+    from hapticlink.orchestrator.timeline import timeline
+
+    read = scene_file.load(scene, options)
+    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
+        time = timeline(read)
+        system = from_scene(read, time, fmu_files(read, time, Path(room)))
+        for line in explain.explain(Plan(system)):
+            print(line)
+    return 0

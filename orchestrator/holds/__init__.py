@@ -1,29 +1,49 @@
 """What stands on an input between two samples of its source. One hold a file.
 
-Stamps are ticks of the plan's base: `push` gets each sample with the tick it is true at,
-`value` is asked at ticks at or after the newest stamp.
+A hold's class says what it `needs` ("derivative": samples are the signal and then its derivative;
+"power": the connection carries it; or None), and whether it `gives_samples`, unchanged.
 """
 
 from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hapticlink.orchestrator.holds.delayed import Delayed
+from hapticlink.orchestrator.holds.first_order import FirstOrder
+from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDerivative
+from hapticlink.orchestrator.holds.hermite import Hermite
+from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.lead import Lead
+from hapticlink.orchestrator.holds.mean import Mean
+from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
+from hapticlink.orchestrator.holds.passive import Passive
+from hapticlink.orchestrator.holds.second_order import SecondOrder
+from hapticlink.orchestrator.holds.site import Site
+from hapticlink.orchestrator.holds.smooth import Smooth
 from hapticlink.orchestrator.holds.zero_order import ZeroOrder
 
-Vector = NDArray[np.float64]
+
+class HoldType(Protocol):
+    @property
+    def needs(self) -> str | None: ...
+
+    @property
+    def gives_samples(self) -> bool: ...
+
+    def __call__(self, site: Site) -> Hold: ...
 
 
-class Hold(Protocol):
-    def __init__(self, size: int) -> None: ...
-
-    def push(self, stamp: int, sample: Vector) -> None:
-        """Take a sample of the source; `sample` is only valid during the call."""
-
-    def value(self, tick: int) -> Vector:
-        """What the target reads at `tick`."""
-
-
-HOLDS: dict[str, type[Hold]] = {"zoh": ZeroOrder}
+HOLDS: dict[str, HoldType] = {
+    "zoh": ZeroOrder,
+    "lead": Lead,
+    "foh": FirstOrder,
+    "foh-derivative": FirstOrderDerivative,
+    "second-order": SecondOrder,
+    "hermite": Hermite,
+    "delayed": Delayed,
+    "smooth": Smooth,
+    "passive": Passive,
+    "nepce": NearlyEnergyPreserving,
+    "latest": ZeroOrder,
+    "mean": Mean,
+}

@@ -1,17 +1,24 @@
-"""Zero-order hold: the newest sample. A delay of half a period at low frequency."""
+"""Zero-order hold: the newest sample, y_n. Order 1; a delay of half a period at low frequency."""
 
 from __future__ import annotations
+
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.holds.site import Site
+
 
 class ZeroOrder:
-    def __init__(self, size: int) -> None:
-        self._newest = np.zeros(size)
+    needs: ClassVar[str | None] = None
+    gives_samples: ClassVar[bool] = True
 
-    def push(self, stamp: int, sample: NDArray[np.float64]) -> None:
+    def __init__(self, site: Site) -> None:
+        self._newest = np.zeros(site.size)
+
+    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
         self._newest[:] = sample
 
-    def value(self, tick: int) -> NDArray[np.float64]:
+    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
         return self._newest

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.orchestrator.figures import tracking
 from hapticlink.orchestrator.report import draw, measures
 from hapticlink.orchestrator.report.chapter6 import OFF, ON
 from hapticlink.orchestrator.report.entry import Entry, Runs, command
 from hapticlink.orchestrator.results import Results
+from hapticlink.orchestrator.tracking import tracking
 
 SCENE = "closed-loop-b1"
 

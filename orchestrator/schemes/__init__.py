@@ -7,11 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hapticlink.orchestrator.schemes import gauss_seidel, jacobi
+from hapticlink.orchestrator.schemes import gauss_seidel, gauss_seidel_plants, iterated, jacobi
 from hapticlink.orchestrator.schemes.operations import Event, Operation
 from hapticlink.orchestrator.system import System
 
 SCHEMES: dict[str, Callable[[System, Event], tuple[Operation, ...]]] = {
     "gauss-seidel": gauss_seidel.block,
     "jacobi": jacobi.block,
+    "gauss-seidel-plants": gauss_seidel_plants.block,
+    "iterated": iterated.block,
 }
+CAUSAL = frozenset({"gauss-seidel", "jacobi"})
+"""Schemes in which nobody reads a value stamped later than the start of its step."""

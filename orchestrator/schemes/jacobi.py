@@ -18,11 +18,12 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     started = phrases.starting(event, continuous)
     operations: list[Operation] = [*phrases.publish_ended(system, event, continuous)]
     for unit in [*sampled, *started]:
-        operations += phrases.feed(system, unit)
+        operations += phrases.feed(system, event, unit)
     for unit in sampled:
-        operations.append(phrases.step(event, unit))
+        operations += phrases.step(system, event, unit)
     for unit in sampled:
         operations += phrases.publish(system, unit)
     operations += phrases.record(system, event)
-    operations += [phrases.step(event, unit) for unit in started]
+    for unit in started:
+        operations += phrases.step(system, event, unit)
     return tuple(operations)

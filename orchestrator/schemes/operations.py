@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import NamedTuple
 
 
@@ -21,40 +23,55 @@ class Event(NamedTuple):
     firings: tuple[Firing, ...]
 
 
+class Part(NamedTuple):
+    """A step of the plants of a clock by themselves, or the reading at its end."""
+
+    clock: str
+    dticks: int
+    ended: bool = False
+
+
 @dataclass(frozen=True)
 class Get:
-    """Read all outputs of an FMU; they are stamped with the event's tick."""
+    """Read all outputs of an FMU; they are stamped `ahead` of the event's tick."""
 
     fmu: str
+    ahead: int = 0
 
 
 @dataclass(frozen=True)
 class Push:
-    """Give a hold the newest sample of its source."""
+    """Give a hold the newest sample of its source, stamped `ahead` of this tick."""
 
     connection: str
+    ahead: int = 0
 
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Ask a hold for the value of this tick."""
+    """Ask a hold, by what is known at this tick, for its value `ahead` of it: the middle of the
+    step over which a plant takes it, 0 for a sampled block."""
 
     connection: str
+    ahead: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True)
 class Set:
-    """Write all connected inputs of an FMU."""
+    """Write all connected inputs of an FMU; `now` with the sources' newest outputs, no holds."""
 
     fmu: str
+    now: bool = False
 
 
 @dataclass(frozen=True)
 class Step:
-    """fmi2DoStep from this tick over `dticks`."""
+    """fmi2DoStep from this tick over `dticks`, or over part `part` of `parts` of it."""
 
     fmu: str
     dticks: int
+    part: int = 0
+    parts: int = 1
 
 
 @dataclass(frozen=True)
@@ -69,4 +86,68 @@ class StopWhen:
     """End the run in good order if the system's condition holds."""
 
 
-Operation = Get | Push | Evaluate | Set | Step | Record | StopWhen
+@dataclass(frozen=True)
+class Blend:
+    """Ask a hold for a weighted sum of its values: each (weight, `ahead` of this tick)."""
+
+    connection: str
+    points: tuple[tuple[float, Fraction], ...]
+
+
+@dataclass(frozen=True)
+class Save:
+    """Keep the state of an FMU (fmi2GetFMUstate)."""
+
+    fmu: str
+
+
+@dataclass(frozen=True)
+class Rollback:
+    """Take an FMU back to the state that was saved (fmi2SetFMUstate)."""
+
+    fmu: str
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """Carry out `guess` and `body` until the outputs at the end of the step of `dticks` are those
+    that `guess` has handed to the `connections`; `again` goes before every repetition."""
+
+    connections: tuple[str, ...]
+    dticks: int
+    guess: tuple[Push, ...]
+    body: tuple[Operation, ...]
+    again: tuple[Operation, ...]
+
+
+@dataclass(frozen=True)
+class Advance:
+    """Take the plants of a clock over `dticks` in steps that the step control chooses."""
+
+    clock: str
+    dticks: int
+
+
+Operation = (
+    Get
+    | Push
+    | Evaluate
+    | Blend
+    | Set
+    | Step
+    | Save
+    | Rollback
+    | Repeat
+    | Advance
+    | Record
+    | StopWhen
+)
+
+
+def flat(block: Iterable[Operation]) -> Iterator[Operation]:
+    """The operations of a block, a repetition carried out once."""
+    for operation in block:
+        if isinstance(operation, Repeat):
+            yield from (*operation.guess, *flat(operation.body))
+        else:
+            yield operation

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
+from fractions import Fraction
 
 from hapticlink.orchestrator.schemes.operations import (
     Evaluate,
@@ -25,39 +26,69 @@ def firing(system: System, event: Event) -> tuple[list[Unit], list[Unit]]:
     return [u for u in due if u.sampled], [u for u in due if not u.sampled]
 
 
+def without_steps(event: Event, clocks: Container[str] | None = None) -> Event:
+    """The same instant, at which no plant, or none of some clocks, starts a step."""
+    firings = (
+        f._replace(final=f.final or clocks is None or f.clock in clocks) for f in event.firings
+    )
+    return event._replace(firings=tuple(firings))
+
+
 def starting(event: Event, continuous: list[Unit]) -> list[Unit]:
     """The plants that start a step; a step past the end of the run is not started."""
     started = {f.clock for f in event.firings if not f.final}
     return [u for u in continuous if u.clock in started]
 
 
-def publish(system: System, unit: Unit) -> Iterator[Operation]:
+def publish(system: System, unit: Unit, ahead: int = 0) -> Iterator[Operation]:
     """Read the outputs, and hand them to the holds behind them."""
-    yield Get(unit.name)
+    yield Get(unit.name, ahead)
     for connection in system.out_of(unit.name):
         if connection.hold:
-            yield Push(connection.name)
+            yield Push(connection.name, ahead)
 
 
 def publish_ended(system: System, event: Event, continuous: list[Unit]) -> Iterator[Operation]:
-    """The outputs of the plants whose steps end here; initialisation has read the first."""
+    """The outputs of the plants whose steps end here; initialisation has read the first.
+
+    Those that may be read after new inputs are set show their feed-through of this tick.
+    """
     if not event.first:
         for unit in continuous:
             yield from publish(system, unit)
+        for unit in continuous:
+            if unit.name in system.get_after_set and system.into(unit.name):
+                yield Set(unit.name, now=True)
+                yield from publish(system, unit)
 
 
-def feed(system: System, unit: Unit) -> Iterator[Operation]:
-    """Set the inputs, held ones at their value of this tick."""
+def feed(system: System, event: Event, unit: Unit, part: int = 0) -> Iterator[Operation]:
+    """Set the inputs. A plant takes them over its whole step or substep, so it gets what a hold
+    gives for the middle of it; a sampled block what it gives for this tick."""
     incoming = system.into(unit.name)
+    ahead = Fraction(0)
+    if not unit.sampled:
+        ahead = Fraction(
+            (2 * part + 1) * dticks(event, unit), 2 * system.substeps.get(unit.name, 1)
+        )
     for connection in incoming:
         if connection.hold:
-            yield Evaluate(connection.name)
+            yield Evaluate(connection.name, ahead)
     if incoming:
         yield Set(unit.name)
 
 
-def step(event: Event, unit: Unit) -> Step:
-    return Step(unit.name, next(f.dticks for f in event.firings if f.clock == unit.clock))
+def dticks(event: Event, unit: Unit) -> int:
+    return next(f.dticks for f in event.firings if f.clock == unit.clock)
+
+
+def step(system: System, event: Event, unit: Unit) -> Iterator[Operation]:
+    """The step of an FMU that has been fed, with the substeps that a plant is asked to take."""
+    parts = 1 if unit.sampled else system.substeps.get(unit.name, 1)
+    for part in range(parts):
+        if part:
+            yield from feed(system, event, unit, part)
+        yield Step(unit.name, dticks(event, unit), part, parts)
 
 
 def record(system: System, event: Event) -> Iterator[Operation]:

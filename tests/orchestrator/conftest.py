@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,6 +15,17 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.description import describe
 from hapticlink.orchestrator.system import System, Unit, connect
 from hapticlink.orchestrator.ticks import Timeline
+
+
+@pytest.fixture(autouse=True)
+def own_temporary_folder(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> Path:
+    """Where temporary folders land, so that what a test leaves behind is its own."""
+    folder = tmp_path_factory.mktemp("temporary")
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    return folder
 
 
 def clock(name: str, timing: str, inputs: Sequence[str]) -> Component:

@@ -76,7 +76,7 @@ def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) ->
     [
         (["run", "no-such-scene"], "neither a file nor a shipped scene"),
         (["run", "closed-loop", "--set", "controler.topology=false"], "did you mean 'controller'"),
-        (["run", "closed-loop", "--set", "holds.hand.F=zoh"], "does not cross rates"),
+        (["run", "closed-loop", "--set", "holds.hand.G=zoh"], "is no connection of this"),
         (["run", "closed-loop", "--set", "stop_when=hand.G<0"], "there is no such output"),
         (["run", "closed-loop", "--bogus"], "Unknown option"),
         (["fly"], "Unknown command"),

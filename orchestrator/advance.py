@@ -1,0 +1,170 @@
+"""The operation Advance carried out: the plants of a clock, step by step, to its next tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.board import Board
+from hapticlink.orchestrator.crossings import port
+from hapticlink.orchestrator.fmu import Instance
+from hapticlink.orchestrator.holds import Hold
+from hapticlink.orchestrator.meters import Meters
+from hapticlink.orchestrator.schemes.operations import Part
+from hapticlink.orchestrator.step_control import (
+    ORDER,
+    Steps,
+    integral,
+    proportional_integral,
+    rounded,
+)
+from hapticlink.orchestrator.system import System
+from hapticlink.orchestrator.ticks import exact
+
+Call = Callable[[int], object]
+SLOT = 1
+"""Of the saved states; slot 0 is the iteration's."""
+
+
+class Advancer:
+    """The steps of one clock. `calls` gives the bound operations of a step."""
+
+    def __init__(
+        self,
+        clock: str,
+        system: System,
+        board: Board,
+        instances: Mapping[str, Instance],
+        holds: Mapping[str, Hold],
+        meters: Meters,
+        calls: Callable[[Part], Sequence[Call]],
+    ) -> None:
+        assert system.step_control is not None
+        self._settings = settings = system.step_control
+        self._clock, self._values, self._meters = clock, board.values, meters
+        self._calls, self._seconds = calls, system.timeline.seconds
+        base, longest = system.timeline.base, system.timeline.clock(clock).longest
+        self._least = max(int(exact(settings.min) / base), 1)
+        most = longest if settings.max is None else int(exact(settings.max) / base)
+        self._most = max(min(most, longest), self._least)
+        self._size = float(self._least)
+        self._before, self.steps = 0.0, Steps()
+        plants = [u.name for u in system.units if u.clock == clock and not u.sampled]
+        self._instances = [instances[n] for n in plants]
+        self._outputs = _compared(system, board, plants)
+        between = [
+            c
+            for c in system.connections
+            if c.source in plants and c.target in plants and not c.initial
+        ]
+        self._order = min((ORDER.get(c.hold or "", 1) for c in between), default=1)
+        ours = [c for c in system.connections if c.hold and {c.source, c.target} & {*plants}]
+        self._holds = [holds[c.name] for c in ours]
+        self._bonds = []
+        for c in between:
+            if found := port(c, system.power):
+                moved = board.port(system.unit[c.target], found.displacement.partition(".")[2])
+                self._bonds.append((board.sources(c), board.places(c), moved))
+
+    def advance(self, tick: int, dticks: int) -> None:
+        take = self._double if self._settings.method == "doubling" else self._trust
+        at = 0
+        while at < dticks:
+            at += take(tick + at, self._fitting(dticks - at))
+
+    def _fitting(self, left: int) -> int:
+        """A step that divides what is left evenly, or nearly so."""
+        self._size = size = min(max(self._size, self._least), self._most)
+        parts = -int(-left // size)
+        return left if parts == 1 else min(max(rounded(left / parts), self._least), left)
+
+    def _aim(self, size: float, growth: float) -> None:
+        """The next step, at most `growth` times what was aimed at; a step that was cut short to
+        land on a tick does not count as aim."""
+        self._size = min(max(size, 0.2 * self._size), growth * self._size)
+
+    def _step(self, tick: int, dticks: int) -> None:
+        for call in self._calls(Part(self._clock, dticks)):
+            call(tick)
+
+    def _read(self, tick: int) -> None:
+        for call in self._calls(Part(self._clock, 0, ended=True)):
+            call(tick)
+
+    # --- doubling -------------------------------------------------------------------------
+
+    def _double(self, tick: int, size: int) -> int:
+        """Ticks that were taken: `size`, or 0 where the step was taken back."""
+        if size < 2:
+            self._step(tick, size)
+            self._read(tick + size)
+            self.steps.count(self._seconds(size), True)
+            self._size = 2.0
+            return size
+        saved = self._save()
+        self._step(tick, size)
+        self._read(tick + size)
+        whole = self._values[self._outputs]
+        self._restore(saved)
+        half = size // 2
+        for at, dticks in ((tick, half), (tick + half, size - half)):
+            self._step(at, dticks)
+            self._read(at + dticks)
+        halves = self._values[self._outputs]
+        share = np.abs(halves - whole) / (1.0 + np.abs(halves)) / (2**self._order - 1)
+        error = float(share.max(initial=0.0)) / self._seconds(size) / self._settings.tolerance
+        self._aim(size * integral(error, self._order), 2.0)
+        if error > 1.0 and size > self._least:
+            self._restore(saved)
+            self.steps.rejected += 1
+            return 0
+        self.steps.count(self._seconds(size), error > 1.0)
+        return size
+
+    def _save(self) -> Any:
+        for instance in self._instances:
+            instance.save(SLOT)
+        holds = [deepcopy(vars(hold)) for hold in self._holds]
+        return self._values.copy(), holds, self._meters.mark(deep=True)
+
+    def _restore(self, saved: Any) -> None:
+        values, holds, mark = saved
+        for instance in self._instances:
+            instance.rollback(SLOT)
+        self._values[:] = values
+        for hold, kept in zip(self._holds, holds, strict=True):
+            vars(hold).update(deepcopy(kept))
+        self._meters.back(mark)
+
+    # --- ecco -----------------------------------------------------------------------------
+
+    def _trust(self, tick: int, size: int) -> int:
+        self._step(tick, size)
+        values = self._values
+        began = [tuple(values[places] for places in bond) for bond in self._bonds]
+        self._read(tick + size)
+        error = 0.0
+        for (source, held, x), (sources, _, moved) in zip(began, self._bonds, strict=True):
+            residual = (held - (source + values[sources]) / 2) @ (values[moved] - x)
+            error = max(error, abs(float(residual)))
+        assert self._settings.energy is not None
+        error /= self._settings.tolerance * self._settings.energy
+        # Slowly: a residual energy passes through 0 twice in a period, where it says nothing.
+        self._aim(size * proportional_integral(error, self._before, self._order + 1), 1.2)
+        self._before = error
+        self.steps.count(self._seconds(size), error > 1.0 and size <= self._least)
+        return size
+
+
+def _compared(system: System, board: Board, plants: Sequence[str]) -> list[int]:
+    """The outputs whose error counts: those that do not depend directly on an input, which at the
+    end of a step is still that of the step before; all where there are no others."""
+    every = [
+        (board.scalar(n, s.name), system.unit[n].description.follows(s))
+        for n in plants
+        for s in system.unit[n].description.outputs
+    ]
+    return [place for place, follows in every if not follows] or [place for place, _ in every]

@@ -1,0 +1,27 @@
+"""`hapticlink study`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from hapticlink.orchestrator.commands.options import Out
+from hapticlink.orchestrator.commands.sweep import Jobs
+
+
+def study(*, out: Out = None, jobs: Jobs = None) -> int:
+    """Study rates, holds and coupling: tables, figures and a page in OUT (default
+    results/mismatch). Its runs are kept in sweeps/mismatch, so that it goes on after an
+    interruption."""
+    from hapticlink.orchestrator.commands.progress import counted
+    from hapticlink.orchestrator.study import cases
+    from hapticlink.orchestrator.study import study as make
+
+    made = cases.jobs()
+    with counted("study", len(made)) as tell:
+        page = make(
+            made, out or Path("results/mismatch"), Path("sweeps/mismatch"),
+            jobs or os.cpu_count() or 1, tell,
+        )  # fmt: skip
+    print(page)
+    return 0

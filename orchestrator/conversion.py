@@ -1,0 +1,63 @@
+"""Units of a connection: the same, convertible, or a mistake.
+
+FMI 2.0.5 section 2.2.2 and FMI 3.0 section 2.4.3: a unit is factor x (product of powers of
+kg, m, s, A, K, mol, cd, rad) + offset, so y_base = factor y + offset and a signal goes from unit
+a to b by y_b = (f_a/f_b) y_a + (o_a - o_b)/f_b. An offset does not count for differences
+(relativeQuantity).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit by name; base holds the exponents of BASES, None where the FMU does not say."""
+
+    name: str
+    base: tuple[int, ...] | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+@dataclass(frozen=True)
+class Linear:
+    """factor x + offset."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def after(self, first: Linear) -> Linear:
+        """This one of what `first` gives."""
+        return Linear(self.factor * first.factor, self.factor * first.offset + self.offset)
+
+
+SAME = Linear()
+
+
+def conversion(source: Unit | None, target: Unit | None, relative: bool = False) -> Linear:
+    """From `source` to `target`; SAME where one of the two has no unit.
+
+    Raises ValueError, saying why, where there is none.
+    """
+    if source is None or target is None:
+        return SAME
+    if source.base is None or target.base is None:
+        if source.name == target.name:
+            return SAME
+        unknown = source.name if source.base is None else target.name
+        raise ValueError(f"{unknown} has no BaseUnit in its FMU, so it cannot be converted")
+    if source.base != target.base:
+        raise ValueError(f"{_written(source)} is not {_written(target)}")
+    offset = 0.0 if relative else (source.offset - target.offset) / target.factor
+    return Linear(source.factor / target.factor, offset)
+
+
+def _written(unit: Unit) -> str:
+    assert unit.base is not None
+    powers = ((b, n) for b, n in zip(BASES, unit.base, strict=True) if n)
+    return ".".join(b if n == 1 else f"{b}{n}" for b, n in powers) or "1"

@@ -1,0 +1,150 @@
+"""Which hold stands on which connection, and why a default does not.
+
+[holds], [delays] and [kinds] speak of a connection as `source -> target`, by its target's port
+or by its source's port (all connections from there), the most precise first. Without a word of
+its own, a connection from a slower clock takes the scene's `hold`, one from a faster clock its
+`downsampling`; one within a rate holds nothing unless it is named or late. A hold that keeps
+account of energy goes, as a default, to every connection across rates that carries power.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.holds.kinds import KINDS
+from hapticlink.orchestrator.iteration import INTERPOLATING
+from hapticlink.orchestrator.latency import Latency
+from hapticlink.orchestrator.power import PowerPort
+from hapticlink.orchestrator.ticks import Timeline
+
+if TYPE_CHECKING:
+    from hapticlink.orchestrator.system import Connection, Unit
+
+DERIVATIVES = {"x": "v", "v": "a", "q": "qd", "qd": "qdd", "x_true": "v_true"}
+"""The port of a source that is the derivative of another; `der(y)` is that of any y."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a scene says of its connections."""
+
+    hold: str = "zoh"
+    downsampling: str = "latest"
+    holds: Mapping[str, str] = field(default_factory=dict)
+    delays: Mapping[str, Latency] = field(default_factory=dict)
+    kinds: Mapping[str, str] = field(default_factory=dict)
+    power: tuple[PowerPort, ...] = ()
+    between_plants: str | None = None
+    """The hold within a rate between plants that are iterated; None where they are not."""
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A hold that does not fit: `key` is where the scene asks for it, None for the default."""
+
+    key: str | None
+    connection: Connection
+    hold: str
+    reason: str
+
+
+def names(c: Connection) -> tuple[str, str, str]:
+    """The names under which a scene may speak of a connection, the most precise first."""
+    return (c.name, f"{c.target}.{c.target_port}", f"{c.source}.{c.source_port}")
+
+
+def port(c: Connection, power: Iterable[PowerPort]) -> PowerPort | None:
+    """The power that a connection carries."""
+    return next((p for p in power if p.effort == f"{c.target}.{c.target_port}"), None)
+
+
+def derivative(c: Connection, units: Mapping[str, Unit]) -> str | None:
+    """The port of the source that is the derivative of what the connection carries."""
+    description = units[c.source].description
+    for name in (f"der({c.source_port})", DERIVATIVES.get(c.source_port)):
+        if name and len(description.port(name, "output")) == len(c.outputs):
+            return name
+    return None
+
+
+def assign(
+    units: Iterable[Unit], connections: Iterable[Connection], timeline: Timeline, rules: Rules
+) -> tuple[tuple[Connection, ...], tuple[Refused, ...]]:
+    """The connections with their holds, latencies and kinds, and the holds that were refused."""
+    by_name = {u.name: u for u in units}
+    refused: list[Refused] = []
+    assigned = tuple(_assign(connections, by_name, timeline, rules, refused))
+    if rules.hold not in {c.hold for c in assigned}:
+        # A default that fits nowhere is a mistake where it needs something that is nowhere.
+        refused = [replace(r, key=r.key or "hold") for r in refused]
+    return assigned, tuple(refused)
+
+
+def _assign(
+    connections: Iterable[Connection],
+    units: Mapping[str, Unit],
+    timeline: Timeline,
+    rules: Rules,
+    refused: list[Refused],
+) -> Iterator[Connection]:
+    for c in connections:
+        if c.initial:
+            yield c
+            continue
+        source, target = (units[n].clock for n in (c.source, c.target))
+        key = next((k for k in names(c) if k in rules.holds), None)
+        latency = next((rules.delays[k] for k in names(c) if k in rules.delays), None)
+        hold = rules.holds[key] if key else c.hold
+        if not key and source != target:
+            slower = timeline.clock(source).longest > timeline.clock(target).longest
+            energy = HOLDS[rules.hold].needs == "power"
+            hold = rules.hold if slower or energy else rules.downsampling
+        elif latency and not hold:
+            hold = "zoh"
+        iterated = rules.between_plants if _between_plants(c, units) else None
+        hold = hold or iterated
+        reason = hold and _misfit(hold, c, units, rules.power, iterated is not None)
+        if hold and reason:
+            refused.append(Refused(key, c, hold, reason))
+            hold = "foh" if iterated else "zoh"
+        named = (k for k in names(c) if k in rules.kinds)
+        kind = next((rules.kinds[k] for k in named), KINDS.get(c.source_port))
+        if kind in ("projector", "semidefinite") and round(len(c.inputs) ** 0.5) ** 2 != len(
+            c.inputs
+        ):
+            kind = None
+        yield replace(c, hold=hold, latency=latency, kind=kind if hold else None)
+
+
+def _between_plants(c: Connection, units: Mapping[str, Unit]) -> bool:
+    """Whether two plants of a rate are connected."""
+    source, target = units[c.source], units[c.target]
+    return source.clock == target.clock and not source.sampled and not target.sampled
+
+
+def _misfit(
+    hold: str,
+    c: Connection,
+    units: Mapping[str, Unit],
+    power: Iterable[PowerPort],
+    iterated: bool,
+) -> str | None:
+    """Why a hold cannot stand on a connection."""
+    needs = HOLDS[hold].needs
+    if iterated and hold not in INTERPOLATING:
+        return f"coupling = 'iterated' interpolates here; take one of {', '.join(INTERPOLATING)}"
+    if needs == "derivative" and derivative(c, units) is None:
+        known = DERIVATIVES.get(c.source_port, f"der({c.source_port})")
+        return (
+            f"{c.source} does not put out the derivative of {c.source_port} ({known}); "
+            "take 'foh', which makes it from two samples"
+        )
+    if needs == "power" and port(c, power) is None:
+        return (
+            f"{c.name} carries no power: no [[power]] pairs {c.target}.{c.target_port} with a "
+            "displacement, so there is no energy to keep account of"
+        )
+    return None

@@ -1,0 +1,69 @@
+"""What [[fmu]], [[connection]] and [faults] must say before any FMU is opened; `wiring` checks them
+against the FMUs themselves. Each check yields (path in the file, message with remedy)."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path as FilePath
+
+from hapticlink.orchestrator.blocks import blocks
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.ticks import exact
+from hapticlink.orchestrator.toml_lines import Path
+
+Problem = tuple[Path, str]
+
+
+def check(scene: Scene) -> Iterator[Problem]:
+    """Every fault found, in the order of the file."""
+    taken = [b.name for b in blocks(scene)]
+    for i, fmu in enumerate(scene.fmu):
+        path: Path = ("fmu", i)
+        if not re.fullmatch(r"\w+", fmu.name):
+            yield (*path, "name"), f"{fmu.name!r}: letters, digits and _ only; others write name.y"
+        elif fmu.name in taken:
+            yield (*path, "name"), f"{fmu.name!r} is taken: give every FMU and block its own name"
+        taken.append(fmu.name)
+        if not FilePath(fmu.path).is_file():
+            yield (*path, "path"), f"there is no file {fmu.path}"
+        yield from _rate((*path, "rate"), fmu.rate, scene)
+    for i, wire in enumerate(scene.connection):
+        for key, end in (("from", wire.from_), ("to", wire.to)):
+            fmu_name, dot, variable = end.partition(".")
+            if not dot or not variable:
+                yield ("connection", i, key), f"{end!r}: write fmu.variable"
+            elif fmu_name not in taken:
+                yield ("connection", i, key), unknown("FMU", fmu_name, taken)
+        if wire.hold is not None and wire.hold not in HOLDS:
+            yield ("connection", i, "hold"), unknown("hold", wire.hold, HOLDS)
+        if wire.factor == 0:
+            yield ("connection", i, "factor"), "0.0 passes nothing on: take the connection out"
+    if scene.faults.timeout <= 0:
+        yield ("faults", "timeout"), f"{scene.faults.timeout} s: a timeout is more than 0"
+
+
+def _rate(path: Path, rate: int | float | str, scene: Scene) -> Iterator[Problem]:
+    if rate == "haptics":
+        return
+    if rate == "graphics":
+        if scene.graphics is None:
+            yield path, "there is no graphics rate: add [graphics] with its rate"
+        return
+    try:
+        good = exact(rate) > 0
+    except (ValueError, ZeroDivisionError):
+        yield path, f"{rate!r}: write 'haptics', 'graphics', or a rate as 30 or '30000/1001' (Hz)"
+        return
+    if not good:
+        yield path, f"{rate} Hz: a rate is more than 0"
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    """That there is no `kind` of this name, with the nearest that there is."""
+    known = list(known)
+    near = difflib.get_close_matches(name, known, 1)
+    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known) or 'none'}"
+    return f"no {kind} {name!r}; {hint}"

@@ -1,0 +1,30 @@
+"""First-order hold: y_n + (y_n - y_{n-1}) s/H with s = t - t_n and H = t_n - t_{n-1}.
+
+Order 2, no delay at low frequency; amplifies at most 1.59-fold, at omega H = 2.13. With one
+sample, that sample.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.site import Site
+
+
+class FirstOrder:
+    needs: ClassVar[str | None] = None
+    gives_samples: ClassVar[bool] = False
+
+    def __init__(self, site: Site) -> None:
+        self._samples = History(2)
+
+    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
+        self._samples.push(stamp, sample)
+
+    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+        stamp, newest = self._samples[-1]
+        return newest + self._samples.slope() * (tick - stamp + ahead)

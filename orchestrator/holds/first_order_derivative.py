@@ -1,0 +1,32 @@
+"""First-order hold from the source's own derivative: y_n + yd_n s with s = t - t_n.
+
+Order 2, no delay at low frequency, right from the first sample, and deaf to the noise that a
+difference of samples amplifies. The source must put its derivative out too (v beside x): a
+sample is y, then yd (1/s of y's unit).
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.holds.site import Site
+
+
+class FirstOrderDerivative:
+    needs: ClassVar[str | None] = "derivative"
+    gives_samples: ClassVar[bool] = False
+
+    def __init__(self, site: Site) -> None:
+        self._size, self._seconds = site.size, site.seconds
+        self._stamp = 0
+        self._newest, self._slope = np.zeros(site.size), np.zeros(site.size)
+
+    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
+        self._stamp = stamp
+        self._newest[:], self._slope[:] = sample[: self._size], sample[self._size :]
+
+    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+        return self._newest + self._slope * self._seconds(tick - self._stamp + ahead)

@@ -1,0 +1,44 @@
+"""Hermite: the cubic through the two newest samples and their derivatives.
+
+With s = (t - t_{n-1})/H, H = t_n - t_{n-1}: h00 y_{n-1} + h10 H yd_{n-1} + h01 y_n + h11 H yd_n,
+h00 = (1 + 2 s)(1 - s)^2, h10 = s (1 - s)^2, h01 = s^2 (3 - 2 s), h11 = s^2 (s - 1). Order 4. Made
+for interpolation (coupling = "iterated"); extrapolated it amplifies more than second order. From
+one sample, the first-order hold of its derivative.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.site import Site
+
+
+class Hermite:
+    needs: ClassVar[str | None] = "derivative"
+    gives_samples: ClassVar[bool] = False
+
+    def __init__(self, site: Site) -> None:
+        self._size, self._seconds = site.size, site.seconds
+        self._samples = History(2)
+
+    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
+        self._samples.push(stamp, sample)
+
+    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+        n = self._size
+        stamp, newest = self._samples[-1]
+        if len(self._samples) < 2:
+            return newest[:n] + newest[n:] * self._seconds(tick - stamp + ahead)
+        before, first = self._samples[0]
+        s, width = (tick - before + ahead) / (stamp - before), self._seconds(stamp - before)
+        kept, gone = (1 - s) * (1 - s), s * s
+        return (
+            (1 + 2 * s) * kept * first[:n]
+            + s * kept * width * first[n:]
+            + (3 - 2 * s) * gone * newest[:n]
+            + (s - 1) * gone * width * newest[n:]
+        )

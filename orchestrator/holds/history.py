@@ -1,0 +1,36 @@
+"""The newest samples of a source, with their stamps."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+
+
+class History:
+    """At most `depth` samples, oldest first; a second sample of one stamp takes the place of the
+    first."""
+
+    def __init__(self, depth: int) -> None:
+        self._samples: deque[tuple[int, Vector]] = deque(maxlen=depth)
+
+    def push(self, stamp: int, sample: Vector) -> None:
+        if self._samples and self._samples[-1][0] == stamp:
+            self._samples.pop()
+        self._samples.append((stamp, sample.copy()))
+
+    def __len__(self) -> int:
+        return len(self._samples)
+
+    def __getitem__(self, index: int) -> tuple[int, Vector]:
+        return self._samples[index]
+
+    def slope(self, index: int = -1) -> Vector:
+        """The backward difference at a sample, per tick; 0 where there is none before it."""
+        if len(self) + index < 1:
+            return np.zeros_like(self[index][1])
+        (before, first), (stamp, sample) = self[index - 1], self[index]
+        return (sample - first) / (stamp - before)

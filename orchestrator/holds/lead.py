@@ -1,0 +1,30 @@
+"""Half-step lead: y_n + (y_n - y_{n-1})/2, constant until the next sample.
+
+The first-order hold at the middle of a period: order 2 where the target takes a constant input,
+and no delay at low frequency. With one sample, that sample.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.site import Site
+
+
+class Lead:
+    needs: ClassVar[str | None] = None
+    gives_samples: ClassVar[bool] = False
+
+    def __init__(self, site: Site) -> None:
+        self._samples = History(2)
+
+    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
+        self._samples.push(stamp, sample)
+
+    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+        newest = self._samples[-1][1]
+        return newest + (newest - self._samples[0][1]) / 2

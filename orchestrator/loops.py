@@ -1,0 +1,137 @@
+"""The operation Repeat carried out: plants step until their outputs are those that were guessed."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hapticlink.orchestrator.board import Board
+from hapticlink.orchestrator.crossings import derivative
+from hapticlink.orchestrator.faults import Fault
+from hapticlink.orchestrator.fixed_points import SOLVERS, Found, Newton, Vector
+from hapticlink.orchestrator.holds import HOLDS, Hold
+from hapticlink.orchestrator.iteration import Iteration
+from hapticlink.orchestrator.meters import Meters
+from hapticlink.orchestrator.schemes.operations import Repeat
+from hapticlink.orchestrator.system import Connection, System
+
+Call = Callable[[int], object]
+
+
+@dataclass
+class Iterations:
+    """What a run's loops did: steps that were iterated, times that their plants stepped in all,
+    rollbacks, the most iterations of a step, Jacobians made, steps that did not converge."""
+
+    steps: int = 0
+    iterations: int = 0
+    rollbacks: int = 0
+    most: int = 0
+    jacobians: int = 0
+    unconverged: int = 0
+
+
+def total(counts: Iterable[Iterations]) -> Iterations | None:
+    """Of all loops of a run; None where it has none."""
+    found = None
+    for c in counts:
+        found = found or Iterations()
+        for name, value in vars(c).items():
+            merged = max if name == "most" else operator.add
+            setattr(found, name, merged(getattr(found, name), value))
+    return found
+
+
+class Unconverged(Fault):
+    """Plants that do not agree; names the connection that differs most."""
+
+
+class Loop:
+    """One Repeat, its operations bound: `guess` hands the board to the holds, `body` steps, `again`
+    rolls back."""
+
+    def __init__(
+        self,
+        operation: Repeat,
+        system: System,
+        board: Board,
+        holds: Mapping[str, Hold],
+        calls: tuple[Sequence[Call], Sequence[Call], Sequence[Call]],
+        meters: Meters,
+    ) -> None:
+        self._guess, self._body, self._again = calls
+        self._settings: Iteration = system.iteration
+        self._board, self._meters, self._dticks = board, meters, operation.dticks
+        self.counts = Iterations()
+        self._seconds = system.timeline.seconds
+        connections = [c for c in system.connections if c.name in operation.connections]
+        self._held = [(holds[c.name], board.sources(c)) for c in connections if c.hold]
+        self._places: list[int] = []
+        self._names: list[str] = []
+        for c in connections:
+            for place in _read(c, system, board):
+                if place not in self._places:
+                    self._places.append(place)
+                    self._names.append(c.name)
+        self._solver = SOLVERS[self._settings.method]()
+
+    def __call__(self, tick: int) -> None:
+        values, places, counts = self._board.values, self._places, self.counts
+        began = False
+
+        def residual(point: Vector) -> Vector:
+            nonlocal began
+            if began:
+                counts.rollbacks += 1
+                for call in self._again:
+                    call(tick)
+                self._meters.back(mark)
+            began = True
+            values[places] = point
+            for calls in (self._guess, self._body):
+                for call in calls:
+                    call(tick)
+            return values[places] - point
+
+        for hold, sources in self._held:
+            values[sources] = hold.value(tick, self._dticks)[: len(sources)]
+        mark = self._meters.mark()
+        before = counts.rollbacks
+        settings = self._settings
+        start = values[places]
+        found = self._solver.solve(residual, start, settings.tolerance, settings.most)
+        counts.steps += 1
+        counts.iterations += 1 + counts.rollbacks - before
+        counts.most = max(counts.most, found.iterations)
+        if isinstance(self._solver, Newton):
+            counts.jacobians += self._solver.jacobians
+            self._solver.jacobians = 0
+        if not found.error <= settings.tolerance:
+            self._unconverged(found, tick)
+
+    def _unconverged(self, found: Found, tick: int) -> None:
+        self.counts.unconverged += 1
+        if self._settings.unconverged == "accept" and np.isfinite(found.error):
+            return
+        shares = np.abs(found.residual) / (1.0 + np.abs(found.point))
+        worst = int(np.argmax(np.where(np.isnan(shares), np.inf, shares)))
+        other = "newton" if self._settings.method == "aitken" else "more iterations (most)"
+        raise Unconverged(
+            f"{self._names[worst]} does not converge at t = {self._seconds(tick)!r} s: after "
+            f"{found.iterations} iterations ({self._settings.method}) its value at the end of the "
+            f"step is {found.point[worst]:.9g} where the FMUs give "
+            f"{found.point[worst] + found.residual[worst]:.9g}; take a higher rate, or in "
+            f"[iteration] {other} or a larger tolerance"
+        )
+
+
+def _read(c: Connection, system: System, board: Board) -> list[int]:
+    """What the target of `c` is made from: the source's outputs, and where its hold wants them
+    their derivatives."""
+    places = board.sources(c)
+    if c.hold and HOLDS[c.hold].needs == "derivative" and (name := derivative(c, system.unit)):
+        places = places + board.port(system.unit[c.source], name)
+    return places

@@ -1,0 +1,82 @@
+"""A scene's [holds], [delays], [kinds], [[power]] and [substeps] against its connections."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from hapticlink.orchestrator import power
+from hapticlink.orchestrator.crossings import Refused, Rules, names
+from hapticlink.orchestrator.faults import Finding
+from hapticlink.orchestrator.latency import Latency
+from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.toml_lines import Path
+
+if TYPE_CHECKING:
+    from hapticlink.orchestrator.system import Connection, Unit
+
+
+def rules_of(scene: Scene, own: Mapping[str, str]) -> Rules:
+    """The rules of `scene`; `own` are holds that a [[connection]] asks for itself, by name."""
+    delays = {
+        key: d if isinstance(d, Latency) else Latency(min=d) for key, d in scene.delays.items()
+    }
+    return Rules(
+        scene.hold,
+        scene.downsampling,
+        {**scene.holds, **own},
+        delays,
+        scene.kinds,
+        (*scene.power, *power.BLOCKS),
+        scene.iteration.interpolation if scene.coupling == "iterated" else None,
+    )
+
+
+def unfit(
+    scene: Scene,
+    units: Iterable[Unit],
+    connections: Iterable[Connection],
+    refused: Iterable[Refused],
+) -> Iterator[Finding]:
+    """What these tables say of things that are not there, or that cannot be."""
+    by_name = {u.name: u for u in units}
+    found = [c for c in connections if not c.initial]
+    for table in ("holds", "delays", "kinds"):
+        for key in getattr(scene, table):
+            if not any(key in names(c) for c in found):
+                known = ", ".join(c.name for c in found) or "none"
+                message = f"is no connection of this scene; there are {known}"
+                yield scene.place((table, key), message)
+    for r in refused:
+        if r.key:
+            path: Path = ("hold",) if r.key == "hold" else ("holds", r.key)
+            yield scene.place(path, f"{r.hold!r} does not fit {r.connection.name}: {r.reason}")
+    for name in scene.substeps:
+        if name not in by_name or by_name[name].sampled:
+            plants = ", ".join(u.name for u in by_name.values() if not u.sampled)
+            yield scene.place(("substeps", name), f"is no plant of this scene; there are {plants}")
+    for name in scene.get_after_set:
+        if name not in by_name or by_name[name].sampled:
+            plants = ", ".join(u.name for u in by_name.values() if not u.sampled)
+            message = f"{name!r} is no plant of this scene; there are {plants}"
+            yield scene.place(("get_after_set",), message)
+    for i, p in enumerate(scene.power):
+        yield from _power(scene, i, p, by_name)
+
+
+def _power(
+    scene: Scene, i: int, p: power.PowerPort, units: Mapping[str, Unit]
+) -> Iterator[Finding]:
+    sizes = {}
+    for end, causality in (("effort", "input"), ("displacement", "output")):
+        fmu, _, name = getattr(p, end).partition(".")
+        entries = units[fmu].description.port(name, causality) if fmu in units else ()
+        sizes[end] = len(entries)
+        if not entries:
+            yield scene.place(("power", i, end), f"there is no {causality} {getattr(p, end)}")
+    if p.displacement.partition(".")[0] != p.fmu:
+        message = "effort and displacement are of one FMU: give the motion of the FMU it acts on"
+        yield scene.place(("power", i), message)
+    elif all(sizes.values()) and len(set(sizes.values())) > 1:
+        message = f"{sizes['effort']} efforts on {sizes['displacement']} displacements"
+        yield scene.place(("power", i), message)

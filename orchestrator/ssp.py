@@ -1,0 +1,29 @@
+"""The words of an SSP 1.0 (System Structure and Parameterization): names, and what of a scene
+stands in the annotation, because the standard has no rates and no holds."""
+
+from __future__ import annotations
+
+SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
+SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+RUN = "urn:hapticlink:run"
+ANNOTATION = "hapticlink.run"
+STRUCTURE = "SystemStructure.ssd"
+FMU = "application/x-fmu-sharedlibrary"
+
+NOT_IN_ANNOTATION = frozenset(
+    (
+        *("linkage", "contacts", "mechanism", "directions", "device", "controller", "hand"),
+        *("sensing", "mechanism_at", "directions_from", "graphics", "fmu", "connection"),
+    )
+)
+"""Keys of a scene that its FMUs and the structure itself say; graphics keeps its rate."""
+
+SCALAR = {"Boolean": "Boolean", "String": "String", "Real": "Real"}
+
+
+def type_of(fmi_type: str) -> str:
+    """The type of a connector or parameter for an FMI type."""
+    if fmi_type.startswith("Float"):
+        return "Real"
+    return SCALAR.get(fmi_type, "Integer")

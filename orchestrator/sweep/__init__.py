@@ -1,0 +1,98 @@
+"""Many runs of a scene: a grid or a list, in parallel, resumable, with one table at the end."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.faults import Fault
+from hapticlink.orchestrator.sweep import cluster, job, pool, table
+from hapticlink.orchestrator.sweep.job import Job
+from hapticlink.orchestrator.sweep.row import DIED, REFUSED, Row, failed, measure
+
+Measure = Callable[[Experiment], Row]
+Tell = Callable[[int], None]
+
+
+def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row:
+    """The row of one job; its results live in `room` (None: the machine's own) until measured."""
+    assert each.scene is not None
+    if job.key(each.scene) != each.key:
+        return failed(DIED, "this worker has another version of hapticlink or of what it uses")
+    with tempfile.TemporaryDirectory(dir=room) as folder:
+        try:
+            return measure(simulate(each.scene, folder))
+        except Fault as fault:
+            return failed(REFUSED, str(fault))
+        except Exception as error:  # one run of many: the others go on
+            return failed(DIED, f"{type(error).__name__}: {error}")
+
+
+def sweep(
+    jobs: Sequence[Job],
+    folder: Path,
+    processes: int,
+    scheduler: str | None = None,
+    tell: Tell = lambda done: None,
+    measure: Measure = measure,
+) -> list[Row]:
+    """The rows of `jobs`, in their order, each with its point; `tell` hears how many are done.
+
+    A row is kept in `folder`/rows when its run ends, and not made again by a later call. Raises
+    Fault where it is interrupted, with table.csv of the rows so far, or where the disk is full.
+    """
+    try:
+        rows = table.Rows(folder / "rows")
+        found = {j.key: kept for j in jobs if j.scene and (kept := rows.find(j.key))}
+        # Two points may give one scene: it runs once.
+        missing = list({j.key: j for j in jobs if j.scene and j.key not in found}.values())
+        refused = sum(j.scene is None for j in jobs)
+
+        def done() -> int:
+            return refused + sum(j.key in found for j in jobs if j.scene)
+
+        tell(done())
+        interrupted = False
+        try:
+            for each, made in _finished(missing, folder, processes, scheduler, measure):
+                if made["end"] == "interrupted":  # a signal reached the worker too
+                    continue
+                if made["end"] != DIED:  # the next sweep tries those again
+                    rows.keep(each.key, made)
+                found[each.key] = made
+                tell(done())
+        except KeyboardInterrupt:
+            interrupted = True
+        told = [
+            {**j.point, **(found[j.key] if j.scene else failed(REFUSED, j.refusal))}
+            for j in jobs
+            if not j.scene or j.key in found
+        ]
+        table.write(folder / "table.csv", told)
+    except OSError as error:
+        raise Fault(f"{folder}: {error}") from error
+    if interrupted or len(told) < len(jobs):
+        raise Fault(
+            f"interrupted: {len(told)} of {len(jobs)} runs are in {folder}/table.csv; "
+            "the same command does the rest"
+        )
+    return told
+
+
+def _finished(
+    jobs: Sequence[Job], folder: Path, processes: int, scheduler: str | None, measure: Measure
+) -> Iterator[pool.Done]:
+    if scheduler:
+        yield from cluster.on_cluster(partial(work, measure=measure), jobs, scheduler)
+        return
+    room = folder / ".running"
+    shutil.rmtree(room, ignore_errors=True)  # of a sweep that was killed
+    room.mkdir(parents=True)
+    try:
+        yield from pool.in_processes(partial(work, room=room, measure=measure), jobs, processes)
+    finally:
+        shutil.rmtree(room, ignore_errors=True)

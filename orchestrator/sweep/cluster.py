@@ -1,0 +1,40 @@
+"""Jobs on a Dask cluster, for those who outgrow one machine.
+
+Its workers need hapticlink of the same version, and one thread each (`dask worker --nthreads 1`):
+the Python FMUs of a process share one interpreter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.sweep.job import Job
+from hapticlink.orchestrator.sweep.pool import Done, Work
+from hapticlink.orchestrator.sweep.row import DIED, failed
+
+
+def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
+    """Each job with its row, as they finish. Raises InputFault without Dask or a scheduler."""
+    try:
+        from dask.distributed import Client, as_completed
+    except ImportError:
+        raise InputFault(
+            "--scheduler needs Dask; install it with pip install 'hapticlink[distributed]'"
+        ) from None
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        message = f"--scheduler {address}: no Dask scheduler answers there: {error}"
+        raise InputFault(message) from error
+    with client:
+        futures = {client.submit(work, j, key=f"hapticlink-{j.key}", pure=False): j for j in jobs}
+        try:
+            for future in as_completed(futures):
+                try:
+                    row = future.result()
+                except Exception as error:  # whatever a cluster can break of
+                    row = failed(DIED, f"{type(error).__name__}: {error}")
+                yield futures[future], row
+        finally:
+            client.cancel(list(futures))

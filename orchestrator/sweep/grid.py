@@ -1,0 +1,154 @@
+"""What a sweep varies: axes of a grid, or a list of runs from a file.
+
+A point is {dotted key: value as text}, what `--set` takes.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from hapticlink.orchestrator.faults import InputFault
+
+Point = dict[str, str]
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?:\.\.({_NUMBER})|:(\d+))?")
+MOST = 100_000
+"""Values of one axis; more are a slip of the pen."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A key and the values that it takes, as text."""
+
+    key: str
+    values: tuple[str, ...]
+
+
+def parse(text: str) -> Axis:
+    """The axis of `key=values`: values and ranges between commas.
+
+    `a..b` is every whole number from a to b, `a..b..step` goes in steps, `a..b:n` has n points
+    evenly spread (to 6 digits). Raises InputFault where it cannot be read or is empty.
+    """
+    key, equals, values = text.partition("=")
+    key = key.strip()
+    if not equals or not key:
+        raise InputFault(f"--vary {text}: write key=values, e.g. --vary graphics.rate=10..60..10")
+    found = [value for item in _items(values) for value in _values(item, text)]
+    if not found:
+        raise InputFault(f"--vary {text}: no value; give some, e.g. {key}=1,2,3")
+    return Axis(key, tuple(dict.fromkeys(found)))
+
+
+def grid(axes: Sequence[Axis]) -> list[Point]:
+    """Every combination; the first axis varies slowest."""
+    keys = [axis.key for axis in axes]
+    twice = next((k for k in keys if keys.count(k) > 1), None)
+    if twice:
+        raise InputFault(f"--vary {twice}: given twice; write all its values with commas")
+    return [dict(zip(keys, values, strict=True)) for values in product(*(a.values for a in axes))]
+
+
+def listed(path: Path) -> list[Point]:
+    """The runs of a file: a CSV with a column a key (an empty cell leaves the scene's own), or a
+    TOML of [[run]] tables. Raises InputFault."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputFault(f"--runs {path}: cannot be read as text: {error}") from error
+    points = list(_toml(path, text) if path.suffix == ".toml" else _csv(path, text))
+    if not points:
+        form = "[[run]] table" if path.suffix == ".toml" else "row under its header"
+        raise InputFault(f"--runs {path}: no runs; give one {form} a run")
+    return points
+
+
+def _items(text: str) -> Iterator[str]:
+    """Split at commas outside of brackets and quotes."""
+    depth, quote, start = 0, "", 0
+    for i, letter in enumerate(text):
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        elif letter in "[{":
+            depth += 1
+        elif letter in "]}":
+            depth -= 1
+        elif letter == "," and not depth:
+            yield text[start:i].strip()
+            start = i + 1
+    yield text[start:].strip()
+
+
+def _values(item: str, option: str) -> Iterable[str]:
+    match = _RANGE.fullmatch(item)
+    if not match:
+        return [item] if item else []
+    first, last = Decimal(match[1]), Decimal(match[2])
+    if last < first:
+        raise InputFault(f"--vary {option}: {item} ends below its start; write {last}..{first}")
+    if match[4]:
+        count = int(match[4])
+        if not 2 <= count <= MOST:
+            raise InputFault(f"--vary {option}: {item} has {count} points; give 2 to {MOST}")
+        return [f"{first + (last - first) * i / (count - 1):.6g}" for i in range(count)]
+    step = Decimal(match[3]) if match[3] else Decimal(1)
+    if not match[3] and (first % 1 or last % 1):
+        raise InputFault(
+            f"--vary {option}: {item} is every whole number, but an end is none; write "
+            f"{item}..STEP or {item}:POINTS"
+        )
+    if step <= 0 or (last - first) / step >= MOST:
+        raise InputFault(f"--vary {option}: {item} goes in steps of {step}; take a larger one")
+    return [_plain(first + i * step) for i in range(int((last - first) / step) + 1)]
+
+
+def _plain(number: Decimal) -> str:
+    return f"{number.normalize():f}"
+
+
+def _csv(path: Path, text: str) -> Iterator[Point]:
+    reader = csv.DictReader(text.splitlines())
+    for row in reader:
+        if None in row or None in row.values():
+            count = len(reader.fieldnames or ())
+            raise InputFault(f"--runs {path}: line {reader.line_num}: not {count} cells")
+        yield {key.strip(): cell.strip() for key, cell in row.items() if cell.strip()}
+
+
+def _toml(path: Path, text: str) -> Iterator[Point]:
+    try:
+        runs = tomllib.loads(text).get("run", [])
+    except tomllib.TOMLDecodeError as error:
+        raise InputFault(f"--runs {path}: not TOML: {error}") from error
+    if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
+        raise InputFault(f"--runs {path}: `run` is no array of tables; write [[run]]")
+    for run in runs:
+        yield dict(_flat(run))
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value if isinstance(value, str) else json.dumps(value)
+
+
+def number(text: str) -> float | None:
+    """The number that a value is, None for a word."""
+    try:
+        return float(Decimal(text))
+    except InvalidOperation:
+        return None

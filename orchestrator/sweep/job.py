@@ -1,0 +1,79 @@
+"""One run of a sweep, and the key that its row is kept by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from platform import python_version
+from typing import Any
+
+from pydantic_core import to_json
+
+import hapticlink.components
+import hapticlink.fmus
+import hapticlink.orchestrator
+from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator.experiment import PACKAGES
+from hapticlink.orchestrator.faults import Fault, InputFault
+from hapticlink.orchestrator.scene import Scene
+
+APART = frozenset({"commands", "report", "study"})
+"""Folders of the orchestrator that no run depends on."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A point of a sweep. `scene` is the checked one, or None where it is refused for `refusal`."""
+
+    point: Mapping[str, str]
+    scene: Scene | None
+    key: str = ""
+    refusal: str = ""
+
+
+def jobs(scene: str, options: Sequence[str], points: Iterable[Mapping[str, str]]) -> list[Job]:
+    """The jobs of `points`, each over `scene` with the common `options`.
+
+    A point that gives no scene is a job that is refused; where every one does, InputFault.
+    """
+    made = [job(scene, [*options, *(f"{k}={v}" for k, v in p.items())], p) for p in points]
+    if made and all(each.scene is None for each in made):
+        raise InputFault(made[0].refusal)
+    return made
+
+
+def job(scene: str, options: Sequence[str], point: Mapping[str, str]) -> Job:
+    """The job of `scene` with `options`, told in the table as `point`."""
+    try:
+        # A copy leaves behind the way back to the file's lines, which no other process takes.
+        found = replace(scene_file.load(scene, options))
+        return Job(point, found, key(found))
+    except Fault as fault:
+        return Job(point, None, refusal=str(fault))
+
+
+def key(scene: Scene) -> str:
+    """sha256 of the resolved scene, the FMU files that it names, the versions and the sources:
+    where one of them changes, a run is made again. Raises InputFault for an FMU not to be read."""
+    whole: dict[str, Any] = {"scene": asdict(scene), "made_with": _made_with()}
+    try:
+        files = [sha256(Path(f.path).read_bytes()).hexdigest() for f in scene.fmu]
+    except OSError as error:
+        raise InputFault(f"{error.filename}: cannot be read: {error.strerror}") from error
+    return sha256(to_json(whole | {"fmus": files}, inf_nan_mode="constants")).hexdigest()
+
+
+@cache
+def _made_with() -> list[str]:
+    sha = sha256()
+    for package in (hapticlink.components, hapticlink.fmus, hapticlink.orchestrator):
+        root = Path(package.__path__[0])
+        for path in sorted(root.rglob("*.py")):
+            name = path.relative_to(root)
+            if name.parts[0] not in APART:
+                sha.update(name.as_posix().encode() + b"\0" + path.read_bytes())
+    return [python_version(), *(version(name) for name in PACKAGES), sha.hexdigest()]

@@ -1,0 +1,97 @@
+"""Jobs in processes of their own: a crash takes one run, Ctrl-C leaves nothing behind.
+
+At most one job a process is under way. Where a process dies, its pool breaks and does not say
+which job did it: those under way are made again, each alone, and the one that dies alone is told.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+
+from hapticlink.orchestrator import interrupt
+from hapticlink.orchestrator.sweep.job import Job
+from hapticlink.orchestrator.sweep.row import DIED, Row, failed
+
+Work = Callable[[Job], Row]
+Done = tuple[Job, Row]
+RUNS = 200
+"""Runs of one process, before a fresh one takes over: libraries of Python FMUs stay loaded."""
+
+
+def in_processes(work: Work, jobs: Sequence[Job], count: int) -> Iterator[Done]:
+    """Each job with its row, as they finish. Raises KeyboardInterrupt at SIGINT or SIGTERM, when
+    all processes have ended."""
+    queue = deque(jobs)
+    with interrupt.watch() as interrupted:
+        while queue:
+            suspects = yield from _spread(work, queue, count, interrupted)
+            for job in suspects:
+                if (yield from _spread(work, deque([job]), 1, interrupted)):
+                    yield job, failed(DIED, "the process of this run crashed")
+
+
+def _spread(
+    work: Work, queue: deque[Job], count: int, interrupted: interrupt.Flag
+) -> Generator[Done, None, list[Job]]:
+    """Take jobs from `queue` until it is empty, or a process dies: then what was under way."""
+    under_way: dict[Future[Row], Job] = {}
+    with _executor(min(count, len(queue))) as pool:
+        while queue or under_way:
+            try:
+                while queue and len(under_way) < count:
+                    under_way[pool.submit(work, queue[0])] = queue[0]
+                    queue.popleft()
+                ready = wait(under_way, timeout=0.2, return_when=FIRST_COMPLETED).done
+                if interrupted:
+                    raise KeyboardInterrupt
+                for future in ready:
+                    row = future.result()
+                    yield under_way.pop(future), row
+            except BrokenProcessPool:
+                return list(under_way.values())
+    return []
+
+
+@contextmanager
+def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
+    before = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")  # FMUs hold threads and libraries: no fork
+    pool = ProcessPoolExecutor(
+        count, mp_context=context, initializer=_follow, max_tasks_per_child=RUNS
+    )
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in set(multiprocessing.active_children()) - before:
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown()
+
+
+def _follow() -> None:
+    """A worker leaves signals of the terminal to its parent, ends by SIGTERM with its folders
+    cleaned up, and does not outlive the parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    while True:  # a first one ends the run, a second one the process
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.5)

@@ -1,0 +1,86 @@
+"""The numbers of one run, as a row of the sweep's table.
+
+The names of the columns carry the unit. Where a scene has no such signal, its cell is empty.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.experiment import Experiment
+from hapticlink.orchestrator.results import Results, Vector
+from hapticlink.orchestrator.tracking import has_tracking, pose_error
+
+Row = dict[str, Any]
+
+METRIC = "tracking_max_mm"
+REFUSED, DIED = "refused", "died"
+FAILED = ("fault", REFUSED, DIED)
+"""Ends in bad order: a fault of the run, bad input, a process that crashed."""
+
+
+def measure(experiment: Experiment) -> Row:
+    """Everything that the table says of a run."""
+    outcome = experiment.outcome
+    results = experiment.results
+    held = {c.name for c in experiment.system.connections if c.hold}
+    made = {n: e.made for n, e in outcome.energies.items() if n in held}
+    found: Row = {
+        "end": outcome.reason,
+        "end_time_s": outcome.end_time,
+        "message": _line(str(outcome.fault)) if outcome.fault else "",
+        **_tracking(results),
+        **_largest(results, "closure_max_m", "virtual_mechanism.closure_error"),
+        **_switches(results),
+    }
+    if made:
+        found["held_energy_made_J"] = sum(made.values())
+        found |= {f"made_J {name}": energy for name, energy in made.items()}
+    calls = outcome.calls
+    found |= {f"steps {name}": counts.get("step", 0) for name, counts in calls.items()}
+    return found | {"run_time_s": outcome.wall_time}
+
+
+def failed(reason: str, message: str) -> Row:
+    """The row of a run that did not come to an outcome."""
+    return {"end": reason, "message": _line(message)}
+
+
+def _line(message: str) -> str:
+    return " ".join(message.split())
+
+
+def _tracking(results: Results) -> Row:
+    if not has_tracking(results):
+        return {}
+    _, distance, angle = pose_error(results)
+    if not len(distance):
+        return {}
+    return {
+        METRIC: float(distance.max()),
+        "tracking_rms_mm": _rms(distance),
+        "theta_max_rad": float(angle.max()),
+        "theta_rms_rad": _rms(angle),
+    }
+
+
+def _rms(values: Vector) -> float:
+    largest = values.max()
+    return float(largest * np.sqrt(np.mean((values / largest) ** 2))) if largest else 0.0
+
+
+def _largest(results: Results, column: str, signal: str) -> Row:
+    found = next((t[signal] for t in results.tables.values() if signal in t), None)
+    return {} if found is None or not len(found) else {column: float(np.abs(found).max())}
+
+
+def _switches(results: Results) -> Row:
+    """How often the number of resisted directions changes, as the controller sees it."""
+    for fmu in ("virtual_environment", "virtual_mechanism"):
+        signal = f"{fmu}.n_constraints"
+        count = next((t[signal] for t in results.tables.values() if signal in t), None)
+        if count is not None:
+            return {"switches": int(np.count_nonzero(np.diff(count)))}
+    return {}

@@ -1,0 +1,52 @@
+"""Rows on disk, each written when its run ends, and the one table of them all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from hapticlink.orchestrator.results import write_json
+from hapticlink.orchestrator.sweep.row import Row
+
+LAST = "run_time_s"
+
+
+class Rows:
+    """A folder with one file a row, by the key of its job."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def find(self, key: str) -> Row | None:
+        """The row of an earlier sweep, None where it is not there or cannot be read."""
+        try:
+            found = json.loads((self._folder / f"{key}.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return found if isinstance(found, dict) else None
+
+    def keep(self, key: str, row: Row) -> None:
+        write_json(self._folder / f"{key}.json", row)
+
+
+def columns(rows: Sequence[Row]) -> list[str]:
+    """Of all rows, in the order in which they first come; the run time, which no second sweep
+    repeats, last."""
+    found = dict.fromkeys(name for row in rows for name in row)
+    return [n for n in found if n != LAST] + [n for n in found if n == LAST]
+
+
+def write(path: Path, rows: Sequence[Row]) -> None:
+    """A CSV with one line a row, whole or not at all."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns(rows), restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    unfinished.write_text(text.getvalue(), encoding="utf-8")
+    os.replace(unfinished, path)

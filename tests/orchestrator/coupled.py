@@ -1,0 +1,177 @@
+"""Small systems of real FMUs for tests of couplings, with answers known in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from hapticlink.components.component import Block, Component, Variable
+from hapticlink.fmus.build import build
+from hapticlink.orchestrator.crossings import Rules, assign
+from hapticlink.orchestrator.description import Description, describe
+from hapticlink.orchestrator.plan import Plan
+from hapticlink.orchestrator.power import PowerPort
+from hapticlink.orchestrator.results import Table, read_table
+from hapticlink.orchestrator.run import Outcome, run
+from hapticlink.orchestrator.system import System, Unit, connect
+from hapticlink.orchestrator.ticks import Clock, Timeline
+
+from . import oscillator
+
+ROWS = oscillator.ROWS
+HERMITE = [*ROWS, ("one.a", "two.a1")]
+"""der(F) of `two` needs the acceleration of `one`."""
+POWER = (PowerPort(effort="one.F", displacement="one.x"),)
+
+
+def with_derivative() -> Component:
+    """`two` of the oscillator that also puts out the derivative of its force."""
+    block = Block(
+        inputs=[Variable("x1", (), "m"), Variable("v1", (), "m/s"), Variable("a1", (), "m/s2")],
+        states=[Variable("x", (), "m"), Variable("v", (), "m/s")],
+        outputs=[
+            Variable("x", (), "m"),
+            Variable("v", (), "m/s"),
+            Variable("F", (), "N"),
+            Variable("der(F)", (), "N/s"),
+        ],
+    )
+    x, v, (x1, v1, a1) = block.x["x"], block.x["v"], (block.u[n] for n in ("x1", "v1", "a1"))
+    k, c, k_c, c_c = oscillator.K, oscillator.C, oscillator.K_C, oscillator.C_C
+    force = k_c * (x - x1) + c_c * (v - v1)
+    moved = oscillator.driven(x, v, k_c * x1 + c_c * v1, k + k_c, c + c_c, block.h)
+    start = oscillator.together(ca.SX(0.0))
+    return block.component(
+        "two",
+        "takes a motion",
+        "continuous",
+        initial={"x": start["x2"], "v": start["v2"]},
+        step=oscillator.warmed(block, "2", moved),
+        output={
+            "x": x,
+            "v": v,
+            "F": force,
+            "der(F)": k_c * (v - v1) + c_c * (-k * x - c * v - force - a1),
+        },
+    )
+
+
+def stiff(k_1: float, k_2: float, k_c: float, c_c: float) -> tuple[Component, Component]:
+    """Unit masses on k_1 and k_2, at rest at 1 m, joined by k_c and c_c."""
+    first = Block(
+        inputs=[Variable("F", (), "N")],
+        states=[Variable("x", (), "m", 1.0), Variable("v", (), "m/s")],
+        outputs=[Variable("x", (), "m"), Variable("v", (), "m/s")],
+    )
+    x, v = first.x["x"], first.x["v"]
+    moved = oscillator.driven(x, v, first.u["F"], k_1, 0.0, first.h)
+    one = first.component(
+        "one",
+        "takes a force",
+        "continuous",
+        initial={"x": 1.0, "v": 0.0},
+        step=dict(zip("xv", moved, strict=True)),
+        output={"x": x, "v": v},
+    )
+    second = Block(
+        inputs=[Variable("x1", (), "m", 1.0), Variable("v1", (), "m/s")],
+        states=[Variable("x", (), "m", 1.0), Variable("v", (), "m/s")],
+        outputs=[Variable("x", (), "m"), Variable("v", (), "m/s"), Variable("F", (), "N")],
+    )
+    x, v, x1, v1 = second.x["x"], second.x["v"], second.u["x1"], second.u["v1"]
+    moved = oscillator.driven(x, v, k_c * x1 + c_c * v1, k_2 + k_c, c_c, second.h)
+    two = second.component(
+        "two",
+        "takes a motion",
+        "continuous",
+        initial={"x": 1.0, "v": 0.0},
+        step=dict(zip("xv", moved, strict=True)),
+        output={"x": x, "v": v, "F": k_c * (x - x1) + c_c * (v - v1)},
+    )
+    return one, two
+
+
+def stiff_exact(
+    times: NDArray[np.float64], k_1: float, k_2: float, k_c: float, c_c: float
+) -> NDArray[np.float64]:
+    """Rows x1, x2."""
+    a = np.array(
+        [
+            [0.0, 1.0, 0.0, 0.0],
+            [-k_1 - k_c, -c_c, k_c, c_c],
+            [0.0, 0.0, 0.0, 1.0],
+            [k_c, c_c, -k_2 - k_c, -c_c],
+        ]
+    )
+    start = np.array([1.0, 0.0, 1.0, 0.0])
+    return np.array([(expm(a * t) @ start)[[0, 2]] for t in times])
+
+
+def gain(name: str, factor: float, offset: float, timing: str = "continuous") -> Component:
+    """y = factor u + offset, through and through; z is the u of the step before."""
+    block = Block(
+        inputs=[Variable("u"), Variable("w")],
+        states=[Variable("z")],
+        outputs=[Variable("y"), Variable("z")],
+    )
+    return block.component(
+        name,
+        "feed-through",
+        timing,  # type: ignore[arg-type]
+        initial={"z": ca.SX(0.0)},
+        step={"z": block.u["w"]},
+        output={"y": factor * block.u["u"] + offset, "z": block.x["z"]},
+    )
+
+
+def described(components: Iterable[Component], folder: Path) -> dict[str, Description]:
+    return {c.name: describe(build(c, folder)) for c in components}
+
+
+def system(
+    fmus: Mapping[str, Description],
+    rows: Iterable[tuple[str, str]],
+    coupling: str,
+    period: Fraction,
+    until: Fraction,
+    *,
+    base: Fraction | None = None,
+    between: str | None = None,
+    hold: str | None = None,
+    substeps: int = 1,
+    **others: object,
+) -> System:
+    """All FMUs at one rate. between: the hold of iterated connections; hold: of all connections."""
+    ticks = int(period / base) if base else 1
+    steps = int(until / period)
+    clock = Clock("haptics", range(0, (steps + 3) * ticks, ticks))
+    timeline = Timeline(period / ticks, steps * ticks, (clock,))
+    units = tuple(Unit(name, fmu, "haptics") for name, fmu in fmus.items())
+    rows = list(rows)
+    holds = {source: hold for source, _ in rows} if hold else {}
+    rules = Rules(holds=holds, between_plants=between)
+    connections, _ = assign(units, tuple(connect(units, rows, "zoh", {})), timeline, rules)
+    return System(
+        units,
+        connections,
+        timeline,
+        coupling,
+        substeps=dict.fromkeys(fmus, substeps),
+        **others,  # type: ignore[arg-type]
+    )
+
+
+def simulate(made: System, folder: Path) -> tuple[Outcome, Table]:
+    return run(Plan(made), folder), read_table(folder / "haptics.csv")
+
+
+def error(table: Table) -> float:
+    """The largest error of a position of the two-mass oscillator."""
+    found = np.stack([table["one.x"], table["two.x"]], axis=1)
+    return float(np.abs(found - oscillator.exact(table["time"])[:, [0, 2]]).max())

@@ -1,0 +1,143 @@
+"""FMUs of others for tests: pythonfmu's and pythonfmu3's, and one in C that fails on demand."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import uuid
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from fmpy import platform, sharedLibraryExtension
+from pythonfmu.builder import FmuBuilder
+
+from hapticlink.orchestrator import results
+from hapticlink.orchestrator.experiment import Experiment, simulate
+
+SLAVE = """
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.u, self.y, self.gain, self.steps, self.on = 0.0, 0.0, 1.0, 0, False
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+        self.register_variable(Integer("steps", causality=Fmi2Causality.output))
+        self.register_variable(Boolean("on", causality=Fmi2Causality.input))
+        self.register_variable(Real("gain", causality=Fmi2Causality.parameter,
+                                    variability=Fmi2Variability.tunable))
+
+    def do_step(self, time, size):
+        self.steps += 1
+        {body}
+        return True
+"""
+
+
+def python_fmu(
+    folder: Path, name: str, body: str = "self.y = time + size", **options: bool
+) -> Path:
+    """An FMI 2.0 FMU: inputs u and on, outputs y and steps, parameter gain.
+
+    Its module has a name of its own, so that no FMU of another test is in its way.
+    """
+    return python_fmu_of(folder, SLAVE.format(name=name, body=body), uuid.uuid4().hex, **options)
+
+
+def python_fmu_of(folder: Path, text: str, module: str, **options: bool) -> Path:
+    """The FMU of a slave's text, in a module of that name."""
+    script = folder / f"m{module}.py"
+    script.write_text(text)
+    return Path(FmuBuilder.build_FMU(script, dest=folder, **options))
+
+
+UNITS = """<UnitDefinitions>
+<Unit name="mm"><BaseUnit m="1" factor="0.001"/></Unit>
+<Unit name="m"><BaseUnit m="1"/></Unit>
+<Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>
+<Unit name="K"><BaseUnit K="1"/></Unit>
+<Unit name="deg"><BaseUnit rad="1" factor="0.017453292519943295"/></Unit>
+<Unit name="rad"><BaseUnit rad="1"/></Unit>
+<Unit name="furlong"/>
+</UnitDefinitions>
+<ModelVariables>"""
+
+
+def edited(path: Path, change: Callable[[str], str]) -> Path:
+    """The FMU with its modelDescription.xml changed."""
+    with zipfile.ZipFile(path) as archive:
+        entries = {n: archive.read(n) for n in archive.namelist()}
+    text = change(entries["modelDescription.xml"].decode())
+    entries["modelDescription.xml"] = text.encode()
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    return path
+
+
+def with_units(path: Path, **units: str) -> Path:
+    """The FMU with units of its Real variables."""
+
+    def change(text: str) -> str:
+        text = text.replace("<ModelVariables>", UNITS)
+        for name, unit in units.items():
+            head, tail = text.split(f'name="{name}"', 1)
+            text = f'{head}name="{name}"' + tail.replace("<Real", f'<Real unit="{unit}"', 1)
+        return text
+
+    return edited(path, change)
+
+
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="faults" guid="{guid}">
+<CoSimulation modelIdentifier="faults"/>
+<ModelVariables>
+<ScalarVariable name="mode" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
+<ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>
+</ModelVariables>
+<ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def c_fmu(folder: Path, guid: str = "{faults}") -> Path:
+    """The FMU of fault_fmu.c; skips the test where there is no C compiler."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    library, path = folder / f"faults{sharedLibraryExtension}", folder / "faults.fmu"
+    source = Path(__file__).parent / "fault_fmu.c"
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", DESCRIPTION.format(guid=guid))
+        archive.write(library, f"binaries/{platform}/faults{sharedLibraryExtension}")
+    return path
+
+
+PAIR = """
+[[fmu]]
+name = "gives"
+path = "Gives.fmu"
+[[fmu]]
+name = "takes"
+path = "Takes.fmu"
+[[connection]]
+from = "gives.y"
+to = "takes.u"
+"""
+
+
+def scene(folder: Path, text: str, rate: int = 64, duration: float = 0.5) -> Path:
+    """A scene file of [[fmu]] and [[connection]] tables."""
+    path = folder / "scene.toml"
+    head = f'title = "test"\nduration = {duration}\nhaptics.rate = {rate}\n'
+    path.write_text(head + text)
+    return path
+
+
+def run(folder: Path, text: str, *options: str) -> tuple[Experiment, results.Results]:
+    experiment = simulate(str(scene(folder, text)), folder / "out", options)
+    return experiment, experiment.results

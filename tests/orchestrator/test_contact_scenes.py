@@ -1,0 +1,74 @@
+"""Scenes with contacts, further hands or a local model: what is refused, and that they run."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.faults import SceneFault
+
+
+@pytest.mark.parametrize(
+    ("scene", "option", "message"),
+    [
+        ("enclosure", "contacts.enclosure=[[0.0, 0.0], [1.0, 0.0]]", "2 corners"),
+        (
+            "enclosure",
+            "contacts.enclosure=[[0.0, 0.0], [1.0, 0.0], [0.1, 0.1], [0.0, 1.0]]",
+            "not convex at",
+        ),
+        ("enclosure", "linkage.body.link1.radius=0.0", "a radius is more than 0"),
+        ("enclosure", "linkage.body.link1.capsule=[[0.0, 0.0], [0.0, 0.0]]", "two different"),
+        ("enclosure", "contacts.stiffness=-1.0", "0 or more"),
+        ("enclosure", "contacts.detection=hapics", "'graphics' or 'haptics'"),
+        ("obstacles", "contacts.disc.pin.name=block", "'block' is taken"),
+        ("obstacles", "contacts.disc.pin.radius=0.0", "a radius is more than 0"),
+        ("closed-loop", "controller.contact=true", r"there is nothing to touch: add \[contacts\]"),
+        ("two-hands", "hands.right={wrench=[0.0, 0.0, 0.0]}", "no point 'right'; there are left"),
+        ("two-hands", "linkage.point.left.body=link9", "no body 'link9'"),
+        ("local-model", "mechanism.stabilization=projection", "take 'baumgarte'"),
+        ("local-model", "mechanism_at=graphics", "runs at the graphics rate itself"),
+    ],
+)
+def test_what_is_refused(scene: str, option: str, message: str) -> None:
+    with pytest.raises(SceneFault, match=message):
+        scene_file.load(scene, [option])
+
+
+def test_the_hand_feels_the_wall_and_the_link_stays_out_of_it(tmp_path: Path) -> None:
+    """Against a run without walls: the force of the walls turns the motion around."""
+    options = ["duration=0.6"]
+    walls = simulate("enclosure", tmp_path / "walls", options).results.haptics
+    alone = ["controller.contact=false", "contacts.enclosure=[[-1,-1],[1,-1],[1,1],[-1,1]]"]
+    free = simulate("enclosure", tmp_path / "free", [*options, *alone]).results.haptics
+    gap, F = walls["virtual_mechanism.contact_gap"], walls["virtual_mechanism.F_env[1]"]
+    assert gap.min() < 0
+    assert gap.min() > -0.5e-3  # less than 15000 N/m x 0.5 mm
+    assert np.abs(F).max() > 0.3
+    assert F[gap >= 0].tolist() == [0.0] * int(np.sum(gap >= 0))
+    assert free["virtual_mechanism.x[1]"].max() > walls["virtual_mechanism.x[1]"].max() + 2e-3
+
+
+def test_detection_at_the_graphics_rate_is_near_that_at_the_haptic_rate(tmp_path: Path) -> None:
+    runs = [
+        simulate("enclosure", tmp_path / d, ["duration=0.6", f"contacts.detection={d}"])
+        for d in ("graphics", "haptics")
+    ]
+    x = [
+        np.column_stack([r.results.haptics[f"virtual_mechanism.x[{i}]"] for i in (1, 2)])
+        for r in runs
+    ]
+    assert np.abs(x[0] - x[1]).max() < 1e-4
+
+
+def test_a_second_hand_holds_its_point(tmp_path: Path) -> None:
+    two = simulate("two-hands", tmp_path, ["duration=0.5"]).results.haptics
+    for i in (1, 2, 3):
+        grip = two[f"hand_left.F[{i}]"]
+        assert np.isfinite(grip).all()
+    assert np.abs(two["hand_left.F[1]"]).max() > 0.01
+    step = np.diff(two["virtual_mechanism.left.x[1]"]) * 512
+    speed = two["virtual_mechanism.left.v[1]"]
+    np.testing.assert_allclose(step, (speed[1:] + speed[:-1]) / 2, atol=1e-4)

@@ -1,0 +1,102 @@
+"""`--explain`, phases and recorded traces: what runs when is told, and is what runs."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.commands import main
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.faults import Fault
+from hapticlink.orchestrator.ticks import aligned, periodic
+
+
+def test_explain_tells_blocks_and_the_samples_behind_inputs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments = ["run", "closed-loop", "--explain", "--set", "graphics.rate=128"]
+    with pytest.raises(SystemExit, match="0"):
+        main([*arguments, "--set", "hold=foh"])
+    told = capsys.readouterr().out
+    assert not list(tmp_path.iterdir())
+    assert "ticks of 1/512 s, gauss-seidel" in told
+    assert "haptics: every 1 ticks: hand (sampled), controller (sampled)" in told
+    assert "virtual_environment.P_c -> controller.P_c: foh of a projector" in told
+    assert re.search(r"^block A: the start, haptics 1, graphics 4$", told, re.M)
+    assert re.search(r"^  evaluate virtual_environment.P_c -> controller.P_c$", told, re.M)
+    assert re.search(r"^  step virtual_environment dticks 4$", told, re.M)
+    # One hyperperiod, both ends in it: the projector is of the newest frame.
+    rows = re.findall(r"^ +(\d+)  .* controller: x_D@(\d+) .* P_c@(\d+)$", told, re.M)
+    assert rows == [(t, t, "4" if t == "4" else "0") for t in "01234"]
+
+
+def test_first_frame_ends_at_the_phase() -> None:
+    base, period, first = Fraction(1, 1000), Fraction(1, 50), Fraction(7, 1000)
+    assert list(periodic(period, base, 60, first))[:4] == [0, 7, 27, 47]
+    assert aligned(Fraction(1, 30), base, 100, Fraction(1, 60))[:4] == (0, 17, 50, 84)
+    assert aligned(Fraction(1, 30), base, 100) == aligned(
+        Fraction(1, 30), base, 100, Fraction(1, 30)
+    )
+
+
+@pytest.mark.parametrize("align", ["exact", "tick"])
+def test_a_phase_moves_the_frames(tmp_path: Path, align: str) -> None:
+    options = ["duration=0.2", "graphics.phase=0.01", f"graphics.align={align}"]
+    experiment = simulate("closed-loop", tmp_path, options)
+    assert experiment.outcome.fault is None
+    frames = experiment.results.graphics["time"]
+    expected = np.array([0.0, *(0.01 + np.arange(6) / 30)])
+    if align == "tick":
+        expected = np.ceil(expected * 512 - 1e-9) / 512
+    np.testing.assert_allclose(frames, expected[expected <= 102 / 512], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (["graphics.phase=0.05"], "within a period"),
+        (["graphics.phase=0"], "within a period"),
+        (["graphics.phase=0.01", "graphics.rate={min=10, max=60}"], "needs a fixed rate"),
+        (["graphics.rate={trace='none.csv'}"], "cannot be read as a trace"),
+        (["delays.hand.F=-1.0"], "a latency is 0 or more"),
+        (["delays.hand.F={loss=1.5}"], "a probability is between 0 and 1"),
+        (["substeps.hand=4"], "is no plant of this scene"),
+        (["get_after_set=['hand']"], "is no plant of this scene"),
+        (["downsampling=zoh"], "there are latest, mean"),
+    ],
+)
+def test_bad_rates_and_delays_are_told(tmp_path: Path, options: list[str], why: str) -> None:
+    with pytest.raises(Fault, match=why):
+        simulate("closed-loop", tmp_path, options)
+
+
+def test_a_recorded_trace_is_a_list_of_frames_beside_its_scene(tmp_path: Path) -> None:
+    stamps = ["1.600", "1.617", "1.634", "1.700  # a hitch", "1.716", "1.8"]
+    (tmp_path / "frames.csv").write_text("time,fps\n" + "\n".join(stamps))
+    scene = tmp_path / "traced.toml"
+    scene.write_text('extends = "closed-loop"\nduration = 0.2\n[graphics]\nrate.trace="frames.csv"')
+    experiment = simulate(str(scene), tmp_path / "out")
+    run = experiment.results.run
+    assert run["scene"]["graphics"]["rate"] == [0.017, 0.034, 0.1, 0.116, 0.2]
+    frames = experiment.results.graphics["time"]
+    expected = np.ceil(np.array([0, 0.017, 0.034, 0.1, 0.116]) * 512) / 512
+    np.testing.assert_allclose(frames, expected, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("time\n0.1\nsoon", "line 3: 'soon' is no time"),
+        ("0.2\n0.1", "line 2: 0.1 s does not come after 0.2 s"),
+        ("0.1", "1 time stamps"),
+    ],
+)
+def test_what_is_no_trace_is_told_by_its_line(tmp_path: Path, text: str, why: str) -> None:
+    (tmp_path / "frames.csv").write_text(text)
+    with pytest.raises(Fault, match=re.escape(why)):
+        simulate("closed-loop", tmp_path, [f"graphics.rate={{trace='{tmp_path}/frames.csv'}}"])

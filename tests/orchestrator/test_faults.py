@@ -1,0 +1,254 @@
+"""Faults made to happen through real FMUs: what each policy does, that results are kept, and that
+no process and no folder stays behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator import results
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.faults import InputFault
+
+from .foreign_fmus import SLAVE, c_fmu, python_fmu, python_fmu_of, run, scene
+
+resource = pytest.importorskip("resource")  # these are the signals and limits of POSIX
+
+ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
+OTHER = '[[fmu]]\nname = "other"\npath = "Other.fmu"\n'
+ISOLATED = "isolate = true\n"
+
+
+def folders() -> set[str]:
+    return {p.name for p in Path(tempfile.gettempdir()).glob("hapticlink-*")}
+
+
+def children() -> set[str]:
+    own = Path(f"/proc/{os.getpid()}/task")
+    found = (task / "children" for task in own.iterdir()) if own.exists() else ()
+    return {child for path in found if path.exists() for child in path.read_text().split()}
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left_behind(own_temporary_folder: Path) -> Iterator[None]:
+    before = folders(), children(), list(sys.path), os.getcwd()
+    yield
+    assert folders() <= before[0]
+    assert children() <= before[1]
+    assert os.getcwd() == before[3]
+    assert not [p for p in sys.path if "hapticlink-" in p]
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize("value", ["float('nan')", "float('inf')"])
+def test_a_value_that_is_not_finite_stops_or_is_held(
+    tmp_path: Path, value: str, isolate: str
+) -> None:
+    body = f"self.y = {value} if self.steps == 5 else float(self.steps)"
+    python_fmu(tmp_path, "Lost", body)
+    one = ONE.format("Lost.fmu") + isolate
+    experiment, found = run(tmp_path, one)
+    assert f"output y is {value[7:10]} at t = 0.078125 s" in str(experiment.outcome.fault)
+    assert found.haptics["one.y"].tolist() == [0, 1, 2, 3, 4]
+    experiment, found = run(tmp_path, one, "faults.nan=hold")
+    assert experiment.outcome.fault is None
+    assert found.haptics["one.y"][:8].tolist() == [0, 1, 2, 3, 4, 4, 6, 7]
+    assert found.run["held_outputs"] == {"one": 1}
+
+
+def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path: Path) -> None:
+    never = SLAVE.format(name="Never", body="pass").replace("0.0, 0.0, 1.0", "0.0, float('nan'), 1")
+    python_fmu_of(tmp_path, never, "never")
+    experiment, _ = run(tmp_path, ONE.format("Never.fmu"), "faults.nan=hold")
+    assert "one: output y is nan at t = 0.0 s" in str(experiment.outcome.fault)
+
+
+HALF = "\n        ".join(
+    ["if size > 0.005: return False", "self.gain += size", "self.y = self.gain"]
+)
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path: Path, isolate: str) -> None:
+    python_fmu(tmp_path, "Stiff", HALF, canGetAndSetFMUstate=True)
+    one = ONE.format("Stiff.fmu") + isolate
+    experiment, found = run(tmp_path, one)
+    assert "one: fmi2DoStep returned discard at t = 0.0 s" in str(experiment.outcome.fault)
+    assert found.haptics["time"].tolist() == [0.0]
+    experiment, found = run(tmp_path, one, "faults.discard=retry")
+    assert experiment.outcome.fault is None
+    np.testing.assert_allclose(found.haptics["one.y"][1:], 1 + found.haptics["time"][1:], 1e-15)
+    assert found.haptics["one.steps"][-1] == 32 * 4  # quarters of 1/64 s are below 5 ms
+    assert found.run["smaller_steps"] == {"one": 32}
+
+
+def test_a_retry_that_cannot_be_says_why(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Stiff", "return False")
+    experiment, _ = run(tmp_path, ONE.format("Stiff.fmu"), "faults.discard=retry")
+    assert "not retried: the FMU lacks canGetAndSetFMUstate" in str(experiment.outcome.fault)
+    python_fmu(tmp_path, "Stiffer", "return False", canGetAndSetFMUstate=True)
+    experiment, _ = run(tmp_path, ONE.format("Stiffer.fmu"), "faults.discard=retry")
+    assert "in steps of 1/1024 too" in str(experiment.outcome.fault)
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_an_exception_in_a_python_fmu(tmp_path: Path, isolate: str) -> None:
+    python_fmu(tmp_path, "Raises", "if time > 0.2: raise RuntimeError('broken gear')")
+    python_fmu(tmp_path, "Other")
+    experiment, found = run(tmp_path, ONE.format("Raises.fmu") + isolate + OTHER)
+    message = str(experiment.outcome.fault)
+    assert message.startswith("one: fmi2DoStep returned fatal at t = 0.203125 s")
+    assert "broken gear" in message
+    assert found.haptics["other.y"][-1] == found.haptics["time"][-1] == 0.203125
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize(("mode", "named"), [(1, None), (2, "discard"), (3, "error"), (4, "fatal")])
+def test_every_status(tmp_path: Path, mode: int, named: str | None, isolate: str) -> None:
+    c_fmu(tmp_path)
+    python_fmu(tmp_path, "Other")
+    text = ONE.format("faults.fmu") + isolate + f"start.mode = {mode}\n" + OTHER
+    experiment, found = run(tmp_path, text)
+    fault = experiment.outcome.fault
+    if named is None:  # a warning is no fault
+        assert fault is None
+        return
+    assert str(fault) == f"one: fmi2DoStep returned {named} at t = 0.046875 s"
+    assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
+    assert found.run["fault"]["kind"] == "FmuFault"
+
+
+@pytest.mark.parametrize(
+    ("body", "how"),
+    [
+        ("if time > 0.2: __import__('os')._exit(3)", "its process ended with exit status 3"),
+        ("if time > 0.2: __import__('ctypes').string_at(0)", "its process ended by SIGSEGV"),
+        ("if time > 0.2: __import__('time').sleep(60)", "did not answer within 2 s"),
+    ],
+)
+def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(
+    tmp_path: Path, body: str, how: str
+) -> None:
+    python_fmu(tmp_path, "Dies", body)
+    ended = tmp_path / "ended"
+    said = f"\n    def terminate(self):\n        open({str(ended)!r}, 'w').close()\n"
+    python_fmu_of(tmp_path, SLAVE.format(name="Other", body="pass") + said, tmp_path.name)
+    text = ONE.format("Dies.fmu") + ISOLATED + OTHER
+    experiment, found = run(tmp_path, text, "faults.timeout=2")
+    message = str(experiment.outcome.fault)
+    assert message.startswith("one: ")
+    assert how in message
+    assert message.endswith("at t = 0.203125 s")
+    np.testing.assert_array_equal(found.haptics["time"], np.arange(14) / 64)
+    assert found.run["end"]["reason"] == "fault"
+    assert ended.exists()  # the other FMU was terminated
+
+
+def test_a_native_crash_and_an_endless_loop(tmp_path: Path) -> None:
+    c_fmu(tmp_path)
+    for mode, how in ((5, "ended by SIGABRT"), (6, "did not answer within 2 s and was ended")):
+        text = ONE.format("faults.fmu") + ISOLATED + f"start.mode = {mode}\n"
+        experiment, found = run(tmp_path, text, "faults.timeout=2")
+        assert how in str(experiment.outcome.fault)
+        assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
+
+
+def test_isolated_runs_give_the_same_bytes(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
+    wire = '[[connection]]\nfrom = "one.y"\nto = "two.u"\nfactor = 0.3\n'
+    back = '[[connection]]\nfrom = "two.y"\nto = "one.u"\n'
+    two = ONE.format("Gives.fmu").replace("one", "two") + "rate = 24\n"
+    text = ONE.format("Gives.fmu") + two + wire + back
+    for out, options in (("a", []), ("b", ["isolate=true"]), ("c", ["fmu.two.isolate=true"])):
+        ended = simulate(str(scene(tmp_path, text)), tmp_path / out, options)
+        assert ended.outcome.fault is None
+        assert (out == "a") == (ended.outcome.isolated == {})
+        for table in ("haptics.csv", "24hz.csv"):
+            assert (tmp_path / out / table).read_bytes() == (tmp_path / "a" / table).read_bytes()
+
+
+def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path: Path) -> None:
+    for name, value in (("first", 1.0), ("second", 2.0)):
+        (tmp_path / name).mkdir()
+        slave = SLAVE.format(name="Same", body=f"self.y = {value}")
+        python_fmu_of(tmp_path / name, slave, "same")
+    two = ONE.format("second/Same.fmu").replace("one", "two")
+    experiment, found = run(tmp_path, ONE.format("first/Same.fmu") + two)
+    assert experiment.outcome.fault is None
+    assert found.haptics["one.y"][-1] == 1.0
+    assert found.haptics["two.y"][-1] == 2.0
+    assert "another module 'msame'" in found.run["isolated"]["two"]
+
+
+# --- the commands from outside ------------------------------------------------------------
+
+COMMAND = [sys.executable, "-c", "from hapticlink.orchestrator.commands import main; main()"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_a_signal_keeps_results_and_exits_with_1(
+    tmp_path: Path, number: signal.Signals, isolate: str
+) -> None:
+    started = tmp_path / "started"
+    body = f"__import__('time').sleep(0.01); time > 0.3 and open({str(started)!r}, 'w').close()"
+    python_fmu(tmp_path, "Slow", body)
+    path = scene(tmp_path, ONE.format("Slow.fmu") + isolate, duration=100)
+    out = tmp_path / "out"
+    with subprocess.Popen([*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE) as running:
+        deadline = time.monotonic() + 60
+        while not started.exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        running.send_signal(number)
+        _, said = running.communicate(timeout=60)
+    assert running.returncode == 1
+    assert b"interrupted at t = " in said
+    found = results.load(out)
+    assert found.run["end"]["reason"] == "interrupted"
+    assert found.haptics["time"][-1] == found.run["end"]["time"] >= 0.3
+
+
+def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path: Path) -> None:
+    most = 40_000
+    limit = f"__import__('resource').setrlimit({resource.RLIMIT_FSIZE}, ({most}, {most}))"
+    python_fmu(tmp_path, "Fine", f"self.y = 1 / 3 + time; self.steps == 1 and {limit}")
+    path = scene(tmp_path, ONE.format("Fine.fmu"), duration=60)
+    out = tmp_path / "out"
+    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    ended = subprocess.run(command, capture_output=True, check=False)
+    assert ended.returncode == 1
+    assert b"File too large" in ended.stderr
+    assert b"Traceback" not in ended.stderr
+    found = results.load(out)
+    assert found.run["end"]["time"] == found.haptics["time"][-1]
+    rows = found.haptics["time"]
+    np.testing.assert_array_equal(rows, np.arange(len(rows)) / 64)
+    assert (out / "haptics.csv").stat().st_size > most - 100
+    assert not list(out.glob(".*"))
+
+
+def test_bad_fmus_are_refused_before_anything_runs(tmp_path: Path) -> None:
+    c_fmu(tmp_path, guid="{another}")
+    experiment, _ = run(tmp_path, ONE.format("faults.fmu"))
+    assert "its guid may not be that of its binary" in str(experiment.outcome.fault)
+    (tmp_path / "broken.fmu").write_bytes((tmp_path / "faults.fmu").read_bytes()[:500])
+    with pytest.raises(InputFault, match="damaged, not a readable zip archive"):
+        run(tmp_path, ONE.format("broken.fmu"))
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["fault"]
+
+
+def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Gives")
+    text = 'extends = "closed-loop"\n' + ONE.format("Gives.fmu")
+    wire = '[[connection]]\nfrom = "one.y"\nto = "controller.x_D[1]"\n'
+    (tmp_path / "scene.toml").write_text(text + wire)
+    with pytest.raises(InputFault, match=r"line 7: .*x_D lose their source, haptic_device.x"):
+        simulate(str(tmp_path / "scene.toml"), tmp_path / "out")

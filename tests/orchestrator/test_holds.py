@@ -1,0 +1,254 @@
+"""Laws of the holds, on samples without FMUs: what each reproduces, and what stays what it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.holds import HOLDS, Site
+from hapticlink.orchestrator.holds.account import repayment
+from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.kinds import Projector, Semidefinite, Unwrapped
+
+Vector = NDArray[np.float64]
+stamps = st.lists(st.integers(1, 40), min_size=3, max_size=8).map(np.cumsum)
+EXTRAPOLATING = ["lead", "foh", "second-order", "delayed", "smooth", "mean"]
+
+
+def fed(hold: Hold, times: Vector, signal: Callable[[float], Vector]) -> Hold:
+    """Every sample pushed at its stamp, the hold asked at each."""
+    for t in times:
+        hold.push(int(t), signal(t), int(t))
+        hold.value(int(t))
+    return hold
+
+
+@given(stamps, st.integers(0, 40), st.floats(0, 20), st.integers(0, 2))
+def test_a_polynomial_of_the_holds_degree_is_continued_exactly(
+    times: Vector, later: int, ahead: float, degree: int
+) -> None:
+    coefficients = np.array([0.5, -0.3, 0.01][: degree + 1])
+
+    def signal(t: float) -> Vector:
+        return np.array([np.polynomial.polynomial.polyval(t, coefficients)])
+
+    def slope(t: float) -> Vector:
+        derivative = np.polynomial.polynomial.polyder(coefficients)
+        return np.array([np.polynomial.polynomial.polyval(t, derivative) if degree else 0.0])
+
+    tick = int(times[-1]) + later
+    true = signal(tick + ahead)
+    for name, exact_to in (("zoh", 0), ("foh", 1), ("second-order", 2)):
+        if degree <= exact_to:
+            value = fed(HOLDS[name](Site(1)), times, signal).value(tick, ahead)
+            np.testing.assert_allclose(value, true, rtol=1e-9, atol=1e-9)
+    if degree <= 1:
+        own = HOLDS["foh-derivative"](Site(1))
+        own.push(int(times[0]), np.concatenate([signal(times[0]), slope(times[0])]), int(times[0]))
+        np.testing.assert_allclose(own.value(tick, ahead), true, rtol=1e-9, atol=1e-9)
+        period = times[-1] - times[-2]
+        lead = fed(HOLDS["lead"](Site(1)), times, signal).value(tick)
+        np.testing.assert_allclose(lead, signal(times[-1] + period / 2), rtol=1e-9, atol=1e-9)
+
+
+@given(stamps)
+def test_delayed_and_smooth_reach_each_sample_a_period_later(times: Vector) -> None:
+    signal = lambda t: np.array([np.sin(0.3 * t), t * t])  # noqa: E731
+    arrival = int(times[-1])
+    period = arrival - int(times[-2])
+    for name in ("delayed", "smooth"):
+        hold = fed(HOLDS[name](Site(2)), times, signal)
+        np.testing.assert_allclose(hold.value(arrival + period), signal(arrival), atol=1e-9)
+    half = fed(HOLDS["delayed"](Site(2)), times, signal).value(arrival, period / 2)
+    np.testing.assert_allclose(half, (signal(times[-2]) + signal(arrival)) / 2, atol=1e-9)
+
+
+@given(stamps, st.integers(0, 2**32 - 1))
+def test_smooth_has_no_jump_and_no_kink_at_a_sample(times: Vector, seed: int) -> None:
+    samples = iter(np.random.default_rng(seed).normal(size=(len(times), 1)))
+    hold, eps = HOLDS["smooth"](Site(1)), 1e-6
+    hold.push(0, next(samples), 0)
+    for t in times[:-1].tolist():
+        before = [hold.value(t, -s * eps).copy() for s in (2, 1, 0)]
+        hold.push(t, next(samples), t)
+        after = [hold.value(t, s * eps).copy() for s in (0, 1, 2)]
+        np.testing.assert_allclose(after[0], before[2], atol=1e-12)
+        slopes = [(b - a) / eps for a, b in ((before[1], before[2]), (after[0], after[1]))]
+        assert np.abs(slopes[1] - slopes[0]) < 1e-3
+
+
+@given(stamps)
+def test_mean_over_a_slow_step_is_the_integral_of_the_samples(times: Vector) -> None:
+    hold = HOLDS["mean"](Site(1))
+    hold.push(0, np.array([0.0]), 0)
+    assert hold.value(0) == 0.0
+    for t in times.tolist():
+        hold.push(t, np.array([3.0 * t]), t)
+    np.testing.assert_allclose(hold.value(int(times[-1])), 1.5 * times[-1], rtol=1e-12)
+    np.testing.assert_allclose(hold.value(int(times[-1]) + 5), 1.5 * times[-1], rtol=1e-12)
+
+
+def projector(generator: np.random.Generator, rank: int) -> Vector:
+    basis = np.linalg.qr(generator.normal(size=(3, 3)))[0][:, :rank]
+    return (basis @ basis.T).ravel()
+
+
+@pytest.mark.parametrize("name", EXTRAPOLATING)
+@given(seed=st.integers(0, 2**32 - 1), ahead=st.floats(0, 30))
+def test_a_projector_stays_a_projector_of_the_newest_rank(
+    name: str, seed: int, ahead: float
+) -> None:
+    generator = np.random.default_rng(seed)
+    hold = Projector(lambda: HOLDS[name](Site(9)), 9)
+    rank = int(generator.integers(0, 4))
+    for k in range(6):
+        new = k == 0 or k == 3
+        rank = (rank + int(generator.integers(1, 4))) % 4 if new else rank
+        sample = projector(generator, rank)
+        hold.push(10 * k, sample, 10 * k)
+        if new:  # the first of its rank is not mixed with those before
+            np.testing.assert_allclose(hold.value(10 * k, ahead), sample, atol=1e-12)
+        p = hold.value(10 * k, ahead).reshape(3, 3)
+        np.testing.assert_allclose(p, p.T, atol=1e-14)
+        np.testing.assert_allclose(p @ p, p, atol=1e-12)
+        assert round(np.trace(p)) == rank
+
+
+def test_a_turning_direction_is_continued_not_frozen() -> None:
+    """A first-order hold between lines at 0 and 10 degrees points near 15 half a period later."""
+    hold = Projector(lambda: HOLDS["foh"](Site(4)), 4)
+    for stamp, angle in ((0, 0.0), (10, np.radians(10))):
+        line = np.array([np.cos(angle), np.sin(angle)])
+        hold.push(stamp, np.outer(line, line).ravel(), stamp)
+    p = hold.value(15).reshape(2, 2)
+    assert np.degrees(np.arctan2(p[1, 0], p[0, 0])) == pytest.approx(15, abs=0.3)
+
+
+@pytest.mark.parametrize("name", EXTRAPOLATING)
+@given(seed=st.integers(0, 2**32 - 1), ahead=st.floats(0, 30), scale=st.floats(-3, 3))
+def test_a_mobility_stays_semidefinite_in_any_units(
+    name: str, seed: int, ahead: float, scale: float
+) -> None:
+    generator = np.random.default_rng(seed)
+    units = np.outer(u := np.array([1.0, 1.0, 10**scale]), u).ravel()
+    plain, scaled = (Semidefinite(lambda: HOLDS[name](Site(9)), 9) for _ in range(2))
+    for k in range(4):
+        root = generator.normal(size=(3, 2))
+        sample = (root @ root.T).ravel()
+        plain.push(10 * k, sample, 10 * k)
+        scaled.push(10 * k, sample * units, 10 * k)
+    m = plain.value(30, ahead).reshape(3, 3)
+    np.testing.assert_allclose(m, m.T, atol=1e-12 * np.abs(m).max())
+    assert np.linalg.eigvalsh(m)[0] >= -1e-12 * np.abs(m).max()
+    other = scaled.value(30, ahead) / units
+    np.testing.assert_allclose(other, m.ravel(), rtol=0, atol=1e-9 * max(np.abs(m).max(), 1.0))
+
+
+def test_a_wrapped_angle_is_continued_over_the_seam() -> None:
+    hold = Unwrapped(lambda: HOLDS["foh"](Site(2)), [1])
+    for k, angle in enumerate((3.0, 3.1, 3.2, 3.3)):
+        wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
+        hold.push(k, np.array([wrapped, wrapped]), k)
+    assert hold.value(4)[1] == pytest.approx(3.4)
+
+
+# --- holds that keep account of energy ----------------------------------------------------
+
+
+def account(name: str, forces: Vector, motion: Vector, every: int) -> Vector:
+    """What a hold of forces renewed every so many ticks has made at each renewal (J)."""
+    x = np.concatenate([[0.0], np.cumsum(motion)])
+    now = np.zeros(1)
+    hold = HOLDS[name](Site(1, displacement=lambda: now))
+    held, made, ideal = 0.0, [], 0.0
+    for tick in range(len(x)):
+        now[:] = x[tick]
+        if tick % every == 0 and (n := tick // every) < len(forces):
+            hold.push(tick, forces[n : n + 1], tick)
+            if n:
+                ideal += (forces[n - 1] + forces[n]) / 2 * (x[tick] - x[tick - every])
+            made.append(held - ideal)
+        if tick < len(motion):
+            held += hold.value(tick)[0] * motion[tick]
+    return np.array(made)
+
+
+forces = st.lists(st.floats(-10, 10), min_size=4, max_size=40).map(np.array)
+
+
+@given(forces, st.integers(1, 8), st.floats(1e-4, 1.0), st.booleans())
+def test_passive_holds_leave_nothing_made_but_the_last_period(
+    forces: Vector, every: int, speed: float, back: bool
+) -> None:
+    """Any force on a steady motion: what a period made is gone when the next has passed."""
+    motion = np.full(every * len(forces), -speed if back else speed)
+    first = np.concatenate([[0.0], -np.diff(forces) / 2 * motion[0] * every])  # zoh, a period
+    tiny = 1e-12 * 10 * np.abs(motion).sum()
+    assert np.allclose(account("zoh", forces, motion, every), np.cumsum(first), atol=tiny)
+    assert np.all(account("passive", forces, motion, every) <= np.maximum(first, 0.0) + tiny)
+    assert np.allclose(account("nepce", forces, motion, every), first, atol=tiny)
+    rest = np.concatenate([forces, np.full(2, forces[-1])])
+    motion = np.full(every * len(rest), motion[0])
+    assert account("passive", rest, motion, every)[-1] <= tiny
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_passive_holds_make_next_to_nothing_of_random_smooth_signals(seed: int) -> None:
+    """A spring on random motion, renewed every fifth tick: a tenth of what zero order makes."""
+    generator = np.random.default_rng(seed)
+    t = np.arange(4001)
+    rates, phases = generator.uniform(0.005, 0.05, 8), generator.uniform(0, 6.28, 8)
+    x = np.sin(np.outer(t, rates) + phases).sum(axis=1)
+    spring = -100.0 * (x[::5] - x[0])
+    made = {n: account(n, spring, np.diff(x), 5)[-1] for n in ("zoh", "passive", "nepce")}
+    assert made["zoh"] > 0
+    assert made["passive"] < 0.1 * made["zoh"]
+    assert abs(made["nepce"]) < 0.1 * made["zoh"]
+
+
+def wall(stiffness: float, every: int, limit: float) -> tuple[float, float, float]:
+    """(peak mm, peak to peak of the last 0.5 s in mm, energy mJ) of a hand's push on a wall."""
+    mass, damping, period, substeps = 0.04, 0.8, 1e-3, 40
+    quantum = 2 * np.pi * 0.010 / 1024
+    x, v, energy, base, held, path = 0.029, 0.0, 0.0, 0.0, 0.0, []
+    before = np.floor(x / quantum) * quantum
+    for k in range(1500):
+        measured = np.floor(x / quantum) * quantum
+        moved, before = measured - before, measured
+        energy += held * moved
+        if k % every == 0:
+            base = min(max(stiffness * (measured - 0.030), 0.0), 2.0)
+        # The wall's force opposes x: what it absorbs is -(energy made).
+        excess, largest = np.array([max(-energy, 0.0)]), np.array([limit * abs(moved) / period])
+        control = -float(repayment(excess, np.array([moved]), largest)[0])
+        held = min(max(base + control, -2.0), 2.0)
+        for _ in range(substeps):
+            v += period / substeps * (400.0 * (0.033 - x) - damping * v - held) / mass
+            x += period / substeps * v
+        path.append(x * 1e3)
+    return max(path), max(path[-500:]) - min(path[-500:]), energy * 1e3
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "every", "limit", "expected"),
+    [
+        (400, 1, 0.0, (33.53, 0.001, -0.32)),
+        (2500, 1, 0.0, (31.79, 1.658, -17.6)),
+        (2500, 1, 0.8, (31.79, 0.080, -1.81)),
+        (400, 5, 0.0, (34.07, 5.277, -69.67)),
+        (400, 5, 0.8, (33.90, 0.001, -1.44)),
+    ],
+)
+def test_passivity_controller_on_a_virtual_wall(
+    stiffness: float, every: int, limit: float, expected: tuple[float, float, float]
+) -> None:
+    """The passivity controller of Hannaford & Ryu, alpha <= 0.8: rows computed independently."""
+    peak, swing, energy = wall(stiffness, every, limit)
+    assert peak == pytest.approx(expected[0], abs=0.006)
+    assert swing == pytest.approx(expected[1], abs=0.0006)
+    assert energy == pytest.approx(expected[2], abs=0.006 if abs(expected[2]) < 10 else 0.06)

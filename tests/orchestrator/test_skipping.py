@@ -1,0 +1,83 @@
+"""What a scene does not need is left out, and leaving it out changes no result."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator import needs, scene_file
+from hapticlink.orchestrator.blocks import blocks
+from hapticlink.orchestrator.costs import costs
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import Table
+from hapticlink.orchestrator.timeline import timeline
+
+SHORT = "duration=0.15"
+
+
+def haptics(scene: str, folder: Path, *options: str) -> Table:
+    done = simulate(scene, folder, [SHORT, *options])
+    assert done.outcome.fault is None
+    return done.results.haptics
+
+
+def same(one: Table, other: Table, tolerance: float = 0.0) -> None:
+    common = [c for c in one.columns if c in other.columns]
+    assert "virtual_mechanism.x[1]" in common
+    for column in common:
+        np.testing.assert_allclose(
+            one[column], other[column], rtol=tolerance, atol=tolerance, err_msg=column
+        )
+
+
+def test_a_graphics_block_that_nothing_depends_on_changes_no_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = ("controller.topology=false", "controller.impedance=false")
+    without = haptics("closed-loop", tmp_path / "without", *options)
+    assert "graphics" not in {b.clock for b in blocks(scene_file.load("closed-loop", options))}
+    monkeypatch.setattr(needs, "graphics_block", lambda scene: ["to look at"])
+    shown = simulate("closed-loop", tmp_path / "with", [SHORT, *options])
+    assert "virtual_environment.x[1]" in shown.results.graphics.columns
+    same(without, shown.results.haptics)
+
+
+def test_directions_without_a_topology_controller_change_no_bit(tmp_path: Path) -> None:
+    off = "controller.topology=false"
+    without = haptics("closed-loop", tmp_path / "without", off)
+    shown = haptics("closed-loop", tmp_path / "with", off, "mechanism.directions=true")
+    assert "virtual_mechanism.P_c[1,1]" in shown.columns
+    assert "virtual_mechanism.P_c[1,1]" not in without.columns
+    same(without, shown)
+
+
+def test_bodies_out_of_reach_change_nothing(tmp_path: Path) -> None:
+    near = haptics("obstacles", tmp_path / "near")
+    every = haptics("obstacles", tmp_path / "every", "contacts.broad_phase=false")
+    same(near, every, 1e-13)
+
+
+def test_terms_that_are_zero_change_nothing(tmp_path: Path) -> None:
+    without = haptics("five-bar", tmp_path / "without")
+    zero = ("linkage.gravity=[0.0, 0.0]", "linkage.joint.elbow1.friction=0.0")
+    same(without, haptics("five-bar", tmp_path / "zero", *zero), 1e-13)
+
+
+def test_what_is_left_out_is_told_with_its_reason() -> None:
+    told = {n.part: (n.needed, n.why) for n in needs.needs(scene_file.load("obstacles"))}
+    assert told["loop closures"] == (False, "no loop: no multiplier, no projection")
+    assert told["link2 on post"] == (False, "out of reach: no narrow phase")
+    assert told["contacts"] == (True, "2 pairs, 4 places, detected by graphics")
+    assert told["virtual_environment"] == (True, "for Lambda_inv, P_c, contact geometry")
+    alone = {n.part: n.needed for n in needs.needs(scene_file.load("five-bar"))}
+    assert not alone["virtual_environment"]
+    assert alone["loop closures"]
+
+
+@pytest.mark.parametrize("name", ["five-bar", "obstacles"])
+def test_skipping_saves_operations_and_signals(name: str) -> None:
+    scene = scene_file.load(name)
+    time = timeline(scene)
+    kept, every = (costs(scene, time, skip=skip) for skip in (True, False))
+    assert sum(c.operations for c in kept) < 0.9 * sum(c.operations for c in every)
+    assert sum(c.signals for c in kept) < 0.9 * sum(c.signals for c in every)
