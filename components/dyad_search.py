@@ -21,7 +21,8 @@ OTHERS = 'take mechanism.formulation = "partitioning" or "multipliers"'
 
 
 def find_dyads(model: LinkageModel, start: np.ndarray) -> list[Dyad]:
-    """One for each loop in turn, at start (q, p); of several the farthest from its branch point.
+    """One for each loop in turn, at start (q, p); of several one that can never fold (all links in
+    line, where its branches meet), and of these the one farthest from it at the start.
 
     A dyad may stand on those of earlier loops. Raises ValueError for a loop without one, with the
     reason for each that it might have been.
@@ -31,7 +32,7 @@ def find_dyads(model: LinkageModel, start: np.ndarray) -> list[Dyad]:
     found: list[Dyad] = []
     for i, loop in enumerate(linkage.loop):
         name = loop_name(linkage, i)
-        fit: list[tuple[float, Candidate]] = []
+        fit: list[tuple[bool, float, Candidate]] = []
         reasons: list[str] = []
         for dyad, known in _candidates(linkage, i):
             why = _unfit(dyad, known, taken)
@@ -39,18 +40,40 @@ def find_dyads(model: LinkageModel, start: np.ndarray) -> list[Dyad]:
                 reasons.append(why)
                 continue
             side = ca.Function("side", [model.q, model.p.vector], [dyad.side(model)])
-            fit.append((abs(float(side(start[:n], start[n:]))), (dyad, known)))
+            share = abs(float(side(start[:n], start[n:])))
+            fit.append((_never_folds(model, start, i, dyad), share, (dyad, known)))
         if not fit:
             told = "; ".join(dict.fromkeys(reasons)) or "it joins one body to the ground"
             raise ValueError(
                 f"loop `{name}` ({loop.bodies[0]} to {loop.bodies[1]}) has no closed form, as no "
                 f"two links beside its cut joint make a dyad: {told}; {OTHERS}"
             )
-        dyad, known = max(fit, key=lambda each: each[0])[1]
+        dyad, known = max(fit, key=lambda each: each[:2])[2]
         taken = {j: f"loop `{name}` stands on it" for j in known} | taken
         taken |= {j.name: f"loop `{name}` sets it" for j in dyad.joints}
         found.append(dyad)
     return found
+
+
+def _never_folds(model: LinkageModel, start: np.ndarray, index: int, dyad: Dyad) -> bool:
+    """Whether the loop's other links, of lengths r, keep the dyad's ends at a distance that lies
+    inside (|l1 - l2|, l1 + l2): theirs is at most sum r, at least 2 max r - sum r.
+
+    False where a joint that slides changes a length."""
+    loop, n = model.linkage.loop[index], model.q.numel()
+    chains = [_chain(model.linkage, body) for body in loop.bodies]
+    own = [[j for j in a if j not in b] for a, b in (chains, chains[::-1])]
+    around = [*own[0], *reversed(own[1])]
+    if not isinstance(dyad, ThreePivots) or any(j.type != "revolute" for j in around):
+        return False
+    cut = model.frames[loop.bodies[0]].point(model.p[f"{loop_name(model.linkage, index)}.at1"])
+    points = ca.horzcat(cut, *(model.twists(j)[0] for j in around))
+    values = np.array(ca.Function("p", [model.q, model.p.vector], [points])(start[:n], start[n:]))
+    lengths = np.linalg.norm(np.roll(values, -1, axis=1) - values, axis=0)
+    middle = 0 if dyad.target is None else 1 + around.index(dyad.second.joint)
+    r = np.delete(lengths, [middle - 1, middle])
+    l1, l2 = lengths[middle - 1], lengths[middle]
+    return bool(l1 + l2 > r.sum() and abs(l1 - l2) < 2 * r.max() - r.sum())
 
 
 def _chain(linkage: Linkage, body: str) -> list[Joint]:

@@ -8,7 +8,13 @@ import math
 from collections.abc import Iterable, Iterator
 
 from hapticlink.components.specs import Linkage
-from hapticlink.orchestrator import contact_checks, coupling_checks, foreign_checks, needs, option_checks
+from hapticlink.orchestrator import (
+    contact_checks,
+    coupling_checks,
+    foreign_checks,
+    needs,
+    option_checks,
+)
 from hapticlink.orchestrator.conditions import parse_condition
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.latency import Latency

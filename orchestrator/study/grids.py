@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from hapticlink.orchestrator.study.cases import RATES, VARIABLE
-from hapticlink.orchestrator.sweep.row import Row
+from hapticlink.orchestrator.sweep.row import METRIC, Row
 
 COLUMNS = (*RATES, VARIABLE)
+COUPLING, MODELLING, ENERGY = "coupling_1s_mm", "modelling_1s_mm", "held_energy_made_J"
+APART = 42.0, 1.0
+"""mm, the length of a link, and rad: what is further apart is not one hand."""
 
 
 @dataclass(frozen=True)
 class Cell:
     """A metric where all runs of a cell last, the largest of its seeds; otherwise the earliest
-    end (s)."""
+    end (s), that of the whole run where handle and operational point came apart."""
 
     value: float | None
     end: float
@@ -35,9 +38,15 @@ def grid(rows: Iterable[Row], metric: str, **where: str) -> Grid:
 
 def _cell(group: list[Row], metric: str) -> Cell:
     end = min(row.get("end_time_s", 0.0) for row in group)
-    if any(row["end"] != "duration" or metric not in row for row in group):
+    if not all(_lasts(row) and metric in row for row in group):
         return Cell(None, end)
     return Cell(max(row[metric] for row in group), end)
+
+
+def _lasts(row: Row) -> bool:
+    """Whether a run comes to its end with handle and operational point less than APART."""
+    whole = row["end"] == "duration"
+    return whole and row[METRIC] < APART[0] and row["theta_max_rad"] < APART[1]
 
 
 def best(found: Grid, rate: str) -> str | None:
@@ -56,3 +65,19 @@ def short(value: float | None) -> str:
     if value is None or value != value:
         return ""
     return f"{float(f'{value:.2g}'):.10g}"
+
+
+def median(values: Sequence[float | None]) -> float:
+    """The upper one of two; NaN of nothing."""
+    found = sorted(v for v in values if v is not None)
+    return found[len(found) // 2] if found else float("nan")
+
+
+def scaled(found: Grid, factor: float) -> Grid:
+    return {
+        h: {
+            r: replace(c, value=None if c.value is None else factor * c.value)
+            for r, c in by.items()
+        }
+        for h, by in found.items()
+    }

@@ -24,7 +24,9 @@ F_HAND = np.array([-0.5, 0.0, -0.0025])
 M = np.array([[0.27, 0.012, 4e-4], [0.012, 0.24, -3e-4], [4e-4, -3e-4, 3.1e-4]])
 ALONE = {"teleoperation": False, "topology": False}
 directions = st.lists(st.tuples(*[st.floats(-1, 1)] * 3), min_size=0, max_size=3)
-pulls = st.tuples(*[st.floats(-5, 5)] * 3)
+# Squares of much smaller numbers underflow.
+moderate = st.floats(-5, 5).map(lambda v: v if abs(v) > 1e-100 else 0.0)
+pulls = st.tuples(*[moderate] * 3)
 
 
 def block(inputs, parameters=None, **spec):
@@ -187,7 +189,7 @@ def test_constraint_wrench_does_no_work_on_free_motion(vectors, pull, motion):
     free = np.linalg.solve(S, (np.eye(3) - P) @ motion)
     F_T = constraint_map(P) @ pull
     size = np.linalg.norm(motion) * np.linalg.norm(S @ pull)  # of parts that may cancel
-    assert abs(F_T @ free) <= 1e-12 * size + 1e-300  # below it numbers have lost their digits
+    assert abs(F_T @ free) <= 1e-12 * size
 
 
 def test_plain_form_leaks_onto_free_motion_and_depends_on_the_scale():

@@ -57,13 +57,19 @@ def test_a_cell_lasts_where_all_its_seeds_do() -> None:
                 lost = hold == "foh" and seed == 2
                 end: Row = {"end": "stop_when", "end_time_s": 1.5} if lost else {"end": "duration"}
                 value = factor * (seed or 1)
-                rows.append({"hold": hold, "rate": rate, "bias": "full", "m": value, **end})
+                point = {"hold": hold, "rate": rate, "bias": "full"}
+                together = {"tracking_max_mm": 5.0, "theta_max_rad": 0.1}
+                rows.append({**point, "m": value, **together, **end})
     found = grid(rows, "m", bias="full")
     assert found["zoh"]["10..60"].value == 4.0  # the worse seed
     assert (found["foh"]["10..60"].value, found["foh"]["10..60"].end) == (None, 0.0)
     assert (best(found, "30"), best(found, "10..60")) == ("foh", "zoh")
     assert lasting(found, "foh") == list(cases.RATES)
     assert grid(rows, "m", bias="none") == {}
+    for what, limit in (("tracking_max_mm", 42.0), ("theta_max_rad", 1.0)):
+        apart = [{**r, what: limit, "end_time_s": 3.0} for r in rows]
+        cell = grid(apart, "m", bias="full")["zoh"]["30"]
+        assert (cell.value, cell.end) == (None, 3.0)
 
 
 def test_numbers_are_short() -> None:
@@ -88,6 +94,7 @@ def test_the_page_names_the_hold_of_the_least_error(
                 "end": "stop_when" if lost else "duration",
                 "end_time_s": 1.25 if lost else 3.0,
                 "tracking_max_mm": error,
+                "theta_max_rad": 0.1,
                 "coupling_1s_mm": error,
                 "coupling_max_mm": error,
                 "modelling_1s_mm": error,
