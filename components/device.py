@@ -68,9 +68,9 @@ def _plant(block: Block) -> ca.Function:
     """(x = [pose, v], u = [tau, F_hand], p, t) -> x' of (4.5)."""
     state, drive = ca.SX.sym("x", 6), ca.SX.sym("u", 7)
     pose, v, tau, F_hand = state[:3], state[3:], drive[:4], drive[4:]
-    M, C = pantograph.dynamics(pose, v, block.p)
+    M, c = pantograph.motion(pose, v, block.p)
     wrench = pantograph.jacobian(pose, block.p).T @ tau + F_hand
-    wrench += pantograph.stop_wrench(pose, v, block.p) - C @ v
+    wrench += pantograph.stop_wrench(pose, v, block.p) - c
     derivative = ca.vertcat(v, ca.solve(M, wrench))
     return ca.Function("ode", [state, drive, block.p.vector, block.t], [derivative])
 
@@ -169,13 +169,13 @@ def haptic_device(device: specs.Device) -> Component:
     else:
         v, F_hand = velocity, u["F_hand"]
 
-    M, C = pantograph.dynamics(measured, v, p)
+    M, c = pantograph.motion(measured, v, p)
     output = {
         "x": measured,
         "v": v,
         "F_hand_observed": F_hand,
         "M": M,
-        "c": C @ v,
+        "c": c,
         "workspace_margin": ca.mmin(pantograph.margins(pose, p)),
         "x_true": pose,
         "v_true": velocity,

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 DERIVATIVES = {"x": "v", "v": "a", "q": "qd", "qd": "qdd", "x_true": "v_true"}
 """The port of a source that is the derivative of another; `der(y)` is that of any y."""
 
+UNMIXED = frozenset({"contacts"})
+"""Ports whose samples stand for themselves: no value is made of two of them."""
+
 
 @dataclass(frozen=True)
 class Rules:
@@ -136,6 +139,8 @@ def _misfit(
     needs = HOLDS[hold].needs
     if iterated and hold not in INTERPOLATING:
         return f"coupling = 'iterated' interpolates here; take one of {', '.join(INTERPOLATING)}"
+    if c.source_port in UNMIXED and not HOLDS[hold].gives_samples:
+        return f"rows of {c.source_port} name bodies, points and normals: between two there is none"
     if needs == "derivative" and derivative(c, units) is None:
         known = DERIVATIVES.get(c.source_port, f"der({c.source_port})")
         return (

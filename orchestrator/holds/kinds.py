@@ -25,7 +25,7 @@ from hapticlink.orchestrator.holds.hold import Hold
 
 Vector = NDArray[np.float64]
 
-KINDS = {"P_c": "projector", "Lambda_inv": "semidefinite", "M": "semidefinite"}
+KINDS = {"P_c": "projector"} | dict.fromkeys(("Lambda_inv", "M", "D"), "semidefinite")
 """By the port of the source. A scene's [kinds] says it for other FMUs."""
 
 

@@ -232,3 +232,15 @@ def test_stops_push_back_and_only_beyond_the_margin():
     assert stop(outside, (0, 0, 0))[1] < 0
     assert stop(outside, (0, 0.3, 0))[1] < stop(outside, (0, 0, 0))[1]
     np.testing.assert_array_equal(stop(outside, (0, -50.0, 0)), 0)  # never pulls
+
+
+def test_velocity_term_is_the_christoffel_matrix_times_the_velocity():
+    term = function([POSE, V], *pantograph.motion(POSE, V, P))
+    for pose, v in (
+        ((0.01, -0.02, 0.4), (0.3, -0.2, 4.0)),
+        ((-0.04, 0.03, 3.5), (-0.1, 0.5, -6.0)),
+    ):
+        M, C = dynamics(pose, v)
+        M_again, c = term(pose, v)
+        np.testing.assert_allclose(M_again, M, rtol=1e-14)
+        np.testing.assert_allclose(np.ravel(c), C @ v, rtol=1e-12, atol=1e-16)

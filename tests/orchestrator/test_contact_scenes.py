@@ -72,3 +72,12 @@ def test_a_second_hand_holds_its_point(tmp_path: Path) -> None:
     step = np.diff(two["virtual_mechanism.left.x[1]"]) * 512
     speed = two["virtual_mechanism.left.v[1]"]
     np.testing.assert_allclose(step, (speed[1:] + speed[:-1]) / 2, atol=1e-4)
+
+
+def test_contact_rows_are_never_mixed(tmp_path):
+    """A default hold that extrapolates leaves them as sampled, and run.json says so."""
+    experiment = simulate("enclosure", tmp_path / "run", ["hold=foh", "duration=0.2"])
+    holds = experiment.results.run["holds"]
+    name = next(name for name in holds if ".contacts ->" in name)
+    assert "zoh" in str(holds[name])
+    assert "foh" in str(holds.values())
