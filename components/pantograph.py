@@ -20,13 +20,15 @@ Parameters = Mapping[str, ca.SX]
 
 
 class Arm(NamedTuple):
-    """One arm at a pose: angles (rad) of both links in the world, points (m)."""
+    """One arm at a pose: angles (rad) of both links in the world, points (m), and the offset of
+    its crank end from the handle (m)."""
 
     proximal: ca.SX
     distal: ca.SX
     proximal_direction: ca.SX
     base: ca.SX
     reach: ca.SX
+    offset: ca.SX
 
 
 def arms(pose: ca.SX, p: Parameters) -> Iterator[Arm]:
@@ -46,14 +48,15 @@ def arms(pose: ca.SX, p: Parameters) -> Iterator[Arm]:
     for base_y, crank_end, toward in planes:
         for side in (-1, 1):
             base = ca.vertcat(p["base_x"] + side * p["base_half_width"], base_y)
-            d = pose[:2] + crank_end * half_crank - base
+            offset = crank_end * half_crank
+            d = pose[:2] + offset - base
             r = ca.norm_2(d)
             phi = toward * ca.pi / 2 + ca.atan2(-toward * d[0], toward * d[1])
             s = -toward * side
             proximal = phi + s * ca.acos((l1**2 + r**2 - l2**2) / (2 * l1 * r))
             distal = phi - s * ca.acos((l2**2 + r**2 - l1**2) / (2 * l2 * r))
             direction = ca.vertcat(ca.cos(proximal), ca.sin(proximal))
-            yield Arm(proximal, distal, direction, base, r)
+            yield Arm(proximal, distal, direction, base, r, offset)
 
 
 def base_angles(pose: ca.SX, p: Parameters) -> ca.SX:
@@ -61,39 +64,56 @@ def base_angles(pose: ca.SX, p: Parameters) -> ca.SX:
     return ca.vertcat(*(arm.proximal for arm in arms(pose, p)))
 
 
+def _rates(arm: Arm, p: Parameters) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Rows of d/dpose, (1, 3), (2, 3) and (1, 3): proximal angle, distal centre, distal angle.
+
+    With u, n along and across the links, base + l1 u1 + l2 u2 = e(pose) gives, along u2 and u1,
+
+        proximal' = u2 . e' / (l1 u2 . n1),   distal' = -u1 . e' / (l2 u2 . n1)
+    """
+
+    def across(r: ca.SX) -> ca.SX:
+        return ca.vertcat(-r[1], r[0])
+
+    u1, u2 = arm.proximal_direction, ca.vertcat(ca.cos(arm.distal), ca.sin(arm.distal))
+    n1, n2 = across(u1), across(u2)
+    end = ca.horzcat(ca.SX.eye(2), across(arm.offset))
+    s = ca.dot(u2, n1)
+    proximal = u2.T @ end / (p["proximal_length"] * s)
+    distal = -(u1.T @ end) / (p["distal_length"] * s)
+    centre = p["proximal_length"] * n1 @ proximal + p["distal_center"] * n2 @ distal
+    return proximal, centre, distal
+
+
 def jacobian(pose: ca.SX, p: Parameters) -> ca.SX:
     """J_q = dq/dpose, shape (4, 3): qdot = J_q v, and torques tau give the wrench J_q' tau."""
-    at = ca.SX.sym("pose", 3)
-    return ca.substitute(ca.jacobian(base_angles(at, p), at), at, pose)
+    return ca.vertcat(*(_rates(arm, p)[0] for arm in arms(pose, p)))
 
 
-def _coordinates(pose: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
-    """(g, m): angle or point g_i(pose) of every rotor, link and the handle, and its inertia."""
-    coordinates, inertias = [pose], [p["handle_mass"], p["handle_mass"], p["handle_inertia"]]
+def _every_rate(pose: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
+    """(J, m): rows of d/dpose of every rotor, link and the handle with its crank, and the
+    inertia of each."""
+    rows, inertias = [ca.SX.eye(3)], [p["handle_mass"], p["handle_mass"], p["handle_inertia"]]
     about_base = p["proximal_inertia"] + p["proximal_mass"] * p["proximal_center"] ** 2
     for arm in arms(pose, p):
-        elbow = arm.base + p["proximal_length"] * arm.proximal_direction
-        toward_end = ca.vertcat(ca.cos(arm.distal), ca.sin(arm.distal))
-        distal_center = elbow + p["distal_center"] * toward_end
-        coordinates += [arm.proximal, distal_center, arm.distal]
+        rows += _rates(arm, p)
         inertias += [p["rotor_inertia"] + about_base]
         inertias += [p["distal_mass"], p["distal_mass"], p["distal_inertia"]]
-    return ca.vertcat(*coordinates), ca.vertcat(*inertias)
+    return ca.vertcat(*rows), ca.vertcat(*inertias)
 
 
 def dynamics(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
     """M_d and C_d of (4.5), both (3, 3), M_d vdot + C_d v = wrench.
 
-    With J = dg/dpose of all coordinates g and m = diag of their inertias,
+    With J the rates of all links and m = diag of their inertias,
 
         M_d = J' m J,   C_d = J' m Jdot,
 
     so that dM_d/dt - 2 C_d is skew.
     """
     at = ca.SX.sym("pose", 3)
-    g, m = _coordinates(at, p)
-    J = ca.jacobian(g, at)
-    J_dot = ca.reshape(ca.jtimes(ca.vec(J), at, v), J.shape)
+    J, m = _every_rate(at, p)
+    J_dot = ca.reshape(ca.jtimes(ca.vec(ca.densify(J)), at, v), J.shape)
     weighted = J.T @ ca.diag(m)
     M, C = ca.substitute([weighted @ J, weighted @ J_dot], [at], [pose])
     return M, C
@@ -102,9 +122,8 @@ def dynamics(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
 def motion(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
     """M_d and the vector C_d v = J' m (Jdot v) of `dynamics`, for less work than C_d."""
     at = ca.SX.sym("pose", 3)
-    g, m = _coordinates(at, p)
-    J = ca.jacobian(g, at)
-    bias = ca.jtimes(ca.jtimes(g, at, v), at, v)
+    J, m = _every_rate(at, p)
+    bias = ca.jtimes(J @ v, at, v)
     M, c = ca.substitute([J.T @ ca.diag(m) @ J, J.T @ (m * bias)], [at], [pose])
     return M, c
 
