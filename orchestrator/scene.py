@@ -72,7 +72,11 @@ class Graphics(GraphicsCopy):
 
 
 def _hand_type(table: Any) -> str:
-    return table.get("type", "constant") if isinstance(table, dict) else table.type
+    return (
+        table.get("type", "constant")
+        if isinstance(table, dict)
+        else getattr(table, "type", "constant")
+    )
 
 
 Hand = Annotated[

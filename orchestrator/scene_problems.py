@@ -47,14 +47,14 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
     whole = copy.deepcopy(data)
     for filled in (None, 1.0):
         for path, _ in known:
-            node = whole
-            for part in path[:-1]:
-                node = node[part]
+            node = _at(whole, path[:-1])
             if isinstance(node, list):
-                node[path[-1]] = filled  # type: ignore[index]
-            elif filled is None:
+                place = typing.cast("int", path[-1])
+                node += [filled] * (place + 1 - len(node))  # too short a vector
+                node[place] = filled
+            elif isinstance(node, dict) and filled is None:
                 node.pop(path[-1], None)
-            elif _is_needed(path):
+            elif isinstance(node, dict) and _is_needed(path):
                 node[path[-1]] = filled
     try:
         document = to_json(whole, inf_nan_mode="constants")
@@ -63,6 +63,16 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
         return []
     told = {path for path, _ in known}
     return [problem for problem in found if problem[0] not in told]
+
+
+def _at(data: Any, path: Path) -> Any:
+    """What stands at `path`, None where nothing does (any more)."""
+    for part in path:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return data
 
 
 def _is_needed(path: Path) -> bool:

@@ -162,3 +162,23 @@ def test_scenes_that_extend_each_other_are_refused(tmp_path):
     two.write_text(f'extends = "{one}"\n')
     with pytest.raises(InputFault, match="circle"):
         scene_file.load(str(one))
+
+
+def test_too_short_a_vector_and_a_misspelt_key_are_both_told() -> None:
+    text = GOOD.replace("  0.0,\n  0.0,\n", "  0.0,\n").replace("rate = 30", "rat = 30")
+    found = findings(text)
+    assert found["hand.wrench[2]"][1] == "is missing"
+    assert "did you mean 'rate'" in found["graphics.rat"][1]
+
+
+def test_a_scene_that_is_not_a_table_where_one_is_needed() -> None:
+    assert "graphics" in findings(
+        GOOD.replace("[graphics]\nrate = 30\n", "").replace(
+            "duration = 1.0", "duration = 1.0\ngraphics = 3"
+        )
+    )
+
+
+@pytest.mark.parametrize("value", ["3", "'x'", "[1.0]"])
+def test_a_hand_that_is_no_table(value: str) -> None:
+    assert any(key.startswith("hand") for key in findings(GOOD, f"hand = {value}"))
