@@ -8,7 +8,6 @@ import tomllib
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -19,7 +18,7 @@ from hapticlink.orchestrator import families, overrides, scene_checks
 from hapticlink.orchestrator.faults import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.frame_trace import frame_times
 from hapticlink.orchestrator.latency import Latency
-from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.scene import Scene, adapter
 from hapticlink.orchestrator.scene_problems import beyond, problems
 from hapticlink.orchestrator.toml_lines import Path, key_lines, line_of
 
@@ -98,7 +97,7 @@ def from_tables(
     try:
         # As JSON, because strict JSON takes arrays for tuples and still refuses "1" for 1.
         document = to_json(data, inf_nan_mode="constants")
-        found = _adapter().validate_json(document)
+        found = adapter().validate_json(document)
     except pydantic.ValidationError as error:
         found_there = problems(error.errors(include_url=False), data)
         found_there += beyond(found_there, data)
@@ -109,12 +108,6 @@ def from_tables(
         found = replace(found, device=replace(found.device, sensing=found.sensing))
     object.__setattr__(found, "_place", place)
     return found
-
-
-@cache
-def _adapter() -> pydantic.TypeAdapter[Scene]:
-    """Making it takes ten times as long as a scene; sweeps read hundreds."""
-    return pydantic.TypeAdapter(Scene)
 
 
 def _folder(scene: str) -> FilePath | None:

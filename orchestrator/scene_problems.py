@@ -13,7 +13,7 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator import scene_checks
-from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.scene import Scene, adapter
 from hapticlink.orchestrator.toml_lines import Path
 
 
@@ -58,7 +58,7 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
                 node[path[-1]] = filled
     try:
         document = to_json(whole, inf_nan_mode="constants")
-        found = scene_checks.check(pydantic.TypeAdapter(Scene).validate_json(document))
+        found = scene_checks.check(adapter().validate_json(document))
     except pydantic.ValidationError:
         return []
     told = {path for path, _ in known}

@@ -165,30 +165,6 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
 
 # --- whole sweeps -----------------------------------------------------------------------------
 
-BAR = """title = "A bar at 0.5 m/s"
-duration = 0.25
-[linkage]
-operational_point = { body = "bar" }
-[[linkage.body]]
-name = "bar"
-mass = 1.0
-inertia = 0.01
-[[linkage.joint]]
-name = "slide"
-type = "prismatic"
-axis = 0.0
-child = "bar"
-[linkage.start_velocity]
-slide = 0.5
-"""
-
-
-@pytest.fixture
-def bar(tmp_path: Path) -> Path:
-    path = tmp_path / "bar.toml"
-    path.write_text(BAR)
-    return path
-
 
 def status(*arguments: object) -> int:
     with pytest.raises(SystemExit) as ended:
