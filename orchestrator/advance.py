@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from typing import Any
 
@@ -10,9 +10,7 @@ import numpy as np
 
 from hapticlink.orchestrator.board import Board
 from hapticlink.orchestrator.crossings import port
-from hapticlink.orchestrator.fmu import Instance
-from hapticlink.orchestrator.holds import Hold
-from hapticlink.orchestrator.meters import Meters
+from hapticlink.orchestrator.live import Call, Live
 from hapticlink.orchestrator.schemes.operations import Part
 from hapticlink.orchestrator.step_control import (
     ORDER,
@@ -24,7 +22,6 @@ from hapticlink.orchestrator.step_control import (
 from hapticlink.orchestrator.system import System
 from hapticlink.orchestrator.ticks import exact
 
-Call = Callable[[int], object]
 SLOT = 1
 """Of the saved states; slot 0 is the iteration's."""
 
@@ -35,16 +32,13 @@ class Advancer:
     def __init__(
         self,
         clock: str,
-        system: System,
-        board: Board,
-        instances: Mapping[str, Instance],
-        holds: Mapping[str, Hold],
-        meters: Meters,
+        live: Live,
         calls: Callable[[Part], Sequence[Call]],
     ) -> None:
+        system, board = live.system, live.board
         assert system.step_control is not None
         self._settings = settings = system.step_control
-        self._clock, self._values, self._meters = clock, board.values, meters
+        self._clock, self._values, self._meters = clock, board.values, live.meters
         self._calls, self._seconds = calls, system.timeline.seconds
         base, longest = system.timeline.base, system.timeline.clock(clock).longest
         self._least = max(int(exact(settings.min) / base), 1)
@@ -53,7 +47,7 @@ class Advancer:
         self._size = float(self._least)
         self._before, self.steps = 0.0, Steps()
         plants = [u.name for u in system.units if u.clock == clock and not u.sampled]
-        self._instances = [instances[n] for n in plants]
+        self._instances = [live.instances[n] for n in plants]
         self._outputs = _compared(system, board, plants)
         between = [
             c
@@ -62,7 +56,7 @@ class Advancer:
         ]
         self._order = min((ORDER.get(c.hold or "", 1) for c in between), default=1)
         ours = [c for c in system.connections if c.hold and {c.source, c.target} & {*plants}]
-        self._holds = [holds[c.name] for c in ours]
+        self._holds = [live.holds[c.name] for c in ours]
         self._bonds = []
         for c in between:
             if found := port(c, system.power):

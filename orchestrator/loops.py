@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +12,11 @@ from hapticlink.orchestrator.board import Board
 from hapticlink.orchestrator.crossings import derivative
 from hapticlink.orchestrator.faults import Fault
 from hapticlink.orchestrator.fixed_points import SOLVERS, Found, Newton, Vector
-from hapticlink.orchestrator.holds import HOLDS, Hold
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.iteration import Iteration
-from hapticlink.orchestrator.meters import Meters
+from hapticlink.orchestrator.live import Call, Live
 from hapticlink.orchestrator.schemes.operations import Repeat
 from hapticlink.orchestrator.system import Connection, System
-
-Call = Callable[[int], object]
 
 
 @dataclass
@@ -56,19 +54,17 @@ class Loop:
     def __init__(
         self,
         operation: Repeat,
-        system: System,
-        board: Board,
-        holds: Mapping[str, Hold],
+        live: Live,
         calls: tuple[Sequence[Call], Sequence[Call], Sequence[Call]],
-        meters: Meters,
     ) -> None:
+        system, board = live.system, live.board
         self._guess, self._body, self._again = calls
         self._settings: Iteration = system.iteration
-        self._board, self._meters, self._dticks = board, meters, operation.dticks
+        self._board, self._meters, self._dticks = board, live.meters, operation.dticks
         self.counts = Iterations()
         self._seconds = system.timeline.seconds
         connections = [c for c in system.connections if c.name in operation.connections]
-        self._held = [(holds[c.name], board.sources(c)) for c in connections if c.hold]
+        self._held = [(live.holds[c.name], board.sources(c)) for c in connections if c.hold]
         self._places: list[int] = []
         self._names: list[str] = []
         for c in connections:

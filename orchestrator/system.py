@@ -92,6 +92,10 @@ class System:
     def unit(self) -> Mapping[str, Unit]:
         return {u.name: u for u in self.units}
 
+    @cached_property
+    def connection(self) -> Mapping[str, Connection]:
+        return {c.name: c for c in self.connections}
+
     def into(self, name: str) -> tuple[Connection, ...]:
         """Connections to the inputs of an FMU."""
         return tuple(c for c in self.connections if c.target == name and not c.initial)

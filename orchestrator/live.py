@@ -1,0 +1,86 @@
+"""The live side of a system: instances, board, holds, meters and recorders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+from hapticlink.orchestrator.board import Board
+from hapticlink.orchestrator.fmu import Instance
+from hapticlink.orchestrator.holding import make_hold
+from hapticlink.orchestrator.initialize import initialize
+from hapticlink.orchestrator.instances import instance, isolated
+from hapticlink.orchestrator.latency import Late
+from hapticlink.orchestrator.meters import Meters
+from hapticlink.orchestrator.results import Recorder
+from hapticlink.orchestrator.system import System
+
+Call = Callable[[int], object]
+
+
+class Live:
+    """What `stack` closes again; rows go to `folder`.
+
+    setters and now_setters fill the inputs of an FMU from the board: as its connections hold them,
+    and as their sources stand now.
+    """
+
+    def __init__(self, system: System, folder: Path, stack: ExitStack) -> None:
+        self.system, self.board = system, Board(system)
+        self.seconds = system.timeline.seconds
+        values = self.board.values
+        self.recorders = {
+            c.name: stack.enter_context(
+                Recorder(
+                    folder / f"{c.name}.csv",
+                    self.board.columns(c.name),
+                    values[self.board.clock(c.name)],
+                )
+            )
+            for c in system.timeline.clocks
+        }
+        self.isolated = isolated(system.units)
+        self.instances: dict[str, Instance] = {}
+        for unit in system.units:
+            view = values[self.board.unit(unit.name)]
+            made = instance(unit, view, system.faults, unit.name in self.isolated)
+            self.instances[unit.name] = stack.enter_context(made)
+        self.holds = {
+            c.name: make_hold(c, system, self.board) for c in system.connections if c.hold
+        }
+        self.meters = Meters(system, self.board)
+        self.setters: dict[str, Call] = {}
+        self.now_setters: dict[str, Call] = {}
+
+    def start(self) -> None:
+        """Initialise; every hold gets its sample of t = 0, every FMU its way to set inputs."""
+        initialize(self.system, self.instances, self.board)
+        values = self.board.values
+        for c in self.system.connections:
+            if c.hold:
+                self.holds[c.name].push(0, values[self.board.sources(c)], 0)
+        self.meters.start()
+        for unit in self.system.units:
+            incoming = self.system.into(unit.name)
+            if not incoming:
+                continue
+            connect = self.instances[unit.name].connect
+            scalars = [s for c in incoming for s in c.inputs]
+            held = [p for c in incoming for p in self.board.places(c)]
+            self.setters[unit.name] = _from(connect(scalars, held), self.board)
+            if unit.name in self.system.get_after_set:
+                sources = [p for c in incoming for p in self.board.sources(c)]
+                self.now_setters[unit.name] = _from(connect(scalars, sources), self.board)
+
+    def links(self) -> dict[str, dict[str, int]]:
+        """What became of the samples of connections with a latency."""
+        late = {n: h.link for n, h in self.holds.items() if isinstance(h, Late)}
+        return {
+            n: {"sent": k.sent, "lost": k.lost, "overtaken": k.overtaken} for n, k in late.items()
+        }
+
+
+def _from(set_from: Callable, board: Board) -> Call:
+    values = board.values
+    return lambda tick: set_from(values)
