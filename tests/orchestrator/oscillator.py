@@ -44,9 +44,11 @@ def exact(times: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([expm(A * (t - WARM)) @ START for t in times])
 
 
-def driven(x: ca.SX, v: ca.SX, force: ca.SX, k: float, c: float, h: ca.SX) -> tuple[ca.SX, ca.SX]:
+def driven(
+    x: ca.SX, v: ca.SX, force: ca.SX, k: float | ca.SX, c: float, h: ca.SX
+) -> tuple[ca.SX, ca.SX]:
     """x'' = force - k x - c v over h, the force constant; exact for c^2 < 4 k."""
-    a, w = c / 2, float(np.sqrt(k - c * c / 4))
+    a, w = c / 2, ca.sqrt(k - c * c / 4)
     e, decay, cos, sin = x - force / k, ca.exp(-a * h), ca.cos(w * h), ca.sin(w * h)
     moved = force / k + decay * (e * cos + (v + a * e) / w * sin)
     return moved, decay * (v * cos - (k * e + a * v) / w * sin)
