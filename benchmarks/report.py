@@ -13,8 +13,10 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from benchmarks.mechanism import LOST, MACHINE, NATIVE, advantage
+from benchmarks.state import versions
 
 COLOURS = {
     NATIVE: "#1b6ca8",
@@ -23,7 +25,6 @@ COLOURS = {
     "Exudyn": "#e0a030",
     "Pinocchio": "#5a8f3c",
 }
-MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 
 
 def write(
@@ -72,7 +73,8 @@ def _page(
     lines = [
         "# Mechanism: error against run time",
         "",
-        f"Made by `{command}` on {platform.machine()}, {os.cpu_count()} cores, one of them used.",
+        f"Made by `{command}` on {platform.machine()}, {os.cpu_count()} cores, one of them used:",
+        ", ".join(f"{name} {number}" for name, number in versions().items()) + ".",
         "Seconds are the least of interleaved rounds and compare within one run only. All codes",
         "start from the same pose and rates and take equal steps; building is not timed. An error",
         "above 0.1 m, or none, is a mechanism that was lost.",
@@ -151,15 +153,12 @@ def _page(
 
 
 def figure_error(path: Path, found: dict) -> None:
-    figure, axes = plt.subplots(1, len(found), figsize=(5.2 * len(found), 4.6), squeeze=False)
+    figure, axes = plt.subplots(1, len(found), figsize=(5.2 * len(found), 4.8), squeeze=False)
     for ax, (case, rows) in zip(axes[0], found.items(), strict=True):
         _error(ax, case, rows)
     axes[0][0].set_ylabel("tip error at the end, m")
-    handles: dict[str, object] = {}
-    for ax in axes[0]:
-        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label.split(":")[0], handle)
-    axes[0][-1].legend(handles.values(), handles.keys(), fontsize=8, loc="upper right")
+    handles = {code: Line2D([], [], color=colour, lw=2) for code, colour in COLOURS.items()}
+    figure.legend(handles.values(), handles, ncols=len(handles), loc="lower center", frameon=False)
     least = [min(v.values()) for rows in found.values() if (v := verdict(rows))]
     finding = (
         f"At equal error the other codes take at least {min(least):.0f} times as long"
@@ -167,37 +166,51 @@ def figure_error(path: Path, found: dict) -> None:
         else "Error against run time"
     )
     figure.suptitle(finding)
-    figure.tight_layout()
+    figure.tight_layout(rect=(0, 0.06, 1, 1))
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
 
 def _error(ax: Axes, case: str, rows: list[dict]) -> None:
+    """Every method's line; those on their code's front are named where they join it."""
     for code, colour in COLOURS.items():
         methods = sorted({r["method"] for r in rows if r["code"] == code})
         if code == MACHINE:  # the same errors as C, shifted: one line tells how far
             methods = [m for m in methods if m == "rk4, projection"]
-        for mark, method in zip(MARKS, methods, strict=False):
-            points = sorted(
-                (r["ms_per_s"], r["error"], r["floor"])
-                for r in rows
-                if r["code"] == code and r["method"] == method and not math.isnan(r["error"])
-            )
+        named = front([r for r in rows if r["code"] == code and r["method"] in methods])
+        for method in methods:
+            mine = [r for r in rows if (r["code"], r["method"]) == (code, method)]
+            points = sorted((r["ms_per_s"], r["error"], r["floor"]) for r in mine)
             kept = [(t, e) for t, e, floor in points if 10 * floor < e < LOST]
-            lost = [t for t, e, _ in points if e >= LOST]
+            on_front = method in named
             if kept:
-                ax.loglog(
-                    *zip(*kept, strict=True),
-                    f"{mark}-",
+                style = {"lw": 1.5, "ms": 4} if on_front else {"lw": 0.8, "ms": 2, "alpha": 0.35}
+                ax.loglog(*zip(*kept, strict=True), "o-", color=colour, **style)
+            if kept and on_front:
+                ax.annotate(
+                    method,
+                    named[method],
+                    (4, 3),
+                    textcoords="offset points",
+                    fontsize=6,
+                    rotation=10,
                     color=colour,
-                    ms=4,
-                    lw=1,
-                    label=f"{code}: {method}",
                 )
-            ax.plot(lost, [LOST] * len(lost), "x", color=colour, ms=6)
+            lost = [t for t, e, _ in points if e >= LOST]
+            ax.plot(lost, [LOST] * len(lost), "x", color=colour, ms=5)
     ax.set_title(case, fontsize=10)
     ax.set_xlabel("run time per simulated second, ms (x: lost)")
     ax.grid(alpha=0.3, which="major")
+
+
+def front(rows: list[dict]) -> dict[str, tuple[float, float]]:
+    """By method, its fastest row (ms, m) that no other of `rows` beats in both error and time."""
+    kept = [r for r in rows if 10 * r["floor"] < r["error"] < LOST]
+    found: dict[str, tuple[float, float]] = {}
+    for r in sorted(kept, key=lambda r: r["ms_per_s"]):
+        if not any(o["error"] < r["error"] and o["ms_per_s"] < r["ms_per_s"] for o in kept):
+            found.setdefault(r["method"], (r["ms_per_s"], r["error"]))
+    return found
 
 
 def figure_growth(path: Path, rows: list[dict]) -> None:

@@ -1,4 +1,4 @@
-"""The mechanism bench as a whole; finished rows are kept and used again."""
+"""The mechanism bench as a whole; finished rows of the same code are kept and used again."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import energy, growth, mechanism, report
+from benchmarks import energy, growth, mechanism, report, state
+
+ROWS = ("runs.csv", "energy.csv", "growth.csv", "references.json")
 
 
 def mechanism_bench(
     out: Path, quick: bool, told: Callable[[str, int, int], None], command: str
 ) -> None:
     """Write README.md, table.csv and two figures to `out`."""
+    state.begin(out, ROWS)
     drifts = energy.measure(out, told)
     sizes = growth.measure(out, quick, told)
     report.write(out, *mechanism.measure(out, quick, told), drifts, sizes, command)

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import hapticlink.components
@@ -43,16 +44,17 @@ def key(material: Mapping[str, Any]) -> str:
     whole = {
         "material": material,
         "versions": {name: version(name) for name in VERSIONS},
-        "sources": _sources(),
+        "sources": sources(hapticlink.components, hapticlink.fmus),
     }
     return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()
 
 
 @cache
-def _sources() -> str:
+def sources(*packages: ModuleType) -> str:
+    """sha256 of the Python files of `packages`."""
     sha = hashlib.sha256()
-    for package in (hapticlink.components, hapticlink.fmus):
-        root = Path(package.__path__[0])
+    for package in packages:
+        root = Path(next(iter(package.__path__)))
         for path in sorted(root.rglob("*.py")):
             sha.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return sha.hexdigest()

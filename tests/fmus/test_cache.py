@@ -57,7 +57,7 @@ def test_versions_are_part_of_the_key(name, monkeypatch):
 
 def test_sources_are_part_of_the_key(monkeypatch):
     before = cache.key(MATERIAL)
-    monkeypatch.setattr(cache, "_sources", lambda: "other")
+    monkeypatch.setattr(cache, "sources", lambda *packages: "other")
     assert cache.key(MATERIAL) != before
 
 

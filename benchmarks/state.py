@@ -1,0 +1,35 @@
+"""What finished rows belong to; rows of another state of the code are measured again."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import benchmarks
+import hapticlink.components
+from hapticlink.fmus.cache import sources
+
+PACKAGES = ("hapticlink", "casadi", "numpy", "scipy", "mujoco", "pin", "exudyn")
+
+
+def versions() -> dict[str, str]:
+    """Of the packages that take part, those that are installed."""
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def begin(out: Path, rows: tuple[str, ...]) -> None:
+    """Keep the files `rows` in `out` only if they were made by these sources and versions."""
+    path = out / "state.json"
+    now = {"sources": sources(hapticlink.components, benchmarks), "versions": versions()}
+    if not path.exists() or json.loads(path.read_text()) != now:
+        for name in rows:
+            (out / name).unlink(missing_ok=True)
+        out.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(now, indent=1) + "\n")
