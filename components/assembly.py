@@ -15,6 +15,7 @@ from hapticlink.components.component import Component
 from hapticlink.components.linkage import LinkageModel, loop_name
 
 STEPS = 12
+MU = 1e-9  # relative to trace(W W')/m
 TOLERANCE = 1e-9  # of the start pose's gap, m
 
 
@@ -30,7 +31,7 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     n = q.numel()
     symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
     at = LinkageModel(model.linkage, model.p, *symbols)
-    least = ClosedLoopSolver(UnitInertia(n), at.W)
+    least = ClosedLoopSolver(UnitInertia(n), at.W, MU)
     parameters = model.p.vector
     shared = {"cse": True}
     newton = ca.Function(

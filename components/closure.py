@@ -4,22 +4,31 @@
 
 The coordinates are eliminated before the constraints that touch them, leaf to root (tree.py);
 what remains, S = W D^-1 W', is made definite by mu (quasi-definite: Vanderbei, SIAM J. Optim.
-5, 1995), and proximal steps S_mu lambda_{k+1} = r + mu lambda_k take mu out of the answer
-again (Parikh & Boyd, Proximal Algorithms, 2014, section 4.1.2). One refinement on the
-unregularised system follows. No pivoting, no branch: redundant and singular closures cost
-the same as regular ones, and lambda is then of least norm.
+5, 1995); a refinement on the unregularised system or proximal steps take mu out of the answer
+again. No pivoting, no branch: redundant and singular closures cost the same as regular ones.
+
+Where an eigenvalue sigma^2 of S is below mu its direction is cut: the closure does not act along
+it. Which mu is right near a singular pose depends on the right-hand side. W D^-1 b lies in the
+range of W by construction, and cutting it lets the linkage go with the acceleration that b alone
+would give: mu is as small as the rounding of S allows (its pivots are then mu within 2e-15 of
+trace(S)/m). c = -Wdot qd does so only for rates on the branch; what the rates are off is divided by
+sigma. `follow` therefore cuts c early, and is for accelerations that are integrated.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Protocol
 
 import casadi as ca
 
 from hapticlink.components.tree import symmetric
 
-MU = 1e-8  # relative to trace(S)/m
-PROXIMAL_STEPS = 1
+# Relative to trace(S)/m.
+MU = 1e-14
+MU_FOLLOWING = 1e-6  # of c in `follow`
+MU_MULTIPLIERS = 1e-9  # of multipliers of least norm: rounding along null(W') is divided by it
+PROXIMAL_STEPS = 2
 
 
 class Inertia(Protocol):
@@ -47,37 +56,69 @@ class UnitInertia:
         return u
 
 
-class ClosedLoopSolver:
-    """Factors of D and W (m x n); m = 0 leaves D^-1 alone."""
+class Regularised:
+    """S + mu 1 for a symmetric, positive semi-definite S; mu is relative to trace(S)/m."""
 
-    def __init__(self, inertia: Inertia, W: ca.SX) -> None:
+    def __init__(self, S: ca.SX, mu: float) -> None:
+        m = S.shape[0]
+        self.shift = mu * ca.trace(S) / m
+        self.d, self.upper, self.order = ca.ldl(ca.sparsify(S + self.shift * ca.SX.eye(m)), False)
+
+    def solve(self, b: ca.SX) -> ca.SX:
+        return ca.ldl_solve(b, self.d, self.upper, self.order)
+
+    def proximal(self, b: ca.SX) -> ca.SX:
+        """S y = b with mu taken out: S_mu y_{k+1} = b + mu y_k (Parikh & Boyd, Proximal
+        Algorithms, 2014, section 4.1.2)."""
+        y = self.solve(b)
+        for _ in range(PROXIMAL_STEPS):
+            y = self.solve(b + self.shift * y)
+        return y
+
+
+class ClosedLoopSolver:
+    """Factors of D and W (m x n); m = 0 leaves D^-1 alone. mu is relative to trace(S)/m."""
+
+    def __init__(self, inertia: Inertia, W: ca.SX, mu: float = MU) -> None:
         self.inertia, self.W = inertia, W
         self.m = W.shape[0]
         if self.m:
             self._Z = inertia.inward(W.T)
             self._Y = ca.diag(inertia.d_inv) @ self._Z
-            S = symmetric(self._Z.T @ self._Y)
-            self._mu = MU * ca.trace(S) / self.m
-            self.S = S
-            self._S_factor = ca.ldl(ca.sparsify(S + self._mu * ca.SX.eye(self.m)), False)
+            self.S = symmetric(self._Z.T @ self._Y)
+            self._sharp = Regularised(self.S, mu)
 
-    def _multipliers(self, residual: ca.SX) -> ca.SX:
-        multipliers = ca.ldl_solve(residual, *self._S_factor)
-        for _ in range(PROXIMAL_STEPS):
-            multipliers = ca.ldl_solve(residual + self._mu * multipliers, *self._S_factor)
-        return multipliers
+    @cached_property
+    def _following(self) -> Regularised:
+        return Regularised(self.S, MU_FOLLOWING)
+
+    @cached_property
+    def _shortening(self) -> Regularised:
+        return Regularised(self.S, MU_MULTIPLIERS)
 
     def solve(self, b: ca.SX, c: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """(a, lambda) for right-hand sides b (n x r) and c (m x r)."""
-        free = ca.diag(self.inertia.d_inv) @ self.inertia.inward(b)
+        """(a, lambda), lambda of least norm, for right-hand sides b (n x r) and c (m x r)."""
+        free = self._free(b)
         if not self.m:
             return self.inertia.outward(free), ca.SX(0, b.shape[1])
-        multipliers = self._multipliers(c - self._Z.T @ free)
-        a = self.inertia.outward(free + self._Y @ multipliers)
-        left = self._multipliers(c - self.W @ a)
-        return a + self.inertia.outward(self._Y @ left), multipliers + left
+        first = self._sharp.solve(c - self._Z.T @ free)
+        a = self.inertia.outward(free + self._Y @ first)
+        left = self._sharp.solve(c - self.W @ a)
+        shortest = self._shortening.proximal(self.S @ (first + left))
+        return a + self.inertia.outward(self._Y @ left), shortest
+
+    def follow(self, b: ca.SX, c: ca.SX) -> ca.SX:
+        """a as in `solve`, unrefined, for rates that are near the branch: n x r."""
+        free = self._free(b)
+        if self.m:
+            taken = self._sharp.solve(-(self._Z.T @ free))
+            free = free + self._Y @ (taken + self._following.proximal(c))
+        return self.inertia.outward(free)
 
     def constrain(self, c: ca.SX) -> ca.SX:
         """The least change a (in the metric D) with W a = c, unrefined: for iterations that
         correct themselves."""
-        return self.inertia.outward(self._Y @ self._multipliers(c))
+        return self.inertia.outward(self._Y @ self._sharp.solve(c))
+
+    def _free(self, b: ca.SX) -> ca.SX:
+        return ca.diag(self.inertia.d_inv) @ self.inertia.inward(b)

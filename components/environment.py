@@ -34,7 +34,7 @@ from hapticlink.components.mechanism_variables import (
     states,
 )
 from hapticlink.components.operational_space import OperationalSpace
-from hapticlink.components.projection import project
+from hapticlink.components.projection import MU, projection
 from hapticlink.components.resisted_output import resisted_directions
 from hapticlink.components.specs import Directions, GraphicsCopy, Linkage
 from hapticlink.components.tree import TreeInertia
@@ -160,19 +160,21 @@ def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX,
     u, p, h, q, qd = block.u, block.p, block.h, model.q, model.qd
     D = TreeInertia(model)
     if joint_sync:
-        solver = ClosedLoopSolver(D, model.W)
+        solver = ClosedLoopSolver(D, model.W, MU)
         pull = D.apply(p["K_g"] * (u["q_ref"] - q) + p["B_g"] * u["qd_ref"])
         weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
         K_g, B_g = ca.diag(p["K_g"]), ca.diag(p["B_g"])
         held = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
-        solver = ClosedLoopSolver(TreeInertia(model, held), model.W)
+        solver = ClosedLoopSolver(TreeInertia(model, held), model.W, MU)
         pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
         weight = ca.SX(1)
     momentum = D.apply(qd) + h * (pull - model.C_qd)
     qd1, _ = solver.solve(momentum / weight, ca.SX(solver.m, 1))
     # Twice: a frame's motion is large for one chord of the closures.
-    return project(model, *project(model, q + h * qd1, qd1))
+    project = projection(model, D)
+    closed, rate = project(*project(q + h * qd1, qd1, p.vector), p.vector)
+    return closed, rate
 
 
 def _branch(block: Block, model: LinkageModel) -> dict[str, ca.SX]:

@@ -39,9 +39,10 @@ from hapticlink.components.mechanism_variables import (
 )
 from hapticlink.components.operational_space import OperationalSpace
 from hapticlink.components.partitioning import Partitioning
-from hapticlink.components.projection import project
+from hapticlink.components.projection import projection
 from hapticlink.components.resisted_output import resisted_directions
 from hapticlink.components.specs import Directions, Linkage, Mechanism
+from hapticlink.components.tree import TreeInertia
 
 
 def virtual_mechanism(
@@ -195,12 +196,15 @@ def _step(
         given = ca.Function("efforts", [x, u, p, t], [efforts], {"cse": True})
         embedded = Embedding(model, block.p, independent.start_pose(model, block.p), given)
         return independent.step(mechanism.integrator, embedded, x, u, p, t, block.h)
-    qdd, _ = space.solver.solve(efforts, closing)
+    qdd = space.solver.follow(efforts, closing)
     ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
     if model.linkage.loop and mechanism.formulation == "partitioning":
         parted = Partitioning(model, block.p, independent.start_pose(model, block.p), ode)
         return independent.step(mechanism.integrator, parted, x, u, p, t, block.h)
     after = integrators.step(mechanism.integrator, ode, x, u, p, t, block.h, range(n))
     if mechanism.stabilization == "projection":
-        after = ca.vertcat(*project(model, after[:n], after[n:]))
+        own = space.terms.inertia
+        project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))
+        q1, qd1 = project(after[:n], after[n:], p)
+        after = ca.vertcat(q1, qd1)
     return after

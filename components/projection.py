@@ -4,6 +4,10 @@
 
 A is factored once, at the pose that the integrator left, and used as a chord: each repeat
 multiplies the closure error by about the size of the correction itself.
+
+Near a singular pose a gap that is rounding (1e-16 m) would move the pose by 1e-16/sigma, and its
+rate by 1e-16/sigma^2, along the direction that W is losing, onto another branch. So mu is large
+here, as it may be: what one step leaves, away from the singular pose the next one closes.
 """
 
 from __future__ import annotations
@@ -14,23 +18,23 @@ from hapticlink.components.closure import ClosedLoopSolver
 from hapticlink.components.linkage import LinkageModel
 from hapticlink.components.tree import TreeInertia
 
-REPEATS = 3
+REPEATS = 3  # of the pose
+RATE_REPEATS = 2
+MU = 1e-6  # relative to trace(W D^-1 W')/m
 
 
-def project(model: LinkageModel, q: ca.SX, qd: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """(q, qd), expressions, moved onto h(q) = 0 and W(q) qd = 0; unchanged without a loop."""
-    if not model.linkage.loop:
-        return q, qd
-    p = model.p.vector
-    h = ca.Function("h", [model.q, p], [model.h])
-    W = ca.Function("W", [model.q, p], [model.W])
-    solver = ClosedLoopSolver(TreeInertia(model), model.W)
-    closed, rate = model.q, model.qd
-    for _ in range(REPEATS):
-        closed = closed - solver.constrain(h(closed, p))
-    W_closed = W(closed, p)
-    for _ in range(REPEATS):
-        rate = rate - solver.constrain(W_closed @ rate)
-    moved = ca.Function("project", [model.q, model.qd, p], [closed, rate], {"cse": True})
-    closed, rate = moved(q, qd, p)
-    return closed, rate
+def projection(model: LinkageModel, inertia: TreeInertia) -> ca.Function:
+    """(q, qd, p) -> (q, qd) moved onto h(q) = 0 and W(q) qd = 0; unchanged without a loop.
+
+    inertia: the model's own."""
+    p, closed, rate = model.p.vector, model.q, model.qd
+    if model.linkage.loop:
+        h = ca.Function("h", [model.q, p], [model.h])
+        W = ca.Function("W", [model.q, p], [model.W])
+        solver = ClosedLoopSolver(inertia, model.W, MU)
+        for _ in range(REPEATS):
+            closed = closed - solver.constrain(h(closed, p))
+        W_closed = W(closed, p)
+        for _ in range(RATE_REPEATS):
+            rate = rate - solver.constrain(W_closed @ rate)
+    return ca.Function("project", [model.q, model.qd, p], [closed, rate], {"cse": True})
