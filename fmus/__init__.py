@@ -1,8 +1,8 @@
 """How a component becomes an FMU, and how that FMU is checked."""
 
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build import build, build_native
 from hapticlink.fmus.cache import cached
 from hapticlink.fmus.check import check_fmu
 from hapticlink.fmus.errors import FmuError
 
-__all__ = ["FmuError", "build", "cached", "check_fmu"]
+__all__ = ["FmuError", "build", "build_native", "cached", "check_fmu"]

@@ -42,7 +42,7 @@ def require_platform() -> None:
         return
     raise UnsupportedPlatform(
         f"pythonfmu has no binary for {sys.platform} on {platform.machine()}, only for Linux "
-        "and Windows on x86-64; build and run Python FMUs there"
+        'and Windows on x86-64; take packaging = "native"'
     )
 
 
@@ -69,11 +69,11 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
     slave = Path(python_slave.__file__).read_bytes()
     about = _about(component)
     content = {**files, "slave": slave, "about": json.dumps(about).encode(), "xml": describe("")}
-    digest = _digest(content)
-    module = f"hapticlink_{digest[:16]}"
+    whole = digest(content)
+    module = f"hapticlink_{whole[:16]}"
     files |= {
-        "modelDescription.xml": describe(f"{{{uuid.UUID(digest[:32])}}}"),
-        "resources/component.json": json.dumps(about | {"digest": digest}).encode(),
+        "modelDescription.xml": describe(f"{{{uuid.UUID(whole[:32])}}}"),
+        "resources/component.json": json.dumps(about | {"digest": whole}).encode(),
         f"resources/{module}.py": slave,
         "resources/slavemodule.txt": f"{module}\n".encode(),
     }
@@ -149,7 +149,8 @@ def _about(component: Component) -> dict[str, object]:
     }
 
 
-def _digest(content: Mapping[str, bytes]) -> str:
+def digest(content: Mapping[str, bytes]) -> str:
+    """sha256 of names and bytes."""
     sha = hashlib.sha256()
     for name in sorted(content):
         sha.update(f"{name}\0{len(content[name])}\0".encode() + content[name])

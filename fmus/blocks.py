@@ -5,11 +5,11 @@ The factories are imported when a block is built, so a cached FMU needs no casad
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from hapticlink.fmus import cache
 from hapticlink.fmus.errors import FmuError
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from hapticlink.components.component import Component
 
 Settings = Mapping[str, Any]
+Packaging = Literal["python", "native"]
 
 
 def _components(module: str) -> Any:
@@ -74,26 +75,41 @@ def component(name: str, settings: Settings, step_size: float) -> Component:
 
 
 def build_block(
-    name: str, settings: Settings, room: Path, *, stop_time: float, step_size: float
+    name: str,
+    settings: Settings,
+    room: Path,
+    *,
+    stop_time: float,
+    step_size: float,
+    packaging: Packaging = "python",
+    platforms: Sequence[str] = (),
 ) -> Path:
     """The path of the block's FMU: in the cache, or made in `room` where the cache is off.
 
     settings holds the records of `components.specs` that the block is made of, by the names
-    of a scene's tables; step_size (s) is its communication step.
+    of a scene's tables; step_size (s) is its communication step. platforms are those of a native
+    FMU, this machine's where none is named.
     """
+    experiment = {"stop_time": stop_time, "step_size": step_size}
 
     def make(folder: Path) -> Path:
-        from hapticlink.fmus.build import build
+        from hapticlink.fmus.build import build, build_native
 
         made = component(name, settings, step_size)
-        return build(made, folder, stop_time=stop_time, step_size=step_size)
+        if packaging == "python":
+            return build(made, folder, **experiment)
+        return build_native(made, folder, platforms=platforms, **experiment)
 
     if cache.folder() is None:
         return make(room)
-    material = {
+    material: dict[str, Any] = {
         "block": name,
         "settings": {k: asdict(v) if is_dataclass(v) else v for k, v in settings.items()},  # type: ignore[arg-type]
-        "stop_time": stop_time,
-        "step_size": step_size,
+        **experiment,
     }
+    if packaging == "native":
+        from hapticlink.fmus.native.compiler import compiler_version, host_platform
+
+        material["compiler"] = compiler_version()
+        material["platforms"] = list(platforms) or [host_platform()]
     return cache.cached(material, make)

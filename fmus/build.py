@@ -1,9 +1,10 @@
-"""A component becomes a Python FMU on disk."""
+"""A component becomes an FMU on disk."""
 
 from __future__ import annotations
 
 import os
 import uuid
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fmpy.validation import validate_fmu
@@ -20,7 +21,7 @@ def build(
     stop_time: float = 1.0,
     step_size: float = 1 / 512,
 ) -> Path:
-    """Write `<folder>/<component.name>.fmu` and return its path.
+    """Write the Python FMU `<folder>/<component.name>.fmu` and return its path.
 
     stop_time and step_size (s) are the FMU's default experiment. The same component gives
     the same bytes. The file appears whole or not at all, and only if FMPy's validation has
@@ -28,17 +29,46 @@ def build(
     pythonfmu has no binary.
     """
     require_platform()
+    return _publish(
+        component.name, entries(component, stop_time=stop_time, step_size=step_size), folder
+    )
+
+
+def build_native(
+    component: Component,
+    folder: Path | str,
+    *,
+    platforms: Sequence[str] = (),
+    stop_time: float = 1.0,
+    step_size: float = 1 / 512,
+) -> Path:
+    """As `build`, but with the component compiled for each of `platforms`, of
+    `hapticlink.fmus.native.PLATFORMS`, by default for this machine. Needs no Python to run.
+
+    Raises FmuError where ziglang is not installed or has no such platform.
+    """
+    from hapticlink.fmus.native import archive, host_platform
+
+    made = archive.entries(
+        component,
+        stop_time=stop_time,
+        step_size=step_size,
+        platforms=tuple(platforms) or (host_platform(),),
+    )
+    return _publish(component.name, made, folder)
+
+
+def _publish(name: str, files: Mapping[str, bytes], folder: Path | str) -> Path:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    files = entries(component, stop_time=stop_time, step_size=step_size)
-    target = folder / f"{component.name}.fmu"
-    unfinished = folder / f".{component.name}.{uuid.uuid4().hex}.fmu"
+    target = folder / f"{name}.fmu"
+    unfinished = folder / f".{name}.{uuid.uuid4().hex}.fmu"
     try:
         with unfinished.open("xb") as file:
             write(files, file)
         findings = validate_fmu(str(unfinished))
         if findings:
-            raise FmuError(f"`{component.name}` fails validation:\n  " + "\n  ".join(findings))
+            raise FmuError(f"`{name}` fails validation:\n  " + "\n  ".join(findings))
         os.replace(unfinished, target)
     finally:
         unfinished.unlink(missing_ok=True)

@@ -51,11 +51,11 @@ def key(material: Mapping[str, Any]) -> str:
 
 @cache
 def sources(*packages: ModuleType) -> str:
-    """sha256 of the Python files of `packages`."""
+    """sha256 of the Python and C files of `packages`."""
     sha = hashlib.sha256()
     for package in packages:
         root = Path(next(iter(package.__path__)))
-        for path in sorted(root.rglob("*.py")):
+        for path in sorted((*root.rglob("*.py"), *root.rglob("*.c"))):
             sha.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return sha.hexdigest()
 

@@ -25,7 +25,6 @@ from hapticlink.components.component import Component, Variable
 from hapticlink.fmus.units import base_unit
 
 CAPABILITIES = {
-    "needsExecutionTool": "true",
     "canHandleVariableCommunicationStepSize": "true",
     "canInterpolateInputs": "false",
     "canBeInstantiatedOnlyOncePerProcess": "false",
@@ -43,9 +42,12 @@ LOG_CATEGORIES = {
 
 
 def model_description(
-    component: Component, guid: str, *, stop_time: float, step_size: float
+    component: Component, guid: str, *, stop_time: float, step_size: float, needs_tool: bool = True
 ) -> bytes:
-    """The XML text, the same bytes for the same arguments (it carries no date)."""
+    """The XML text, the same bytes for the same arguments (it carries no date).
+
+    needs_tool: the FMU runs only where Python is.
+    """
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -55,7 +57,8 @@ def model_description(
         generationTool=f"hapticlink {version('hapticlink')}",
         variableNamingConvention="structured",
     )
-    ET.SubElement(root, "CoSimulation", {"modelIdentifier": component.name, **CAPABILITIES})
+    runs = {"modelIdentifier": component.name, "needsExecutionTool": str(needs_tool).lower()}
+    ET.SubElement(root, "CoSimulation", runs | CAPABILITIES)
     _unit_definitions(root, component)
     categories = ET.SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.board import Board
-from hapticlink.orchestrator.crossings import port
+from hapticlink.orchestrator.bonds import bond
+from hapticlink.orchestrator.faults import FmuFault
 from hapticlink.orchestrator.live import Call, Live
+from hapticlink.orchestrator.loops import Unconverged
 from hapticlink.orchestrator.schemes.operations import Part
 from hapticlink.orchestrator.step_control import (
     ORDER,
@@ -46,9 +48,12 @@ class Advancer:
         self._most = max(min(most, longest), self._least)
         self._size = float(self._least)
         self._before, self.steps = 0.0, Steps()
+        self._growth = 2.0  # of a step; less for a while where an FMU has failed
         plants = [u.name for u in system.units if u.clock == clock and not u.sampled]
         self._instances = [live.instances[n] for n in plants]
-        self._outputs = _compared(system, board, plants)
+        compared = _compared(system, board, plants)
+        self._outputs = [place for place, _ in compared]
+        self._nominal = np.array([nominal for _, nominal in compared])
         between = [
             c
             for c in system.connections
@@ -59,9 +64,9 @@ class Advancer:
         self._holds = [live.holds[c.name] for c in ours]
         self._bonds = []
         for c in between:
-            if found := port(c, system.power):
-                moved = board.port(system.unit[c.target], found.displacement.partition(".")[2])
-                self._bonds.append((board.sources(c), board.places(c), moved))
+            if found := bond(c, system, board):
+                places = found.of(board.sources(c)), found.of(board.mean(c)), [*found.moved]
+                self._bonds.append((found.work, places))
 
     def advance(self, tick: int, dticks: int) -> None:
         take = self._double if self._settings.method == "doubling" else self._trust
@@ -99,6 +104,26 @@ class Advancer:
             self._size = 2.0
             return size
         saved = self._save()
+        try:
+            error = self._both(tick, size, saved)
+        except (FmuFault, Unconverged) as fault:
+            if size <= self._least or not (isinstance(fault, Unconverged) or fault.passing):
+                raise
+            self._restore(saved)
+            self.steps.failed += 1
+            self._size, self._growth = size / 2, 1.0
+            return 0
+        self._aim(size * integral(error, self._order), self._growth)
+        self._growth = min(1.1 * self._growth, 2.0)
+        if error > 1.0 and size > self._least:
+            self._restore(saved)
+            self.steps.rejected += 1
+            return 0
+        self.steps.count(self._seconds(size), error > 1.0)
+        return size
+
+    def _both(self, tick: int, size: int, saved: Any) -> float:
+        """The error of a step, in units of the tolerance; its two halves stand."""
         self._step(tick, size)
         self._read(tick + size)
         whole = self._values[self._outputs]
@@ -108,15 +133,8 @@ class Advancer:
             self._step(at, dticks)
             self._read(at + dticks)
         halves = self._values[self._outputs]
-        share = np.abs(halves - whole) / (1.0 + np.abs(halves)) / (2**self._order - 1)
-        error = float(share.max(initial=0.0)) / self._seconds(size) / self._settings.tolerance
-        self._aim(size * integral(error, self._order), 2.0)
-        if error > 1.0 and size > self._least:
-            self._restore(saved)
-            self.steps.rejected += 1
-            return 0
-        self.steps.count(self._seconds(size), error > 1.0)
-        return size
+        share = np.abs(halves - whole) / (self._nominal + np.abs(halves)) / (2**self._order - 1)
+        return float(share.max(initial=0.0)) / self._seconds(size) / self._settings.tolerance
 
     def _save(self) -> Any:
         for instance in self._instances:
@@ -138,11 +156,12 @@ class Advancer:
     def _trust(self, tick: int, size: int) -> int:
         self._step(tick, size)
         values = self._values
-        began = [tuple(values[places] for places in bond) for bond in self._bonds]
+        began = [[values[at] for at in places] for _, places in self._bonds]
         self._read(tick + size)
         error = 0.0
-        for (source, held, x), (sources, _, moved) in zip(began, self._bonds, strict=True):
-            residual = (held - (source + values[sources]) / 2) @ (values[moved] - x)
+        for (source, held, x), (work, places) in zip(began, self._bonds, strict=True):
+            sources, _, moved = places
+            residual = (work * (held - (source + values[sources]) / 2)) @ (values[moved] - x)
             error = max(error, abs(float(residual)))
         assert self._settings.energy is not None
         error /= self._settings.tolerance * self._settings.energy
@@ -153,12 +172,13 @@ class Advancer:
         return size
 
 
-def _compared(system: System, board: Board, plants: Sequence[str]) -> list[int]:
-    """The outputs whose error counts: those that do not depend directly on an input, which at the
-    end of a step is still that of the step before; all where there are no others."""
+def _compared(system: System, board: Board, plants: Sequence[str]) -> list[tuple[int, float]]:
+    """(place, nominal) of the outputs whose error counts: those that do not depend directly on an
+    input, which at the end of a step is still that of the step before; all where there are no
+    others."""
     every = [
-        (board.scalar(n, s.name), system.unit[n].description.follows(s))
+        ((board.scalar(n, s.name), s.nominal), system.unit[n].description.follows(s))
         for n in plants
         for s in system.unit[n].description.outputs
     ]
-    return [place for place, follows in every if not follows] or [place for place, _ in every]
+    return [output for output, follows in every if not follows] or [output for output, _ in every]

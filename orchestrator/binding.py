@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 
+import numpy as np
+
+from hapticlink.orchestrator import input_derivatives, rounds
 from hapticlink.orchestrator.advance import Advancer
 from hapticlink.orchestrator.conditions import COMPARISONS
+from hapticlink.orchestrator.isolated import Isolated
 from hapticlink.orchestrator.live import Call, Live
 from hapticlink.orchestrator.loops import Loop
 from hapticlink.orchestrator.schemes.operations import (
@@ -36,24 +40,33 @@ class Binder:
 
     def __init__(self, live: Live, calls: Callable[[Part], Sequence[Call]]) -> None:
         self._live, self._calls = live, calls
+        self._isolated = {n: i for n, i in live.instances.items() if isinstance(i, Isolated)}
         self.loops: dict[Repeat, Loop] = {}
         self.advancers: dict[str, Advancer] = {}
+
+    def bind_all(
+        self, operations: Iterable[Operation], bind: Callable[[Operation], Call] | None = None
+    ) -> list[Call]:
+        return rounds.bound(operations, bind or self.bind, self._isolated)
 
     def bind(self, operation: Operation) -> Call:
         live = self._live
         match operation:
             case Get(fmu, ahead):
                 return live.meters.read(fmu, ahead, live.instances[fmu].get)
-            case Set(fmu, now):
+            case Set(fmu, now, derivatives):
                 if now:
                     return live.now_setters[fmu]
-                return live.meters.fed(fmu, live.setters[fmu])
+                setters = live.varying_setters if derivatives else live.setters
+                return live.meters.fed(fmu, setters[fmu])
             case Step(fmu, dticks, part, parts):
                 return self._step(fmu, dticks, part, parts)
             case Push(connection, ahead):
                 return self._push(connection, ahead)
-            case Evaluate(connection, ahead):
+            case Evaluate(connection, ahead, 0):
                 return self._evaluate(connection, float(ahead))
+            case Evaluate(connection, ahead, order, width):
+                return self._derive(connection, float(ahead), order, float(width))
             case Blend(connection, points):
                 return self._blend(connection, points)
             case Save(fmu):
@@ -108,6 +121,22 @@ class Binder:
 
         return evaluate
 
+    def _derive(self, connection: str, ahead: float, order: int, width: float) -> Call:
+        live = self._live
+        hold, values, board = live.holds[connection], live.board.values, live.board
+        view, span = values[board.hold(connection)], board.derivatives(connection)
+        derived, mean = values[span], values[span.stop : span.stop + len(view)]
+        instants = [ahead + i * width / order for i in range(order + 1)]
+        seconds = live.seconds(width)
+
+        def derive(tick: int) -> None:
+            found = np.stack([hold.value(tick, at) for at in instants])
+            view[:] = found[0]
+            derivatives, mean[:] = input_derivatives.split(found, seconds)
+            derived[:] = derivatives.ravel()
+
+        return derive
+
     def _advancer(self, clock: str) -> Advancer:
         if clock not in self.advancers:
             self.advancers[clock] = Advancer(clock, self._live, self._calls)
@@ -128,15 +157,16 @@ class Binder:
         live = self._live
         if operation in self.loops:
             return self.loops[operation]
-        body = [
-            live.meters.read(op.fmu, op.ahead, live.instances[op.fmu].read)
-            if isinstance(op, Get)
-            else self.bind(op)
-            for op in operation.body
-        ]
-        guess, again = ([self.bind(op) for op in ops] for ops in (operation.guess, operation.again))
-        calls = (guess, body, again)
-        loop = Loop(operation, self._live, calls)
+
+        def bind(op: Operation) -> Call:  # finite or not: an iteration comes back from infinity
+            if isinstance(op, Get):
+                return live.meters.read(op.fmu, op.ahead, live.instances[op.fmu].read)
+            return self.bind(op)
+
+        body = self.bind_all(operation.body, bind)
+        calls = (self.bind_all(operation.guess), body, self.bind_all(operation.again))
+        held = [self.bind(op) for op in operation.body if isinstance(op, Blend)]
+        loop = Loop(operation, self._live, calls, held)
         self.loops[operation] = loop
         return loop
 

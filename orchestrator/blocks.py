@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,10 @@ from hapticlink.orchestrator.ticks import Timeline
 
 @dataclass(frozen=True)
 class BlockPlan:
-    """A block that the scene asks for: its settings and the clock it runs at."""
+    """A block that the scene asks for: its settings and its rate, "haptics" or "graphics"."""
 
     name: str
-    clock: str
+    rate: str
     settings: dict[str, Any]
     kind: str = ""
 
@@ -73,14 +74,17 @@ def settled(scene: Scene, block: BlockPlan, timeline: Timeline) -> dict[str, Any
     """The settings of a block, with what the timeline says."""
     if not scene.local_model or block.name != "virtual_mechanism":
         return block.settings
-    frame = timeline.clock("graphics").longest
-    return {**block.settings, "frame_s": timeline.seconds(frame)}
+    frame = timeline.clock(timeline.of["virtual_environment"])
+    return {**block.settings, "frame_s": timeline.seconds(frame.longest)}
 
 
-def fmu_files(scene: Scene, timeline: Timeline, room: Path) -> dict[str, Path]:
+def fmu_files(
+    scene: Scene, timeline: Timeline, room: Path, platforms: Sequence[str] = ()
+) -> dict[str, Path]:
     """Block name -> FMU file, from the cache, or made in `room` where the cache is off.
 
-    Raises InputFault where the settings give no FMU (a loop that does not close).
+    platforms are those of native FMUs, this machine's where none is named. Raises InputFault where
+    the settings give no FMU (a loop that does not close).
     """
     files = {}
     for block in blocks(scene):
@@ -88,9 +92,11 @@ def fmu_files(scene: Scene, timeline: Timeline, room: Path) -> dict[str, Path]:
             files[block.name] = build_block(
                 block.made_by,
                 settled(scene, block, timeline),
-                room,
+                room / block.name,  # two hands are two files of one name
                 stop_time=scene.duration,
-                step_size=timeline.seconds(timeline.clock(block.clock).longest),
+                step_size=timeline.seconds(timeline.clock(timeline.of[block.name]).longest),
+                packaging=scene.packaging,
+                platforms=platforms,
             )
         except FmuError as error:
             raise InputFault(str(error)) from error

@@ -1,4 +1,5 @@
-"""One vector with all outputs, clock by clock and FMU by FMU, and after them all held values."""
+"""One vector with all outputs, clock by clock and FMU by FMU, and after them all held values, with
+the derivatives and the mean of those that vary within a step."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator import input_derivatives
 from hapticlink.orchestrator.system import Connection, System, Unit
 
 Vector = NDArray[np.float64]
@@ -19,6 +21,7 @@ class Board:
         self._of_unit: dict[str, slice] = {}
         self._of_clock: dict[str, slice] = {}
         self._of_hold: dict[str, slice] = {}
+        self._of_derivatives: dict[str, slice] = {}
         self._of_scalar: dict[tuple[str, str], int] = {}
         end = 0
         for clock in system.timeline.clocks:
@@ -34,6 +37,10 @@ class Board:
             if connection.hold:
                 self._of_hold[connection.name] = slice(end, end + len(connection.inputs))
                 end += len(connection.inputs)
+                if order := input_derivatives.order(system, connection):
+                    span = slice(end, end + order * len(connection.inputs))
+                    self._of_derivatives[connection.name] = span
+                    end = span.stop + len(connection.inputs)
         self.values = np.zeros(end)
 
     def unit(self, name: str) -> slice:
@@ -44,6 +51,17 @@ class Board:
 
     def hold(self, connection: str) -> slice:
         return self._of_hold[connection]
+
+    def derivatives(self, connection: str) -> slice:
+        """What is held, derived: all entries once, then all twice, ...; empty where it stands."""
+        return self._of_derivatives.get(connection, slice(0, 0))
+
+    def mean(self, connection: Connection) -> list[int]:
+        """The places of what the target takes in the mean of its step."""
+        span = self.derivatives(connection.name)
+        if span.stop:
+            return list(range(span.stop, span.stop + len(connection.inputs)))
+        return self.places(connection)
 
     def scalar(self, fmu: str, variable: str) -> int:
         return self._of_scalar[fmu, variable]

@@ -50,7 +50,7 @@ def conversion(source: Unit | None, target: Unit | None, relative: bool = False)
         if source.name == target.name:
             return SAME
         unknown = source.name if source.base is None else target.name
-        raise ValueError(f"{unknown} has no BaseUnit in its FMU, so it cannot be converted")
+        raise ValueError(f"{unknown} has no BaseUnit, so it cannot be converted")
     if source.base != target.base:
         raise ValueError(f"{_written(source)} is not {_written(target)}")
     offset = 0.0 if relative else (source.offset - target.offset) / target.factor

@@ -3,13 +3,14 @@
 [holds], [delays] and [kinds] speak of a connection as `source -> target`, by its target's port
 or by its source's port (all connections from there), the most precise first. Without a word of
 its own, a connection from a slower clock takes the scene's `hold`, one from a faster clock its
-`downsampling`; one within a rate holds nothing unless it is named or late. A hold that keeps
-account of energy goes, as a default, to every connection across rates that carries power.
+`downsampling`, and one between clocks that only a phase parts `zoh`: the newest sample, of which
+nothing is missing; one within a rate holds nothing unless it is named or late. A hold that keeps
+account of energy goes, as a default, to every connection across clocks that carries power.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -18,9 +19,12 @@ from hapticlink.orchestrator.holds.kinds import KINDS
 from hapticlink.orchestrator.iteration import INTERPOLATING
 from hapticlink.orchestrator.latency import Latency
 from hapticlink.orchestrator.power import PowerPort
+from hapticlink.orchestrator.springs import Spring, misfit
 from hapticlink.orchestrator.ticks import Timeline
 
 if TYPE_CHECKING:
+    from hapticlink.orchestrator.description import Description
+    from hapticlink.orchestrator.scalars import Scalar
     from hapticlink.orchestrator.system import Connection, Unit
 
 DERIVATIVES = {"x": "v", "v": "a", "q": "qd", "qd": "qdd", "x_true": "v_true"}
@@ -42,6 +46,7 @@ class Rules:
     power: tuple[PowerPort, ...] = ()
     between_plants: str | None = None
     """The hold within a rate between plants that are iterated; None where they are not."""
+    springs: tuple[Spring, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,16 +64,27 @@ def names(c: Connection) -> tuple[str, str, str]:
     return (c.name, f"{c.target}.{c.target_port}", f"{c.source}.{c.source_port}")
 
 
-def port(c: Connection, power: Iterable[PowerPort]) -> PowerPort | None:
-    """The power that a connection carries."""
-    return next((p for p in power if p.effort == f"{c.target}.{c.target_port}"), None)
+def paired(c: Connection, entry: Scalar, power: Iterable[PowerPort]) -> PowerPort | None:
+    """The port of an input of a connection: the one that names it, or the vector that it is of."""
+    names = (f"{c.target}.{entry.name}", f"{c.target}.{entry.port}")
+    return next((p for p in power if p.effort in names), None)
+
+
+def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
+    """Whether an entry of a connection does."""
+    power = tuple(power)
+    return any(paired(c, entry, power) for entry in c.inputs)
 
 
 def derivative(c: Connection, units: Mapping[str, Unit]) -> str | None:
     """The port of the source that is the derivative of what the connection carries."""
-    description = units[c.source].description
-    for name in (f"der({c.source_port})", DERIVATIVES.get(c.source_port)):
-        if name and len(description.port(name, "output")) == len(c.outputs):
+    return slope(units[c.source].description, c.source_port, len(c.outputs))
+
+
+def slope(description: Description, port: str, size: int) -> str | None:
+    """The port of `size` outputs that is the derivative of another."""
+    for name in (f"der({port})", DERIVATIVES.get(port)):
+        if name and len(description.port(name, "output")) == size:
             return name
     return None
 
@@ -80,6 +96,7 @@ def assign(
     by_name = {u.name: u for u in units}
     refused: list[Refused] = []
     assigned = tuple(_assign(connections, by_name, timeline, rules, refused))
+    assigned = tuple(_with_springs(assigned, by_name, rules, refused))
     if rules.hold not in {c.hold for c in assigned}:
         # A default that fits nowhere is a mistake where it needs something that is nowhere.
         refused = [replace(r, key=r.key or "hold") for r in refused]
@@ -102,9 +119,11 @@ def _assign(
         latency = next((rules.delays[k] for k in names(c) if k in rules.delays), None)
         hold = rules.holds[key] if key else c.hold
         if not key and source != target:
-            slower = timeline.clock(source).longest > timeline.clock(target).longest
-            energy = HOLDS[rules.hold].needs == "power"
-            hold = rules.hold if slower or energy else rules.downsampling
+            longest, other = (timeline.clock(name).longest for name in (source, target))
+            if longest > other or HOLDS[rules.hold].needs == "power":
+                hold = rules.hold
+            else:
+                hold = rules.downsampling if longest < other else "zoh"
         elif latency and not hold:
             hold = "zoh"
         iterated = rules.between_plants if _between_plants(c, units) else None
@@ -120,6 +139,23 @@ def _assign(
         ):
             kind = None
         yield replace(c, hold=hold, latency=latency, kind=kind if hold else None)
+
+
+def _with_springs(
+    connections: Sequence[Connection],
+    units: Mapping[str, Unit],
+    rules: Rules,
+    refused: list[Refused],
+) -> Iterator[Connection]:
+    """The connections, a hold that needs a spring refused where there is none for it."""
+    for c in connections:
+        needs = HOLDS[c.hold].needs if c.hold else None
+        reason = misfit(c, rules.springs, connections, units) if needs == "spring" else None
+        if c.hold and reason:
+            key = next((k for k in names(c) if k in rules.holds), None)
+            refused.append(Refused(key, c, c.hold, reason))
+            c = replace(c, hold="zoh")
+        yield c
 
 
 def _between_plants(c: Connection, units: Mapping[str, Unit]) -> bool:
@@ -147,7 +183,7 @@ def _misfit(
             f"{c.source} does not put out the derivative of {c.source_port} ({known}); "
             "take 'foh', which makes it from two samples"
         )
-    if needs == "power" and port(c, power) is None:
+    if needs == "power" and not carries_power(c, power):
         return (
             f"{c.name} carries no power: no [[power]] pairs {c.target}.{c.target_port} with a "
             "displacement, so there is no energy to keep account of"

@@ -2,63 +2,24 @@
 
 from __future__ import annotations
 
-import re
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
-from itertools import product
-from math import prod
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
-from hapticlink.components.component import Timing  # the contract's word, a plain Literal
 from hapticlink.orchestrator.archives import opened, read_xml
-from hapticlink.orchestrator.conversion import BASES, SAME, Linear, Unit
+from hapticlink.orchestrator.conversion import BASES, Unit
 from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.scalars import TYPES, Scalar, differences, numbers, text
 
-TYPES = (
-    "Real", "Integer",
-    "Float64", "Float32", "Int64", "Int32", "Int16", "Int8", "UInt64", "UInt32", "UInt16", "UInt8",
-    "Boolean",
-)  # fmt: skip
-"""The FMI types that are numbers, by the name in their get and set functions: FMI 2.0's two,
-FMI 3.0's ten, and Boolean of both."""
-_CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
-_ENTRY = re.compile(r"\[[\d, ]+\]$")
-
-
-@dataclass(frozen=True)
-class Scalar:
-    """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array.
-
-    `conversion` is what a connection does to a value on its way in.
-    """
-
-    name: str
-    reference: int
-    type: str
-    causality: str
-    unit: str | None
-    variability: str = "continuous"
-    start: float = 0.0
-    relative: bool = False
-    entry: int = 0
-    conversion: Linear = SAME
-
-    @property
-    def port(self) -> str:
-        """`x` of `x[1]`: the vector or matrix that the scalar is an entry of."""
-        return _ENTRY.sub("", self.name)
-
-    @property
-    def settable(self) -> bool:
-        """Whether it may be set before initialisation ends."""
-        return self.causality in ("input", "parameter") and self.variability != "constant"
+if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
+    from hapticlink.components.component import Timing
 
 
 @dataclass(frozen=True)
@@ -84,10 +45,10 @@ class Description:
     """Variables that are text: they are set at the start, never connected."""
 
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
-        """The entries of vector `name` (or the scalar of that very name), in order."""
-        return tuple(
-            s for s in self.scalars if name in (s.port, s.name) and s.causality in causalities
-        )
+        """The entries of vector `name` (or the scalar of that very name), in the order of their
+        indices: some tools write x[10] before x[2]."""
+        found = (s for s in self.scalars if name in (s.port, s.name) and s.causality in causalities)
+        return tuple(sorted(found, key=lambda s: s.indices))
 
     def follows(self, output: Scalar, inputs: Iterable[Scalar] | None = None) -> bool:
         """Whether an output depends directly on one of `inputs`; None are all."""
@@ -110,8 +71,8 @@ def describe(path: Path) -> Description:
     """Raises InputFault where the file is no co-simulation FMU of FMI 2.0 or 3.0 that can run
     here."""
     with opened(path, "FMU") as archive:
-        text = read_xml(archive, "modelDescription.xml")
-        tree = ElementTree.fromstring(text)
+        content = read_xml(archive, "modelDescription.xml")
+        tree = ElementTree.fromstring(content)
         version = tree.get("fmiVersion") or "none"
         if version.partition(".")[0] not in ("2", "3") or tree.find("CoSimulation") is None:
             raise InputFault(
@@ -120,10 +81,10 @@ def describe(path: Path) -> Description:
                 "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
             )
         try:
-            model = read_model_description(_only_xml(text), validate=False)
-            relative = _relative(tree)
+            model = read_model_description(_only_xml(content), validate=False)
+            relative = differences(tree)
             scalars = tuple(
-                s for v in model.modelVariables for s in _scalars(v, version[0], v.name in relative)
+                s for v in model.modelVariables for s in numbers(v, version[0], v.name in relative)
             )
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
@@ -148,7 +109,7 @@ def describe(path: Path) -> Description:
             for output in model.outputs
             if output.dependencies is not None
         },
-        strings=tuple(_text(v) for v in model.modelVariables if v.type == "String" and not v.shape),
+        strings=tuple(text(v) for v in model.modelVariables if v.type == "String" and not v.shape),
     )
 
 
@@ -158,49 +119,6 @@ def _only_xml(text: bytes) -> BytesIO:
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("modelDescription.xml", text)
     return file
-
-
-def _relative(tree: ElementTree.Element) -> set[str | None]:
-    """Names of the variables that are differences; FMPy 0.3.32 overlooks the attribute."""
-    return {
-        variable.get("name")
-        for variable in tree.iterfind("./ModelVariables/*")
-        if any(e.get("relativeQuantity") == "true" for e in (variable, *variable))
-    }
-
-
-def _scalars(variable: Any, fmi: str, relative: bool) -> Iterator[Scalar]:
-    """The numbers of a variable; entries of an FMI 3.0 array row by row, named from 1."""
-    kind = _CALLED.get((fmi, variable.type), variable.type)
-    if kind not in TYPES:
-        return
-    shape = tuple(variable.shape or ())
-    starts = [_number(text) for text in (variable.start or "").split()] or [0.0]
-    if len(starts) == 1:
-        starts *= prod(shape)
-    places = product(*(range(1, n + 1) for n in shape))
-    names = [f"{variable.name}[{','.join(map(str, p))}]" if p else variable.name for p in places]
-    declared = variable.declaredType
-    for i, (name, start) in enumerate(zip(names, starts, strict=True)):
-        yield Scalar(
-            name,
-            variable.valueReference,
-            kind,
-            variable.causality or "local",
-            variable.unit or (declared and declared.unit),
-            variable.variability,
-            start,
-            relative or bool(declared and declared.relativeQuantity == "true"),
-            i,
-        )
-
-
-def _text(v: Any) -> Scalar:
-    return Scalar(v.name, v.valueReference, "String", v.causality or "local", None, v.variability)
-
-
-def _number(text: str) -> float:
-    return float(text == "true") if text in ("true", "false") else float(text)
 
 
 def _unit(unit: Any) -> Unit:

@@ -1,7 +1,7 @@
 """The energy that a held effort makes: what it did, minus what its ideal source did.
 
-held  = sum sign F_held,j . (x_{j+1} - x_j)               over the target's steps
-ideal = sum sign (F_n + F_{n+1})/2 . (x(t_{n+1}) - x(t_n))   over the source's samples
+held  = sum F_held,j . (x_{j+1} - x_j)               over the target's steps
+ideal = sum (F_n + F_{n+1})/2 . (x(t_{n+1}) - x(t_n))   over the source's samples
 made  = held - ideal
 
 Each held effort is paired with the displacement that follows it: a spring K sampled with a
@@ -14,6 +14,7 @@ over the substeps of one step counts with its mean.
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
+Read = Callable[[], Vector]
 ROWS = 1024
 """Steps of the target that are kept before they are folded."""
 Mark = tuple[int, int, int]
@@ -47,11 +49,13 @@ class _Sums(NamedTuple):
 
 
 class Meter:
-    """Books one connection. `source`, `held` and `x` are read when `sample`, `hold` and `move`
-    are called; now and then the rows are folded into sums."""
+    """Books one connection. `source`, `held` (the effort, as its source gives it and as the target
+    gets it) and `x` (the displacement, with the sign of the power) are read, each time into a new
+    vector, when `sample`, `hold` and `move` are called; now and then the rows are folded into
+    sums."""
 
-    def __init__(self, source: Vector, held: Vector, x: Vector, sign: float) -> None:
-        self._source, self._held, self._x, self._sign = source, held, x, sign
+    def __init__(self, source: Read, held: Read, x: Read) -> None:
+        self._source, self._held, self._x = source, held, x
         self._stamps: list[int] = []
         self._samples: list[Vector] = []
         self._ticks: list[int] = []
@@ -63,10 +67,10 @@ class Meter:
     def sample(self, stamp: int) -> None:
         """The source has put out a value stamped `stamp`."""
         if self._stamps and self._stamps[-1] == stamp:
-            self._samples[-1] = self._source.copy()
+            self._samples[-1] = self._source()
             return
         self._stamps.append(stamp)
-        self._samples.append(self._source.copy())
+        self._samples.append(self._source())
 
     def move(self, tick: int) -> None:
         """The target stands at `tick`."""
@@ -75,11 +79,11 @@ class Meter:
         if len(self._ticks) >= self._full:
             self._fold()
         self._ticks.append(tick)
-        self._moves.append(self._x.copy())
+        self._moves.append(self._x())
 
     def hold(self, share: float) -> None:
         """The target has got what it takes over `share` of its step."""
-        effort = self._held.copy() if share == 1.0 else self._held * share
+        effort = self._held() if share == 1.0 else self._held() * share
         if len(self._efforts) < len(self._moves):
             self._efforts.append(effort)
         else:
@@ -102,8 +106,8 @@ class Meter:
         if not self._stamps or not self._ticks:
             return Energy(0.0, 0.0, 0.0, 0.0)
         book = self._book()
-        work, ideal = self._sign * book.work, self._sign * book.ideal
-        return Energy(work - ideal, work, ideal, self._stamps[book.sample] * seconds)
+        until = self._stamps[book.sample] * seconds
+        return Energy(book.work - book.ideal, book.work, book.ideal, until)
 
     def _book(self) -> _Sums:
         """All sums up to the newest sample that the target has moved past."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -12,17 +13,20 @@ from time import perf_counter
 from typing import Any
 
 from hapticlink.orchestrator import scene_file, told
-from hapticlink.orchestrator.blocks import fmu_files
+from hapticlink.orchestrator.blocks import blocks, fmu_files
 from hapticlink.orchestrator.faults import Fault
 from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.results import Results, load, write_json
+from hapticlink.orchestrator.rates import VariableRate
+from hapticlink.orchestrator.results import Results, load, write_json, write_over
 from hapticlink.orchestrator.run import Outcome, Progress, run
-from hapticlink.orchestrator.scene import Scene, VariableRate
+from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.stamps import delays
 from hapticlink.orchestrator.system import System, from_scene
 from hapticlink.orchestrator.timeline import timeline
 
 PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
+ROOM = 1 << 14
+"""Bytes that run.json keeps for its end, so that a disk which fills up meanwhile has them."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +65,18 @@ def simulate(
         built = perf_counter() - begin
         folder.mkdir(parents=True, exist_ok=True)
         story = _story(read, system, options) | {"delays": {k: asdict(v) for k, v in ages.items()}}
-        write_json(folder / "run.json", story | {"end": {"reason": "running"}})
+        write_json(folder / "run.json", story | {"end": {"reason": "running"}}, ROOM)
         outcome = run(plan, folder, progress)
     try:
         write_json(folder / "run.json", story | _ending(system, outcome, built))
-    except OSError as error:  # the first run.json stays
-        outcome.fault = outcome.fault or Fault(f"{folder}: {error.strerror or error}")
+    except OSError as error:
+        if outcome.fault is None:
+            outcome.fault = Fault(f"{folder}: {error.strerror or error}")
+            outcome.reason = "fault"
+        ending = _ending(system, outcome, built)
+        least = {key: ending[key] for key in ("end", "fault")}
+        with suppress(OSError):  # a disk that does not write in place keeps "running"
+            write_over(folder / "run.json", story | ending, story | least)
     return Experiment(read, system, outcome, folder)
 
 
@@ -75,10 +85,11 @@ def _story(scene: Scene, system: System, options: Sequence[str]) -> dict[str, An
     return {
         "scene": asdict(scene),
         "options": list(options),
-        "versions": {name: version(name) for name in PACKAGES}
+        "versions": {name: version(name) for name in (*PACKAGES, *_compilers(scene))}
         | {"python": platform.python_version()},
         "seeds": _seeds(scene, system),
         "rates": [c.name for c in system.timeline.clocks],
+        "clocks": told.clocks(system.timeline),
         "base": f"{base.numerator}/{base.denominator} s",
         "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.units},
         "coupling": system.coupling,
@@ -86,9 +97,14 @@ def _story(scene: Scene, system: System, options: Sequence[str]) -> dict[str, An
     } | told.holds(system)
 
 
+def _compilers(scene: Scene) -> tuple[str, ...]:
+    return ("ziglang",) if scene.packaging == "native" and blocks(scene) else ()
+
+
 def _seeds(scene: Scene, system: System) -> dict[str, int]:
-    rate = scene.graphics.rate if scene.graphics else None
-    seeds = {"graphics.rate": rate.seed} if isinstance(rate, VariableRate) else {}
+    rates = {"graphics.rate": scene.graphics.rate} if scene.graphics else {}
+    rates |= {f"fmu.{fmu.name}.rate": fmu.rate for fmu in scene.fmu}
+    seeds = {name: r.seed for name, r in rates.items() if isinstance(r, VariableRate)}
     return seeds | {c.name: c.latency.seed for c in system.connections if c.latency}
 
 

@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
-from itertools import groupby, pairwise
+from itertools import groupby
 
 from hapticlink.orchestrator.plan import Plan
 from hapticlink.orchestrator.schemes.operations import Event, Operation, Repeat
 from hapticlink.orchestrator.stamps import uses
 from hapticlink.orchestrator.system import System
+from hapticlink.orchestrator.ticks import Clock
 
 ROWS = 600
 
 
 def explain(plan: Plan, rows: int = ROWS) -> Iterator[str]:
-    """Clocks, the block of each kind of event, then a table of the first hyperperiod, or of the
-    first `rows` events."""
+    """Clocks, the block of each kind of event, then a table up to the end of the first hyperperiod
+    in which all phases have begun, or of the first `rows` events."""
     system, timeline = plan.system, plan.system.timeline
     base = timeline.base
     yield f"ticks of {base.numerator}/{base.denominator} s, {system.coupling}"
@@ -27,7 +28,7 @@ def explain(plan: Plan, rows: int = ROWS) -> Iterator[str]:
             for u in system.units
             if u.clock == clock.name
         )
-        yield f"  {clock.name}: {_period(clock.starts)}: {units}"
+        yield f"  {clock.name}: {_steps(clock)}: {units}"
     yield from _holds(system)
     until, names = _shown(plan, rows)
     yield ""
@@ -46,10 +47,12 @@ def explain(plan: Plan, rows: int = ROWS) -> Iterator[str]:
 
 def _shown(plan: Plan, rows: int) -> tuple[int, dict[Event, str]]:
     """The last tick to show, and a name for each kind of event until then."""
-    starts = [c.starts for c in plan.system.timeline.clocks]
+    clocks = plan.system.timeline.clocks
     until = plan.system.timeline.end
-    if all(isinstance(s, range) for s in starts):
-        until = min(until, math.lcm(*(s.step for s in starts if isinstance(s, range))))
+    periods = [c.period for c in clocks if c.period]
+    if len(periods) == len(clocks):
+        begun = max(c.first % c.longest for c in clocks)
+        until = min(until, begun + math.lcm(*periods))
     names: dict[Event, str] = {}
     last = 0
     for count, (tick, event) in enumerate(plan):
@@ -64,12 +67,12 @@ def _letters(n: int) -> str:
     return chr(ord("A") + n) if n < 26 else _letters(n // 26 - 1) + _letters(n % 26)
 
 
-def _period(starts: object) -> str:
-    if isinstance(starts, range):
-        return f"every {starts.step} ticks"
-    assert isinstance(starts, tuple)
-    steps = [b - a for a, b in pairwise(starts)]
-    return f"steps of {min(steps)} to {max(steps)} ticks"
+def _steps(clock: Clock) -> str:
+    if clock.period:
+        return f"every {clock.period} ticks" + f", first {clock.first}" * (
+            clock.first != clock.period
+        )
+    return f"steps of {clock.shortest} to {clock.longest} ticks"
 
 
 def _holds(system: System) -> Iterator[str]:

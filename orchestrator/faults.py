@@ -47,10 +47,21 @@ class SceneFault(InputFault):
 
 
 class FmuFault(Fault):
-    """An FMU call that failed or a value that cannot be used; names FMU, call and time."""
+    """An FMU call that failed or a value that cannot be used; names FMU, call and time.
 
-    def __init__(self, fmu: str, what: str, time: float, messages: Sequence[str] = ()) -> None:
+    passing: a smaller step from the state before may do (a step that failed without harm to the
+    FMU, FMI 2.0.5 section 4.2.2; an output that is not finite)."""
+
+    def __init__(
+        self,
+        fmu: str,
+        what: str,
+        time: float,
+        messages: Sequence[str] = (),
+        passing: bool = False,
+    ) -> None:
         self.fmu, self.what, self.time, self.messages = fmu, what, time, tuple(messages)
+        self.passing = passing
         said = "".join(f"\n  {fmu} says: {m}" for m in messages)
         super().__init__(f"{fmu}: {what} at t = {time!r} s{said}")
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 Residual = Callable[[Vector], Vector]
 
 
@@ -65,25 +66,33 @@ class Newton:
     """w <- w - J^-1 r; J by differences, one value of r a column, kept and brought up to date by
     Broyden's rank-one change, and made anew where a step does not halve the error.
 
-    `jacobians` counts how often it was made.
+    `given` may tell J at the point tried last, or None; what it tells is held to the same test, and
+    differences take its place. `jacobians` counts how often J was made by differences, `told` how
+    often it was given.
     """
 
     STEP = 1e-6
     """Of 1 + |w|, in a difference."""
 
     def __init__(self) -> None:
-        self._jacobian: NDArray[np.float64] | None = None
-        self.jacobians = 0
+        self._jacobian: Matrix | None = None
+        self.given: Callable[[], Matrix | None] = lambda: None
+        self.jacobians = self.told = 0
 
     def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Found:
         w, r = start, residual(start)
-        fresh = False
+        fresh = doubted = False
         for iteration in range(1, most + 1):
             found = Found(w, r, error(r, w), iteration)
             if found.error <= tolerance or iteration == most or np.isinf(found.error):
                 break
             if self._jacobian is None:
-                self._jacobian, fresh = self._differences(residual, w, r), True
+                self._jacobian = None if doubted else self.given()
+                fresh, doubted = self._jacobian is None, self._jacobian is not None
+                if self._jacobian is None:
+                    self._jacobian = self._differences(residual, w, r)
+                else:
+                    self.told += 1
             step = -np.linalg.lstsq(self._jacobian, r, rcond=None)[0]
             before, w = r, w + step
             r = residual(w)
@@ -93,12 +102,13 @@ class Newton:
                     w, r = found.point, residual(found.point)
                 fresh = False
                 continue
+            doubted = False
             weighted = step / (1.0 + np.abs(w)) ** 2
             change = np.outer(r - before - self._jacobian @ step, weighted)
             self._jacobian = self._jacobian + change / (step @ weighted)
         return found
 
-    def _differences(self, residual: Residual, w: Vector, r: Vector) -> NDArray[np.float64]:
+    def _differences(self, residual: Residual, w: Vector, r: Vector) -> Matrix:
         self.jacobians += 1
         columns = []
         for i, size in enumerate(self.STEP * (1.0 + np.abs(w))):

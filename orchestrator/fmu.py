@@ -16,19 +16,25 @@ import tempfile
 import time as clock
 from collections.abc import Callable, Sequence
 from itertools import count
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy import extract, fmi2
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.conversion import SAME
-from hapticlink.orchestrator.description import TYPES, Description, Scalar
+from hapticlink.orchestrator.description import Description
+from hapticlink.orchestrator.directional import Matrix, derivatives
 from hapticlink.orchestrator.faults import FmuFault
-from hapticlink.orchestrator.foreign import Faults
+from hapticlink.orchestrator.interpreters import release_at_exit
+from hapticlink.orchestrator.policy import Faults
 from hapticlink.orchestrator.retry import Retry, Saved
-from hapticlink.orchestrator.transfer import Transfer, transfers
-from hapticlink.orchestrator.wiring import Starts
+from hapticlink.orchestrator.scalars import TYPES, Scalar
+from hapticlink.orchestrator.transfer import Transfer, Unfit, transfers
+from hapticlink.orchestrator.varying import Varying
+
+if TYPE_CHECKING:  # a worker process need not load what reads scenes
+    from hapticlink.orchestrator.wiring import Starts
 
 Vector = NDArray[np.float64]
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -122,6 +128,7 @@ class Instance:
             unzipDirectory=self._folder,
             instanceName=self.name,
         )
+        release_at_exit(slave.dll)
         callbacks = fmi2.fmi2CallbackFunctions.from_buffer_copy(_CALLBACKS)
         callbacks.componentEnvironment = self._key
         slave.instantiate(callbacks=callbacks, loggingOn=True)
@@ -154,9 +161,27 @@ class Instance:
             board.take(where, out=values, mode="clip")  # "raise" would copy through a buffer
             if not plain:
                 values.__imul__(factors).__iadd__(offsets)
-            for call, name in setting:
-                if (status := call()) > WARNING:
-                    raise self._failed(name, status)
+            try:
+                for call, name in setting:
+                    if (status := call()) > WARNING:
+                        raise self._failed(name, status)
+            except Unfit as why:
+                raise self._fault(str(why), self.time) from None
+
+        return set_from
+
+    def connect_derivatives(
+        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
+    ) -> Callable[[Vector], None]:
+        """A function that sets what the scalars have at `places` of a board as their derivatives of
+        an order; of order 0, their values, stand first and serve a step that is retried."""
+        varying = Varying(self._slave, scalars, orders, places)
+        if self._retry:
+            self._retry.renew = varying.renew
+
+        def set_from(board: Vector) -> None:
+            if (status := varying.set(board)) > WARNING:
+                raise self._failed(varying.name, status)
 
         return set_from
 
@@ -230,10 +255,15 @@ class Instance:
         """How many steps were discarded and taken again in smaller ones."""
         return self._retry.smaller if self._retry else 0
 
+    def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
+        """(outputs, inputs): the directional derivatives of what the FMU has computed last; None
+        where it does not tell them."""
+        return derivatives(self._slave, self.description, outputs, inputs)
+
     def require_finite(self) -> None:
         for scalar, value in zip(self.description.outputs, self.outputs.tolist(), strict=True):
             if not np.isfinite(value):
-                raise self._fault(f"output {scalar.name} is {value!r}", self.time)
+                raise self._fault(f"output {scalar.name} is {value!r}", self.time, passing=True)
 
     def step(self, time: float, end: float, size: float) -> None:
         """fmi2DoStep from `time` over `size`, to `end` (s)."""
@@ -242,7 +272,8 @@ class Instance:
         status = self._advance(time, size)
         self.step_time += clock.perf_counter() - begin
         if status > WARNING:
-            raise self._failed(f"fmi{self.description.fmi}DoStep", status)
+            do_step = f"fmi{self.description.fmi}DoStep"
+            raise self._failed(do_step, status, passing=status in (DISCARD, ERROR))
         self.time = end
 
     def save(self, slot: int = 0) -> None:
@@ -258,19 +289,20 @@ class Instance:
         if (status := self._saved[slot].restore()) > WARNING:
             raise self._failed(f"fmi{self.description.fmi}SetFMUstate", status)
         self.time = self._saved_time[slot]
+        self._status = 0
 
     # --- ends -----------------------------------------------------------------------------
 
-    def _failed(self, call: str, status: int) -> FmuFault:
+    def _failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
         self._status = max(self._status, status)
         named = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
         if status == DISCARD and self.policy.discard == "retry":
             why = "in steps of 1/1024 too" if self._retry else Retry.why_not(self.description)
             named += f" ({why})"
-        return self._fault(f"{call} returned {named}", self.time)
+        return self._fault(f"{call} returned {named}", self.time, passing)
 
-    def _fault(self, what: str, time: float) -> FmuFault:
-        return FmuFault(self.name, what, time, _messages.get(self._key, [])[-5:])
+    def _fault(self, what: str, time: float, passing: bool = False) -> FmuFault:
+        return FmuFault(self.name, what, time, _messages.get(self._key, [])[-5:], passing)
 
     def close(self) -> None:
         """Terminate where FMI allows it, free, unload, remove the folder; in every state."""

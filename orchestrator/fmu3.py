@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from fmpy import fmi3
 
-from hapticlink.orchestrator.description import TYPES, Scalar
 from hapticlink.orchestrator.fmu import WARNING, Instance, Vector, keep
+from hapticlink.orchestrator.interpreters import release_at_exit
+from hapticlink.orchestrator.scalars import TYPES, Scalar
 
 
 class Instance3(Instance):
@@ -26,6 +27,7 @@ class Instance3(Instance):
             unzipDirectory=self._folder,
             instanceName=self.name,
         )
+        release_at_exit(slave.dll)
 
         def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:
             keep(self._key, status, message)

@@ -1,4 +1,4 @@
-"""[[fmu]], [[connection]] and [faults]: anyone's FMUs in a scene, as frozen records."""
+"""[[fmu]] and [[connection]]: anyone's FMUs in a scene, as frozen records."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-Rate = int | float | str
+from hapticlink.orchestrator.rates import AnyRate
+
 Value = bool | int | float | str | tuple[bool | int | float, ...]
 
 
@@ -16,7 +17,8 @@ Value = bool | int | float | str | tuple[bool | int | float, ...]
 class ForeignFmu:
     """An FMU of FMI 2.0 or 3.0 co-simulation.
 
-    path: relative to the scene file. rate: "haptics", "graphics", or a rate of its own (Hz).
+    path: relative to the scene file. rate: "haptics", "graphics", or one of its own,
+    as graphics.rate.
     timing: None takes what the FMU declares, and "continuous" where it doesn't; "sampled" is a
     block whose doStep(t, h) puts out y(t) of the inputs of t. start: values of inputs and
     parameters by name; a list for a whole vector. isolate: in a process of its own.
@@ -24,7 +26,7 @@ class ForeignFmu:
 
     name: str
     path: str
-    rate: Rate = "haptics"
+    rate: AnyRate = "haptics"
     timing: Literal["sampled", "continuous"] | None = None
     start: Mapping[str, Value] = field(default_factory=dict)
     isolate: bool = False
@@ -44,17 +46,3 @@ class Wire:
     factor: float = 1.0
     offset: float = 0.0
     convert: bool = True
-
-
-@dataclass(frozen=True, kw_only=True)
-class Faults:
-    """What a run does about an FMU that fails.
-
-    nan: an output that is not finite ends the run, or keeps its last finite value. discard: an
-    fmi2Discard ends the run, or the step is taken again in smaller ones where the FMU can do
-    that. timeout (s): how long an isolated FMU may take for one call.
-    """
-
-    nan: Literal["stop", "hold"] = "stop"
-    discard: Literal["stop", "retry"] = "stop"
-    timeout: float = 60.0

@@ -11,7 +11,6 @@ from pathlib import Path as FilePath
 from hapticlink.orchestrator.blocks import blocks
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene import Scene
-from hapticlink.orchestrator.ticks import exact
 from hapticlink.orchestrator.toml_lines import Path
 
 Problem = tuple[Path, str]
@@ -29,7 +28,6 @@ def check(scene: Scene) -> Iterator[Problem]:
         taken.append(fmu.name)
         if not FilePath(fmu.path).is_file():
             yield (*path, "path"), f"there is no file {fmu.path}"
-        yield from _rate((*path, "rate"), fmu.rate, scene)
     for i, wire in enumerate(scene.connection):
         for key, end in (("from", wire.from_), ("to", wire.to)):
             fmu_name, dot, variable = end.partition(".")
@@ -43,22 +41,6 @@ def check(scene: Scene) -> Iterator[Problem]:
             yield ("connection", i, "factor"), "0.0 passes nothing on: take the connection out"
     if scene.faults.timeout <= 0:
         yield ("faults", "timeout"), f"{scene.faults.timeout} s: a timeout is more than 0"
-
-
-def _rate(path: Path, rate: int | float | str, scene: Scene) -> Iterator[Problem]:
-    if rate == "haptics":
-        return
-    if rate == "graphics":
-        if scene.graphics is None:
-            yield path, "there is no graphics rate: add [graphics] with its rate"
-        return
-    try:
-        good = exact(rate) > 0
-    except (ValueError, ZeroDivisionError):
-        yield path, f"{rate!r}: write 'haptics', 'graphics', or a rate as 30 or '30000/1001' (Hz)"
-        return
-    if not good:
-        yield path, f"{rate} Hz: a rate is more than 0"
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:

@@ -7,20 +7,31 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hapticlink.orchestrator.board import Board
-from hapticlink.orchestrator.crossings import derivative, port
+from hapticlink.orchestrator.bonds import bond, reader
+from hapticlink.orchestrator.crossings import derivative
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.hold import Hold, Vector
 from hapticlink.orchestrator.holds.kinds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.holds.set_position import SetPoint
 from hapticlink.orchestrator.holds.site import Site
 from hapticlink.orchestrator.latency import Late, Link
+from hapticlink.orchestrator.springs import Spring, spring
 from hapticlink.orchestrator.system import Connection, System
 
 
-def make_hold(connection: Connection, system: System, board: Board) -> Hold:
+def make_holds(system: System, board: Board) -> dict[str, Hold]:
+    """By connection; those that set one spring share its account."""
+    shared: dict[Spring, SetPoint] = {}
+    return {c.name: make_hold(c, system, board, shared) for c in system.connections if c.hold}
+
+
+def make_hold(
+    connection: Connection, system: System, board: Board, shared: dict[Spring, SetPoint]
+) -> Hold:
     """The hold of `connection`, its kind kept and behind its latency."""
     assert connection.hold is not None
     kind, size = HOLDS[connection.hold], len(connection.inputs)
-    site = _site(connection, system, board)
+    site = _site(connection, system, board, shared)
     hold = kind(site)
     if connection.kind == "projector" and not kind.gives_samples:
         hold = Projector(lambda: kind(site), size)
@@ -47,16 +58,44 @@ class _Beside:
         self._hold.push(stamp, np.concatenate([sample, self._derivative()]), arrival)
 
 
-def _site(connection: Connection, system: System, board: Board) -> Site:
-    """The displacement only where the hold keeps account of energy."""
-    moved = None
-    found = port(connection, system.power)
+def _site(
+    connection: Connection, system: System, board: Board, shared: dict[Spring, SetPoint]
+) -> Site:
+    """The displacement and the spring only where the hold keeps account of energy."""
+    size, moved, moving, set_point = len(connection.inputs), None, None, None
+    found = bond(connection, system, board)
     if HOLDS[connection.hold or ""].needs == "power" and found:
-        unit = system.unit[connection.target]
-        read = _reader(board, board.port(unit, found.displacement.partition(".")[2]))
-        sign = found.sign
-        moved = read if sign == 1.0 else lambda: sign * read()
-    return Site(len(connection.inputs), system.timeline.seconds, moved)
+        # The hold's own samples are not converted yet: what converts them scales their motion.
+        entries, work, places = list(found.entries), np.zeros(size), np.zeros(size, np.intp)
+        work[entries], places[entries] = found.work, found.moved
+        moved = reader(board, places.tolist(), work)
+        if found.moving:
+            places[entries] = found.moving
+            moving = reader(board, places.tolist(), work)
+    if HOLDS[connection.hold or ""].needs == "spring":
+        of = spring(connection, system.springs)
+        assert of is not None
+        if of not in shared:
+            shared[of] = _set_point(of, system, board)
+        row = of.ports.index(f"{connection.target}.{connection.target_port}")
+        set_point = shared[of], row
+    return Site(size, system.timeline.seconds, moved, moving, set_point)
+
+
+def _set_point(of: Spring, system: System, board: Board) -> SetPoint:
+    fmu, _, name = of.position.partition(".")
+    unit = system.unit[fmu]
+    near = next((c for c in system.into(fmu) if c.target_port == name), None)
+    places = board.sources(near) if near else board.port(unit, name)
+    timeline = system.timeline
+    stiffness = np.array(of.stiffness)
+    return SetPoint(
+        stiffness,
+        np.array(of.damping) if of.damping else np.zeros_like(stiffness),
+        _reader(board, places),
+        timeline.seconds(timeline.clock(unit.clock).longest),
+        timeline.seconds,
+    )
 
 
 def _reader(board: Board, places: Sequence[int]) -> Callable[[], Vector]:

@@ -1,7 +1,8 @@
 """Consistent start values: inputs set and outputs read in initialisation mode until they agree.
 
 Sweeps over all FMUs settle every chain and the feed-through loops that contract; what they do not
-settle is solved by Newton, with the values that still change as unknowns.
+settle is solved by Newton, with the values that still change as unknowns, on the directional
+derivatives of the FMUs where all give them.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from hapticlink.orchestrator import jacobians
 from hapticlink.orchestrator.board import Board
 from hapticlink.orchestrator.faults import FmuFault
-from hapticlink.orchestrator.fixed_points import Newton, Vector
+from hapticlink.orchestrator.fixed_points import Matrix, Newton, Vector
 from hapticlink.orchestrator.fmu import Instance
 from hapticlink.orchestrator.system import System
 
@@ -58,14 +60,19 @@ def initialize(system: System, instances: Mapping[str, Instance], board: Board) 
         if agree.all():
             break
     else:
-        _solve(system, board, agree & np.isfinite(values), first, sweep)
+        _solve(system, instances, board, agree & np.isfinite(values), first, sweep)
     for instance in instances.values():
         instance.require_finite()
         instance.exit_initialization()
 
 
 def _solve(
-    system: System, board: Board, settled: np.ndarray, first: Vector, sweep: Callable[[], None]
+    system: System,
+    instances: Mapping[str, Instance],
+    board: Board,
+    settled: np.ndarray,
+    first: Vector,
+    sweep: Callable[[], None],
 ) -> None:
     """Newton on the outputs that have not settled, from their first values."""
     values = board.values
@@ -77,13 +84,41 @@ def _solve(
         sweep()
         return values[places] - point
 
-    found = Newton().solve(residual, first[places], TOLERANCE, SWEEPS)
+    newton = Newton()
+    newton.given = _jacobian(system, instances, board, places)
+    found = newton.solve(residual, first[places], TOLERANCE, SWEEPS)
     if not found.error <= TOLERANCE:
         agree = np.ones(len(values), bool)
         agree[places] = np.abs(found.residual) <= TOLERANCE * (1.0 + np.abs(found.point))
         before = values.copy()
         before[places] = found.point
         _raise_unsettled(system, board, agree, before)
+
+
+def _jacobian(
+    system: System, instances: Mapping[str, Instance], board: Board, places: list[int]
+) -> Callable[[], Matrix | None]:
+    """The Jacobian of a sweep's residual by the FMUs' directional derivatives, where all on the way
+    give them: the unit changes of the places, carried from FMU to FMU as the sweep goes."""
+    moved = [c for c in system.connections if {*places} & {*board.sources(c)}]
+    found = jacobians.ways(system, board, instances, moved, places)
+    held = [(board.hold(c.name), board.sources(c)) for c in moved if c.hold]
+
+    def jacobian() -> Matrix | None:
+        if found is None:
+            return None
+        tangent = np.zeros((len(board.values), len(places)))
+        tangent[places] = np.eye(len(places))
+        for way in found:
+            for taken, sources in held:
+                tangent[taken] = tangent[sources]
+            through = way.of(tangent)
+            if through is None:
+                return None
+            tangent[list(way.rows)] = through
+        return tangent[places] - np.eye(len(places))
+
+    return jacobian
 
 
 def _raise_unsettled(system: System, board: Board, agree: np.ndarray, before: Vector) -> None:

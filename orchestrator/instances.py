@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 from hapticlink.orchestrator.fmu import Instance, Vector
 from hapticlink.orchestrator.fmu3 import Instance3
-from hapticlink.orchestrator.foreign import Faults
 from hapticlink.orchestrator.isolated import Isolated
 from hapticlink.orchestrator.modules import clashes
+from hapticlink.orchestrator.policy import Faults
 from hapticlink.orchestrator.system import Unit
 
 KINDS = {"2": Instance, "3": Instance3}

@@ -1,28 +1,23 @@
 """An instance whose FMU runs in a process of its own: when that dies or hangs, the run does not.
 
-The worker has an `Instance`; here each call is a message to it and its answer. Inputs set between
-two steps go with the step, and the outputs come back with it, so that a step is one message.
-A watchdog kills a worker that is late; the waiting read then ends like any other death.
+The worker has an `Instance`; here each call is a message to it and its answer. Inputs go with the
+call that comes next and the outputs come back with a step, so that a step is one message; it is
+answered when somebody asks, so that several FMUs step at the same time (`rounds`).
 """
 
 from __future__ import annotations
 
-import pickle
-import signal
-import subprocess
-import sys
-import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from time import monotonic
 from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.description import Scalar
+from hapticlink.orchestrator.directional import Matrix
 from hapticlink.orchestrator.faults import FmuFault
 from hapticlink.orchestrator.fmu import Instance, Vector
+from hapticlink.orchestrator.process import Died, Process
+from hapticlink.orchestrator.scalars import Scalar
 
 CLOSING = 10.0
 """Seconds that an FMU may take to terminate."""
@@ -31,81 +26,86 @@ LOADING = 60.0
 
 
 class Isolated(Instance):
-    """An FMU in a worker process."""
+    """An FMU in a worker process. `step` starts a step, `finish` waits for it."""
 
-    _worker: subprocess.Popen[bytes] | None = None
-    _deadline: float | None = None
-    _late = False
+    _process: Process | None = None
+    _fresh: bytes | FmuFault | None = None
+    """Outputs that have come with a step and not been read, or why they could not be."""
+    _smaller = 0
+    _dismissed = False
 
     def _load(self) -> None:
-        self._pending: list[tuple[int, Vector]] = []
-        self._ended = threading.Event()
-        # -P: the worker's imports do not depend on the folder that the user stands in.
-        command = [sys.executable, "-P", "-m", "hapticlink.orchestrator.worker"]
-        self._worker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        threading.Thread(target=self._watch, daemon=True).start()
+        self._pending: list[tuple[int, bytes]] = []
+        self._process = Process("hapticlink.orchestrator.worker")
         what = (self.name, self.description, len(self.outputs), self.starts, self.policy)
-        self._ask("load", *what, self._folder)
+        # The answer waits for `enter_initialization`: all FMUs of a run load at the same time.
+        self._send("load", *what, self._folder, allowed=max(self.policy.timeout, LOADING))
 
-    def _watch(self) -> None:
-        assert self._worker is not None
-        while not self._ended.wait(0.05):
-            if self._deadline is not None and monotonic() > self._deadline:
-                self._late = True
-                self._worker.kill()
-                return
+    # --- messages -------------------------------------------------------------------------
 
-    def _ask(self, call: str, *arguments: Any) -> Any:
-        """The worker's answer. Raises its FmuFault, or one that says how it ended."""
-        worker = self._worker
-        assert worker is not None
-        assert worker.stdin is not None
-        assert worker.stdout is not None
-        self._allowed = self.policy.timeout
-        if call == "load":
-            self._allowed = max(self._allowed, LOADING)
-        self._deadline = monotonic() + self._allowed
+    def _send(self, call: str, *arguments: Any, allowed: float | None = None) -> None:
+        assert self._process is not None
+        if self._process.busy:
+            self._drop()
+        self._fresh = None
         try:
-            pickle.dump((call, arguments), worker.stdin)
-            worker.stdin.flush()
-            kind, answer = pickle.load(worker.stdout)
-        except (EOFError, OSError, pickle.UnpicklingError):
-            raise self._died() from None
-        finally:
-            self._deadline = None
+            self._process.send((self._pending, call, arguments), allowed or self.policy.timeout)
+        except Died as how:
+            raise self._died(how) from None
+        self._pending = []
+
+    def _answer(self) -> Any:
+        """The worker's answer. Raises its FmuFault, or one that says how it ended."""
+        assert self._process is not None
+        try:
+            kind, answer = self._process.answer()
+        except Died as how:
+            raise self._died(how) from None
         if kind == "fault":
             raise FmuFault(self.name, *answer)
         return answer
 
-    def _died(self) -> FmuFault:
-        worker, self._worker = self._worker, None
-        assert worker is not None
-        self._ended.set()
-        code = _end(worker)
-        if self._late:
-            how = f"did not answer within {self._allowed:g} s and was ended"
-        elif code < 0:
-            how = f"ended by {signal.Signals(-code).name}"
-        else:
-            how = f"ended with exit status {code}"
+    def _ask(self, call: str, *arguments: Any) -> Any:
+        self._send(call, *arguments)
+        return self._answer()
+
+    def _drop(self) -> None:
+        """Wait for a step that nobody waits for, because another FMU's in its round has failed."""
+        try:
+            self._answer()
+        except FmuFault as fault:
+            if not fault.passing:
+                raise
+
+    def _died(self, how: Died) -> FmuFault:
+        self._process = None
         return FmuFault(self.name, f"its process {how}", self.time)
 
     # --- the calls of Instance ------------------------------------------------------------
 
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
+        return self._remote(self._ask("connect", list(scalars)), places)
+
+    def connect_derivatives(
+        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
+    ) -> Callable[[Vector], None]:
+        return self._remote(self._ask("connect_derivatives", list(scalars), list(orders)), places)
+
+    def _remote(self, key: int, places: Sequence[int]) -> Callable[[Vector], None]:
+        """What keeps the values at `places` for the setter `key` of the worker."""
         where = np.array(places, dtype=np.intp)
-        key = self._ask("connect", list(scalars))
 
         def set_from(board: Vector) -> None:
-            values = board[where]
-            if self._initialized:
-                self._pending.append((key, values))
-            else:
-                self._ask("set", key, values)
+            self._pending.append((key, board[where].tobytes()))
 
         return set_from
 
+    def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
+        found: Matrix | None = self._ask("jacobian", outputs, inputs)
+        return found
+
     def enter_initialization(self, stop_time: float) -> None:
+        self._answer()  # of `_load`
         self._ask("enter_initialization", stop_time)
 
     def exit_initialization(self) -> None:
@@ -114,58 +114,54 @@ class Isolated(Instance):
 
     def read(self) -> None:
         if self._fresh is None or self._pending:
-            pending, self._pending = self._pending, []
-            self._fresh = self._ask("read", pending)
-        self.outputs[:] = self._fresh
-        if not self._initialized:
-            self._fresh = None
-
-    _fresh: Vector | None = None
-    _smaller = 0
+            self._fresh = self._ask("read")
+        if isinstance(self._fresh, FmuFault):
+            raise self._fresh
+        self.outputs[:] = np.frombuffer(self._fresh)
 
     @property
     def smaller_steps(self) -> int:
         return self._smaller
 
     def step(self, time: float, end: float, size: float) -> None:
-        self.time = time
-        pending, self._pending = self._pending, []
-        self._fresh, self.step_time, self._smaller = self._ask("step", pending, time, end, size)
-        self.time = end
+        self.time, self._end = time, end
+        self._send("step", time, end, size)
+
+    def finish(self) -> None:
+        """Wait for the step. Raises its FmuFault."""
+        outputs, fault, self.step_time, self._smaller = self._answer()
+        self._fresh = outputs if fault is None else FmuFault(self.name, *fault)
+        self.time = self._end
 
     def save(self, slot: int = 0) -> None:
-        pending, self._pending = self._pending, []
-        self._ask("save", pending, slot)
+        self._ask("save", slot)
         self._saved_time[slot] = self.time
 
     def rollback(self, slot: int = 0) -> None:
-        self._pending, self._fresh = [], None  # inputs are part of the state
+        self._pending = []  # inputs are part of the state
         self._ask("rollback", slot)
         self.time = self._saved_time[slot]
 
-    def close(self) -> None:
-        worker = self._worker
-        if worker is None:
-            super().close()
+    def dismiss(self) -> None:
+        """Have the FMU closed; `close` waits for that, so that all of a run close together."""
+        process = self._process
+        if process is None or self._dismissed:
             return
-        self.policy = replace(self.policy, timeout=CLOSING)
+        self._dismissed = True
+        with suppress(Died):  # the run has its results, and the process ends in any case
+            if process.busy:
+                process.answer(CLOSING)
+            process.send(([], "close", ()), CLOSING)
+
+    def close(self) -> None:
+        process = self._process
         try:
-            with suppress(FmuFault):  # the run has its results, and the process ends below
-                self._ask("close")
+            self.dismiss()
+            if process is not None and process.busy:
+                with suppress(Died):
+                    process.answer()
         finally:
-            self._ended.set()
-            _end(worker)
+            self._process = None
+            if process is not None:
+                process.end()
             super().close()
-
-
-def _end(worker: subprocess.Popen[bytes]) -> int:
-    """The exit status of a worker that has nothing more to do; killed where it lingers."""
-    for stream in (worker.stdin, worker.stdout):
-        if stream is not None:
-            with suppress(OSError):  # bytes that a dead process has not taken
-                stream.close()
-    try:
-        return worker.wait(CLOSING)
-    except subprocess.TimeoutExpired:
-        worker.kill()
-        return worker.wait()

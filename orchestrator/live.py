@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from pathlib import Path
 
 from hapticlink.orchestrator.board import Board
 from hapticlink.orchestrator.fmu import Instance
-from hapticlink.orchestrator.holding import make_hold
+from hapticlink.orchestrator.holding import make_holds
 from hapticlink.orchestrator.initialize import initialize
 from hapticlink.orchestrator.instances import instance, isolated
+from hapticlink.orchestrator.isolated import Isolated
 from hapticlink.orchestrator.latency import Late
 from hapticlink.orchestrator.meters import Meters
 from hapticlink.orchestrator.results import Recorder
-from hapticlink.orchestrator.system import System
+from hapticlink.orchestrator.scalars import Scalar
+from hapticlink.orchestrator.system import Connection, System
 
 Call = Callable[[int], object]
 
@@ -22,8 +24,8 @@ Call = Callable[[int], object]
 class Live:
     """What `stack` closes again; rows go to `folder`.
 
-    setters and now_setters fill the inputs of an FMU from the board: as its connections hold them,
-    and as their sources stand now.
+    setters, varying_setters and now_setters fill the inputs of an FMU from the board: as its
+    connections hold them, with derivatives beside, and as their sources stand now.
     """
 
     def __init__(self, system: System, folder: Path, stack: ExitStack) -> None:
@@ -46,12 +48,17 @@ class Live:
             view = values[self.board.unit(unit.name)]
             made = instance(unit, view, system.faults, unit.name in self.isolated)
             self.instances[unit.name] = stack.enter_context(made)
-        self.holds = {
-            c.name: make_hold(c, system, self.board) for c in system.connections if c.hold
-        }
+        stack.callback(self._dismiss)
+        self.holds = make_holds(system, self.board)
         self.meters = Meters(system, self.board)
         self.setters: dict[str, Call] = {}
+        self.varying_setters: dict[str, Call] = {}
         self.now_setters: dict[str, Call] = {}
+
+    def _dismiss(self) -> None:
+        for made in self.instances.values():
+            if isinstance(made, Isolated):
+                made.dismiss()
 
     def start(self) -> None:
         """Initialise; every hold gets its sample of t = 0, every FMU its way to set inputs."""
@@ -68,10 +75,31 @@ class Live:
             connect = self.instances[unit.name].connect
             scalars = [s for c in incoming for s in c.inputs]
             held = [p for c in incoming for p in self.board.places(c)]
-            self.setters[unit.name] = _from(connect(scalars, held), self.board)
+            set_held = connect(scalars, held)
+            self.setters[unit.name] = _from(set_held, self.board)
+            if derived := self._derived(incoming):
+                derive = self.instances[unit.name].connect_derivatives(*derived)
+                self.varying_setters[unit.name] = _from_both(set_held, derive, self.board)
             if unit.name in self.system.get_after_set:
                 sources = [p for c in incoming for p in self.board.sources(c)]
                 self.now_setters[unit.name] = _from(connect(scalars, sources), self.board)
+
+    def _derived(
+        self, incoming: Iterable[Connection]
+    ) -> tuple[list[Scalar], list[int], list[int]] | None:
+        """(inputs, orders, places on the board) of what varies within the steps of an FMU, values
+        first."""
+        rows = []
+        for c in incoming:
+            span = self.board.derivatives(c.name)
+            places = [*self.board.places(c), *range(span.start, span.stop)] if span.stop else []
+            for i, place in enumerate(places):
+                order, entry = divmod(i, len(c.inputs))
+                rows.append((c.inputs[entry], order, place))
+        if not rows:
+            return None
+        rows.sort(key=lambda row: row[1])
+        return [r[0] for r in rows], [r[1] for r in rows], [r[2] for r in rows]
 
     def links(self) -> dict[str, dict[str, int]]:
         """What became of the samples of connections with a latency."""
@@ -84,3 +112,13 @@ class Live:
 def _from(set_from: Callable, board: Board) -> Call:
     values = board.values
     return lambda tick: set_from(values)
+
+
+def _from_both(first: Callable, second: Callable, board: Board) -> Call:
+    values = board.values
+
+    def set_both(tick: int) -> None:
+        first(values)
+        second(values)
+
+    return set_both

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hapticlink.orchestrator import input_derivatives, jacobians
 from hapticlink.orchestrator.board import Board
 from hapticlink.orchestrator.crossings import derivative
 from hapticlink.orchestrator.faults import Fault
-from hapticlink.orchestrator.fixed_points import SOLVERS, Found, Newton, Vector
+from hapticlink.orchestrator.fixed_points import SOLVERS, Found, Matrix, Newton, Vector
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.iteration import Iteration
+from hapticlink.orchestrator.jacobians import Through
 from hapticlink.orchestrator.live import Call, Live
 from hapticlink.orchestrator.schemes.operations import Repeat
 from hapticlink.orchestrator.system import Connection, System
@@ -22,13 +24,15 @@ from hapticlink.orchestrator.system import Connection, System
 @dataclass
 class Iterations:
     """What a run's loops did: steps that were iterated, times that their plants stepped in all,
-    rollbacks, the most iterations of a step, Jacobians made, steps that did not converge."""
+    rollbacks, the most iterations of a step, Jacobians made by differences and taken from the FMUs,
+    steps that did not converge."""
 
     steps: int = 0
     iterations: int = 0
     rollbacks: int = 0
     most: int = 0
     jacobians: int = 0
+    told_jacobians: int = 0
     unconverged: int = 0
 
 
@@ -49,13 +53,14 @@ class Unconverged(Fault):
 
 class Loop:
     """One Repeat, its operations bound: `guess` hands the board to the holds, `body` steps, `again`
-    rolls back."""
+    rolls back. `held` are those of the body that ask holds for what inputs take."""
 
     def __init__(
         self,
         operation: Repeat,
         live: Live,
         calls: tuple[Sequence[Call], Sequence[Call], Sequence[Call]],
+        held: Sequence[Call],
     ) -> None:
         system, board = live.system, live.board
         self._guess, self._body, self._again = calls
@@ -73,9 +78,15 @@ class Loop:
                     self._places.append(place)
                     self._names.append(c.name)
         self._solver = SOLVERS[self._settings.method]()
+        self._ask, self._tick = held, 0
+        self._ways: list[Through] | None = None
+        if isinstance(self._solver, Newton) and all(_constant(c, system) for c in connections):
+            ways = jacobians.ways(system, board, live.instances, connections, self._places)
+            self._ways, self._solver.given = ways, self._jacobian
 
     def __call__(self, tick: int) -> None:
         values, places, counts = self._board.values, self._places, self.counts
+        self._tick = tick
         began = False
 
         def residual(point: Vector) -> Vector:
@@ -104,9 +115,36 @@ class Loop:
         counts.most = max(counts.most, found.iterations)
         if isinstance(self._solver, Newton):
             counts.jacobians += self._solver.jacobians
-            self._solver.jacobians = 0
+            counts.told_jacobians += self._solver.told
+            self._solver.jacobians = self._solver.told = 0
         if not found.error <= settings.tolerance:
             self._unconverged(found, tick)
+
+    def _jacobian(self) -> Matrix | None:
+        """Of the residual, by the FMUs' derivatives of a step by inputs held over it; what a guess
+        makes of these the holds show, which are linear in it."""
+        if self._ways is None:
+            return None
+        values, places = self._board.values, self._places
+        kept = values.copy()
+        shown = []
+        for moved in (None, *places):
+            values[:] = kept
+            if moved is not None:
+                values[moved] += 1.0
+            for call in (*self._guess, *self._ask):
+                call(self._tick)
+            shown.append(values.copy())
+        values[:] = kept
+        tangent = np.stack(shown[1:], axis=1) - shown[0][:, None]
+        found = np.zeros((len(values), len(places)))
+        for way in self._ways:
+            through = way.of(tangent)
+            if through is None:
+                self._ways = None
+                return None
+            found[list(way.rows)] = through
+        return found[places] - np.eye(len(places))
 
     def _unconverged(self, found: Found, tick: int) -> None:
         self.counts.unconverged += 1
@@ -122,6 +160,18 @@ class Loop:
             f"{found.point[worst] + found.residual[worst]:.9g}; take a higher rate, or in "
             f"[iteration] {other} or a larger tolerance"
         )
+
+
+def _constant(c: Connection, system: System) -> bool:
+    """Whether the target takes one constant over its step, in proportion to the guess, and its
+    outputs are those of the step."""
+    return (
+        system.substeps.get(c.target, 1) == 1
+        and input_derivatives.order(system, c) == 0
+        and c.target not in system.get_after_set
+        and c.latency is None
+        and c.kind is None
+    )
 
 
 def _read(c: Connection, system: System, board: Board) -> list[int]:

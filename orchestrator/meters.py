@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hapticlink.orchestrator.board import Board
-from hapticlink.orchestrator.crossings import port
+from hapticlink.orchestrator.bonds import bond, reader
 from hapticlink.orchestrator.energy import Energy, Mark, Meter
 from hapticlink.orchestrator.system import System
 
@@ -13,7 +13,7 @@ Call = Callable[[int], object]
 
 
 class Meters:
-    """One meter for each connection that carries power and whose ends stand side by side."""
+    """One meter for each connection that carries power, of the efforts that its target gets."""
 
     def __init__(self, system: System, board: Board) -> None:
         self._meters: dict[str, Meter] = {}
@@ -22,15 +22,15 @@ class Meters:
         self._seconds = float(system.timeline.base)
         self._shares = {name: 1.0 / parts for name, parts in system.substeps.items()}
         for c in system.connections:
-            found = port(c, system.power)
-            if found is None or c.initial:
+            found = bond(c, system, board)
+            if found is None:
                 continue
-            moved = board.port(system.unit[c.target], found.displacement.partition(".")[2])
-            views = [board.view(places) for places in (board.sources(c), board.places(c), moved)]
-            source, held, x = views
-            if source is None or held is None or x is None:
-                continue
-            meter = self._meters[c.name] = Meter(source, held, x, found.sign)
+            source, held = (
+                reader(board, found.of(places), found.factor, found.offset)
+                for places in (board.sources(c), board.mean(c))
+            )
+            meter = Meter(source, held, reader(board, found.moved, found.scale))
+            self._meters[c.name] = meter
             self._sources.setdefault(c.source, []).append(meter)
             self._targets.setdefault(c.target, []).append(meter)
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class PowerPort:
     """The power into a plant is sign * effort . d(displacement)/dt.
 
-    effort is an input (`fmu.port`, N and N.m), displacement an output of the same FMU that
-    its effort works on (m and rad).
+    effort is an input (`fmu.port` or an entry of it, N and N.m), displacement an output of the same
+    FMU that its effort works on (m and rad); other units count by their factors (`bonds`).
     """
 
     effort: str

@@ -79,14 +79,28 @@ def _quoted(name: str) -> str:
     return f'"{name}"' if "," in name else name
 
 
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write whole or not at all."""
+def write_json(path: Path, content: Mapping[str, Any], room: int = 0) -> None:
+    """Write whole or not at all; `room` bytes of spaces after it are for `write_over`."""
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        unfinished.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        unfinished.write_bytes(_text(content) + b" " * room)
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def write_over(path: Path, *contents: Mapping[str, Any]) -> None:
+    """Write the first of `contents` that fits over what is in the file, which asks no more room of
+    a full disk; nothing where none fits."""
+    with path.open("r+b", buffering=0) as file:
+        room = os.fstat(file.fileno()).st_size
+        fitting = (text for text in map(_text, contents) if len(text) <= room)
+        if text := next(fitting, None):
+            file.write(text.ljust(room))
+
+
+def _text(content: Mapping[str, Any]) -> bytes:
+    return json.dumps(content, indent=2).encode() + b"\n"
 
 
 @dataclass(frozen=True)

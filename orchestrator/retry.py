@@ -38,10 +38,12 @@ class Saved:
 
 
 class Retry:
-    """Steps with the state before each saved. `smaller` counts the steps taken in halves."""
+    """Steps with the state before each saved. `smaller` counts the steps taken in halves; `renew`
+    sets inputs that vary as they are so long (s) after the beginning of the step."""
 
     def __init__(self, slave: Any, fmi: str, advance: Callable[[float, float], int]) -> None:
-        self._advance, self.smaller = advance, 0
+        self._advance, self.smaller, self._begin = advance, 0, 0.0
+        self.renew: Callable[[float], int] = lambda elapsed: 0
         self._saved = [Saved(slave, fmi) for _ in range(HALVINGS + 1)]
 
     @staticmethod
@@ -57,8 +59,11 @@ class Retry:
         return f"not retried: the FMU lacks {' and '.join(missing)}" if missing else ""
 
     def step(self, time: float, size: float, depth: int = 0) -> int:
-        """Status of a step from `time` over `size` (s), in up to 2^10 parts; inputs stay."""
+        """Status of a step from `time` over `size` (s), in up to 2^10 parts; inputs stay, or go on
+        as they vary."""
         saved = self._saved[depth]
+        if depth == 0:
+            self._begin = time
         if (status := saved.save()) > WARNING:
             return status
         status = self._advance(time, size)
@@ -69,6 +74,8 @@ class Retry:
             return status
         half = size / 2
         if (status := self.step(time, half, depth + 1)) > WARNING:
+            return status
+        if (status := self.renew(time + half - self._begin)) > WARNING:
             return status
         return self.step(time + half, half, depth + 1)
 

@@ -123,7 +123,7 @@ class _Bound:
     def calls(self, event: Event | Part) -> list[Call]:
         self._events[event] += 1
         if (found := self._bound.get(event)) is None:
-            found = self._bound[event] = [self._binder.bind(op) for op in self._plan.block(event)]
+            found = self._bound[event] = self._binder.bind_all(self._plan.block(event))
         return found
 
     def counts(self) -> dict[str, dict[str, int]]:

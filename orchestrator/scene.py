@@ -31,23 +31,14 @@ from hapticlink.components.specs import (
     SpringHand,
 )
 from hapticlink.orchestrator.faults import Finding, unplaced
-from hapticlink.orchestrator.foreign import Faults, ForeignFmu, Wire
+from hapticlink.orchestrator.foreign import ForeignFmu, Wire
 from hapticlink.orchestrator.iteration import Iteration
 from hapticlink.orchestrator.latency import Latency
+from hapticlink.orchestrator.policy import Faults
 from hapticlink.orchestrator.power import PowerPort
+from hapticlink.orchestrator.rates import AnyRate, Rate, Seconds
+from hapticlink.orchestrator.springs import Spring
 from hapticlink.orchestrator.step_control import StepControl
-
-Rate = int | float | str
-"""Hz; a fraction of whole numbers may be written as text ("30000/1001")."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class VariableRate:
-    """Periods drawn uniformly between 1/max and 1/min (Hz), in whole haptic ticks."""
-
-    min: Rate
-    max: Rate
-    seed: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,8 +58,8 @@ class Graphics(GraphicsCopy):
     of a fixed rate, None a whole period. A file may give a recorded trace: `{ trace = FILE }`.
     """
 
-    rate: Rate | VariableRate | tuple[float, ...] = 30
-    phase: Rate | None = None
+    rate: AnyRate = 30
+    phase: Seconds | None = None
     align: Literal["exact", "tick"] | None = None
 
 
@@ -100,12 +91,15 @@ class Scene:
     are those at the further points of the linkage, by name. hold is the default from a slow rate to
     a fast one, downsampling from a fast to a slow; holds gives others by source
     (`virtual_environment.P_c`), target or `source -> target`. delays by the same names: a latency
-    in s, or one drawn from a seed, and losses. kinds says what a matrix or angle is where its name
-    does not. power pairs efforts with displacements of FMUs that are not the report's. substeps:
-    steps of a plant between two reads, its held inputs renewed at each. get_after_set: plants whose
-    feed-through may be read after new inputs are set, which FMI forbids between two steps.
+    in s, or one drawn from a seed, and losses. phases: by FMU, the end of its first step (s), after
+    which come whole periods. kinds says what a matrix or angle is where its name does not. power
+    pairs efforts with displacements of FMUs that are not the report's, spring says which inputs
+    set a spring within one. substeps: steps of a plant between two reads, its held inputs renewed
+    at each. get_after_set: plants whose feed-through may be read after new inputs are set, which
+    FMI forbids between two steps.
     stop_when, a signal against a number, ends the run in good order: None takes the device's
     workspace where there is a device, "" is never. isolate runs every FMU in a process of its own.
+    packaging "native" compiles the scene's own blocks, which then need no Python.
     A file may also say `extends`, a scene over which its own tables are laid.
     """
 
@@ -118,8 +112,10 @@ class Scene:
     downsampling: str = "latest"
     holds: Mapping[str, str] = field(default_factory=dict)
     delays: Mapping[str, float | Latency] = field(default_factory=dict)
+    phases: Mapping[str, Seconds] = field(default_factory=dict)
     kinds: Mapping[str, Literal["projector", "semidefinite", "angle"]] = field(default_factory=dict)
     power: tuple[PowerPort, ...] = ()
+    spring: tuple[Spring, ...] = ()
     substeps: Mapping[str, int] = field(default_factory=dict)
     get_after_set: tuple[str, ...] = ()
     coupling: Literal["gauss-seidel", "jacobi", "gauss-seidel-plants", "iterated"] = "gauss-seidel"
@@ -144,6 +140,7 @@ class Scene:
     connection: tuple[Wire, ...] = ()
     faults: Faults = field(default_factory=Faults)
     isolate: bool = False
+    packaging: Literal["python", "native"] = "python"
 
     @property
     def place(self) -> Callable[[tuple[str | int, ...], str], Finding]:

@@ -14,12 +14,12 @@ from hapticlink.orchestrator import (
     foreign_checks,
     needs,
     option_checks,
+    rate_checks,
 )
 from hapticlink.orchestrator.conditions import parse_condition
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.latency import Latency
-from hapticlink.orchestrator.scene import Graphics, Rate, Scene, VariableRate
-from hapticlink.orchestrator.ticks import exact
+from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.toml_lines import Path
 
 Problem = tuple[Path, str]
@@ -27,7 +27,7 @@ Problem = tuple[Path, str]
 
 def check(scene: Scene) -> list[Problem]:
     """Every fault found, in the order of the file's sections."""
-    found = [*_numbers(scene), *_rates(scene), *_holds(scene), *_blocks(scene)]
+    found = [*_numbers(scene), *rate_checks.check(scene), *_holds(scene), *_blocks(scene)]
     found += foreign_checks.check(scene)
     if scene.linkage:
         found += _linkage(scene.linkage)
@@ -56,56 +56,6 @@ def _numbers(scene: Scene) -> Iterator[Problem]:
         record = getattr(scene, table)
         if record and record.substeps < 1:
             yield (table, "substeps"), f"{record.substeps}: at least 1 substep"
-
-
-def _rate(path: Path, rate: Rate) -> Iterator[Problem]:
-    try:
-        good = exact(rate) > 0
-    except (ValueError, ZeroDivisionError):
-        yield path, f"{rate!r}: write a rate as 30, 29.97 or '30000/1001' (Hz)"
-        return
-    if not good:
-        yield path, f"{rate} Hz: a rate is more than 0"
-
-
-def _rates(scene: Scene) -> Iterator[Problem]:
-    yield from _rate(("haptics", "rate"), scene.haptics.rate)
-    if scene.graphics is None:
-        return
-    rate = scene.graphics.rate
-    path: Path = ("graphics", "rate")
-    if isinstance(rate, VariableRate):
-        bounds = [*_rate((*path, "min"), rate.min), *_rate((*path, "max"), rate.max)]
-        yield from bounds
-        if not bounds and exact(rate.min) > exact(rate.max):
-            yield (*path, "min"), f"{rate.min} Hz is above max = {rate.max} Hz: swap them"
-        if rate.seed < 0:
-            yield (*path, "seed"), f"{rate.seed}: a seed is 0 or more"
-    elif isinstance(rate, tuple):
-        if not rate or rate[-1] < scene.duration:
-            yield path, f"the frame times end before duration = {scene.duration} s: add frames"
-        if any(b <= a for a, b in zip((0.0, *rate), rate, strict=False) if b != 0.0):
-            yield path, "frame times must rise: sort them and drop repeated ones"
-    else:
-        yield from _rate(path, rate)
-    yield from _phase(scene.graphics)
-    if scene.graphics.align == "exact" and not isinstance(rate, int | float | str):
-        yield ("graphics", "align"), "'exact' needs a fixed rate: rates that vary are on ticks"
-
-
-def _phase(graphics: Graphics) -> Iterator[Problem]:
-    path: Path = ("graphics", "phase")
-    if graphics.phase is None:
-        return
-    if not isinstance(graphics.rate, int | float | str):
-        yield path, "a phase needs a fixed rate: frames of a rate that varies have none"
-        return
-    try:
-        good = exact(graphics.phase) > 0 and exact(graphics.phase) * exact(graphics.rate) <= 1
-    except (ValueError, ZeroDivisionError):
-        return  # told of already, or of the rate
-    if not good:
-        yield path, f"{graphics.phase} s: the first frame ends after 0 and within a period"
 
 
 def _holds(scene: Scene) -> Iterator[Problem]:

@@ -81,8 +81,8 @@ def from_tables(
     for table in ("holds", "delays", "kinds"):
         if isinstance(data.get(table), dict):
             data[table] = dict(_flat(data[table]))
-    if trace := _trace(data):
-        data["graphics"]["rate"] = frame_times(FilePath(trace["trace"]))
+    for traced in _traced(data):
+        traced["rate"] = frame_times(FilePath(traced["rate"]["trace"]))
     for fmu in _tables_of(data, "fmu"):
         if isinstance(fmu.get("start"), dict):
             fmu["start"] = dict(_flat(fmu["start"]))
@@ -125,8 +125,8 @@ def _document(
     for fmu in _tables_of(data, "fmu"):
         if folder and isinstance(fmu.get("path"), str):
             fmu["path"] = str(folder / fmu["path"])
-    if folder and (trace := _trace(data)):
-        trace["trace"] = str(folder / trace["trace"])
+    for table in _traced(data) if folder else ():
+        table["rate"] = {"trace": str(folder / table["rate"]["trace"])}
     base = data.pop("extends", None)
     if base is None:
         return data
@@ -178,12 +178,15 @@ def _alike(below: Mapping[str, Any], table: Mapping[str, Any]) -> bool:
     return bool(table.get("type", below.get("type")) == below.get("type"))
 
 
-def _trace(data: Mapping[str, Any]) -> dict[str, str] | None:
-    """`graphics.rate = { trace = FILE }`, where that is what the scene says."""
+def _traced(data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """[graphics] and [[fmu]] tables that say `rate = { trace = FILE }`."""
     graphics = data.get("graphics")
-    rate = graphics.get("rate") if isinstance(graphics, dict) else None
-    said = isinstance(rate, dict) and isinstance(rate.get("trace"), str) and len(rate) == 1
-    return rate if said else None
+    tables = [*([graphics] if isinstance(graphics, dict) else []), *_tables_of(data, "fmu")]
+    return [t for t in tables if isinstance(t.get("rate"), dict) and _is_trace(t["rate"])]
+
+
+def _is_trace(rate: Mapping[str, Any]) -> bool:
+    return rate.keys() == {"trace"} and isinstance(rate["trace"], str)
 
 
 LATENCY = {f.name for f in fields(Latency)}

@@ -1,11 +1,11 @@
-"""A scene's [holds], [delays], [kinds], [[power]] and [substeps] against its connections."""
+"""A scene's [holds], [delays], [kinds], [substeps], [[power]] and [[spring]] against its FMUs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from hapticlink.orchestrator import power
+from hapticlink.orchestrator import power, springs
 from hapticlink.orchestrator.crossings import Refused, Rules, names
 from hapticlink.orchestrator.faults import Finding
 from hapticlink.orchestrator.latency import Latency
@@ -29,6 +29,7 @@ def rules_of(scene: Scene, own: Mapping[str, str]) -> Rules:
         scene.kinds,
         (*scene.power, *power.BLOCKS),
         scene.iteration.interpolation if scene.coupling == "iterated" else None,
+        springs.springs_of(scene),
     )
 
 
@@ -62,6 +63,7 @@ def unfit(
             yield scene.place(("get_after_set",), message)
     for i, p in enumerate(scene.power):
         yield from _power(scene, i, p, by_name)
+    yield from springs.unfit(scene, by_name)
 
 
 def _power(

@@ -6,6 +6,7 @@ from __future__ import annotations
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+SSM = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
 RUN = "urn:hapticlink:run"
 ANNOTATION = "hapticlink.run"
 STRUCTURE = "SystemStructure.ssd"
@@ -15,6 +16,7 @@ NOT_IN_ANNOTATION = frozenset(
     (
         *("linkage", "contacts", "mechanism", "directions", "device", "controller", "hand"),
         *("sensing", "mechanism_at", "directions_from", "graphics", "fmu", "connection"),
+        "packaging",
     )
 )
 """Keys of a scene that its FMUs and the structure itself say; graphics keeps its rate."""

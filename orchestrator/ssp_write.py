@@ -10,15 +10,18 @@ import json
 import os
 import uuid
 import zipfile
-from dataclasses import fields
+from dataclasses import asdict, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
 
 import pydantic
 
+from hapticlink.orchestrator.blocks import blocks
 from hapticlink.orchestrator.conversion import BASES
-from hapticlink.orchestrator.description import Scalar
+from hapticlink.orchestrator.rates import AnyRate
+from hapticlink.orchestrator.scalars import Scalar
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.ssp import (
     ANNOTATION,
@@ -145,14 +148,17 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     found["stop_when"] = scene.ends_when
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
     found["holds"] = {**scene.holds, **own}
-    rates = {f.name: f.rate for f in scene.fmu}
-    if scene.graphics and any(u.clock == "graphics" for u in system.units):
+    found["spring"] = [asdict(spring) for spring in system.springs]
+    rates: dict[str, AnyRate] = {b.name: b.rate for b in blocks(scene)}
+    rates |= {f.name: f.rate for f in scene.fmu}
+    if scene.graphics and "graphics" in rates.values():
         graphics = pydantic.TypeAdapter(type(scene.graphics))
         found["graphics"] = graphics.dump_python(
-            scene.graphics, mode="json", exclude_none=True, include={"rate", "align"}
+            scene.graphics, mode="json", exclude_none=True, include={"rate", "align", "phase"}
         )
+    as_json = partial(pydantic.TypeAdapter(AnyRate).dump_python, mode="json")
     found["fmu"] = {
-        u.name: {"rate": rates.get(u.name, u.clock), "timing": u.description.timing}
+        u.name: {"rate": as_json(rates[u.name]), "timing": u.description.timing}
         | ({"isolate": True} if u.isolate else {})
         for u in system.units
     }

@@ -6,8 +6,8 @@ control never cuts a sampled block.
 
 doubling  A step and two of half the size from the same state (Richardson): with order q of the
           coupling, the halves err by |y_2 - y_1| / (2^q - 1). A step whose error is too large is
-          taken back. The error per second is held at the tolerance, so that a run's error is
-          proportional to it.
+          taken back, and so is one in which an FMU fails or gives what is not finite. The error per
+          second is held at the tolerance, so that a run's error is proportional to it.
 ecco      Energy-conservation-based co-simulation (Sadjina, Kyllingstad, Skjong and Pedersen 2017):
           no step is taken back. The residual energy of a power connection over a step,
           (F_held - (F_n + F_{n+1})/2) . (x_{n+1} - x_n), against the energy that matters in the
@@ -21,16 +21,16 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
-Seconds = int | float | str
+from hapticlink.orchestrator.rates import Seconds
 
 
 @dataclass(frozen=True, kw_only=True)
 class StepControl:
     """Settings of [step_control]; times in s, as numbers or "1/3000".
 
-    tolerance: doubling, error per second of an output y over 1 + |y|; ecco, residual energy of a
-    step over `energy` (J), the energy that matters in the scene. min: the shortest step, accepted
-    whatever its error. max: None is a period of the rate.
+    tolerance: doubling, error per second of an output y over its nominal (1 where it has none) +
+    |y|; ecco, residual energy of a step over `energy` (J), the energy that matters in the scene.
+    min: the shortest step, accepted whatever its error. max: None is a period of the rate.
     """
 
     method: Literal["doubling", "ecco"]
@@ -42,11 +42,13 @@ class StepControl:
 
 @dataclass
 class Steps:
-    """What step control did on a rate: steps taken, taken back, taken at `min` though the error
-    was too large, the shortest and longest (s). A step of doubling is its two halves."""
+    """What step control did on a rate: steps taken, taken back for their error, given up because
+    an FMU failed in them, taken at `min` though the error was too large, the shortest and longest
+    (s). A step of doubling is its two halves."""
 
     taken: int = 0
     rejected: int = 0
+    failed: int = 0
     forced: int = 0
     shortest: float = 0.0
     longest: float = 0.0

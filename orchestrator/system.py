@@ -7,21 +7,22 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from hapticlink.orchestrator import haptic_loop
+from hapticlink.orchestrator import haptic_loop, step_sizes
 from hapticlink.orchestrator.blocks import blocks
 from hapticlink.orchestrator.conditions import Condition, parse_condition
 from hapticlink.orchestrator.crossings import Refused, assign
-from hapticlink.orchestrator.description import Description, Scalar, describe
+from hapticlink.orchestrator.description import Description, describe
 from hapticlink.orchestrator.faults import InputFault, SceneFault
-from hapticlink.orchestrator.foreign import Faults
 from hapticlink.orchestrator.iteration import Iteration
 from hapticlink.orchestrator.latency import Latency
+from hapticlink.orchestrator.policy import Faults
 from hapticlink.orchestrator.power import PowerPort
+from hapticlink.orchestrator.scalars import Scalar
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.scene_holds import rules_of, unfit
+from hapticlink.orchestrator.springs import Spring
 from hapticlink.orchestrator.step_control import StepControl
 from hapticlink.orchestrator.ticks import Timeline
-from hapticlink.orchestrator.timeline import clock_of
 from hapticlink.orchestrator.wiring import Ends, Starts, Wiring
 
 
@@ -72,7 +73,7 @@ class System:
 
     power: the ports that carry it. substeps: steps that a plant takes between two reads, its
     held inputs renewed at each. get_after_set: plants that may be read again after new inputs
-    are set. refused: default holds that did not fit.
+    are set. refused: default holds that did not fit. springs: what set positions set.
     """
 
     units: tuple[Unit, ...]
@@ -87,6 +88,7 @@ class System:
     iteration: Iteration = field(default_factory=Iteration)
     step_control: StepControl | None = None
     refused: tuple[Refused, ...] = ()
+    springs: tuple[Spring, ...] = ()
 
     @cached_property
     def unit(self) -> Mapping[str, Unit]:
@@ -109,9 +111,10 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     """The system of `scene` with the FMUs of its blocks in `files`. Raises SceneFault for FMUs
     and connections that do not fit, and for names in holds and stop_when that it does not have."""
     wiring = Wiring(scene)
-    ours = tuple(Unit(b.name, describe(files[b.name]), b.clock) for b in blocks(scene))
+    of = timeline.of
+    ours = tuple(Unit(b.name, describe(files[b.name]), of[b.name]) for b in blocks(scene))
     foreign = (
-        Unit(fmu.name, description, clock_of(fmu.rate, scene), starts, fmu.isolate)
+        Unit(fmu.name, description, of[fmu.name], starts, fmu.isolate)
         for fmu, description, starts in wiring.fmus()
     )
     units = tuple(replace(u, isolate=u.isolate or scene.isolate) for u in (*ours, *foreign))
@@ -125,7 +128,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     findings = wiring.findings
     rules = rules_of(scene, {_between(e): e.hold for e in ends if e.hold})
     made, refused = assign(units, connected, timeline, rules)
-    findings += unfit(scene, units, made, refused)
+    findings += [*unfit(scene, units, made, refused), *step_sizes.unfit(scene, units, timeline)]
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(units, condition):
         message = f"{condition}: there is no such output"
@@ -145,6 +148,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         scene.iteration,
         scene.step_control,
         refused,
+        rules.springs,
     )
 
 

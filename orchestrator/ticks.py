@@ -7,10 +7,11 @@ that do not divide each other never meet a rounded float.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 
 
 def exact(number: int | float | str) -> Fraction:
@@ -29,20 +30,39 @@ class Clock:
     starts: Sequence[int]
 
     @property
+    def first(self) -> int:
+        """The first step (ticks)."""
+        return self.starts[1]
+
+    @cached_property
     def longest(self) -> int:
         """The longest step (ticks)."""
         if isinstance(self.starts, range):
             return self.starts.step
-        return max(b - a for a, b in zip(self.starts, self.starts[1:], strict=False))
+        return max(b - a for a, b in pairwise(self.starts))
+
+    @cached_property
+    def shortest(self) -> int:
+        """The shortest step (ticks) after the first."""
+        if isinstance(self.starts, range):
+            return self.starts.step
+        return min((b - a for a, b in pairwise(self.starts[1:])), default=self.longest)
+
+    @property
+    def period(self) -> int | None:
+        """Of every step but the first, None where they vary."""
+        return self.longest if self.longest == self.shortest else None
 
 
 @dataclass(frozen=True)
 class Timeline:
-    """The base (s), the last tick, and the clocks; the first clock is the haptic one."""
+    """The base (s), the last tick, and the clocks; the first clock is the haptic one. of: the name
+    of each FMU's clock."""
 
     base: Fraction
     end: int
     clocks: tuple[Clock, ...]
+    of: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def seconds(self) -> Callable[[float], float]:

@@ -19,14 +19,16 @@ def has_tracking(results: Results) -> bool:
 
 
 def pose_error(results: Results) -> tuple[Vector, Vector, Vector]:
-    """(time s, |x_S - x_D| mm, |theta_S - theta_D| rad) at the mechanism's samples; the device,
-    which has another rate in some scenes, linear between its own. Raises KeyError."""
+    """(time s, |x_S - x_D| mm, |theta_S - theta_D| rad) at the mechanism's samples up to the
+    device's last; the device, which has a clock of its own in some scenes, linear between its own.
+    Raises KeyError."""
     mechanism, device = table_of(results, MECHANISM), table_of(results, DEVICE)
     if mechanism is None or device is None:
         raise KeyError(f"{results.folder}: tracking needs {MECHANISM} and {DEVICE}")
     time = mechanism["time"]
+    time = time[time <= device["time"][-1]]
     x, y, theta = (
-        mechanism[MECHANISM][:, i] - np.interp(time, device["time"], device[DEVICE][:, i])
+        mechanism[MECHANISM][: len(time), i] - np.interp(time, device["time"], device[DEVICE][:, i])
         for i in range(3)
     )
     return time, np.hypot(x, y) * 1e3, np.abs(theta)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.description import TYPES, Scalar
+from hapticlink.orchestrator.scalars import TYPES, Scalar
 
 Vector = NDArray[np.float64]
 _IN_C: dict[str, type[np.generic]] = {
@@ -20,6 +20,10 @@ _IN_C: dict[str, type[np.generic]] = {
     "UInt64": np.uint64, "UInt32": np.uint32, "UInt16": np.uint16, "UInt8": np.uint8,
 }  # fmt: skip
 _BOOLEAN = {"2": np.int32, "3": np.bool_}  # fmi2Boolean is an int, fmi3Boolean a bool
+
+
+class Unfit(Exception):
+    """A number that its FMI type cannot hold."""
 
 
 class Transfer:
@@ -36,6 +40,10 @@ class Transfer:
         self._values = values[chosen[0] : chosen[-1] + 1]
         in_c = _IN_C.get(type_) or _BOOLEAN[fmi]
         self._boolean, self._whole = type_ == "Boolean", np.issubdtype(in_c, np.integer)
+        if self._whole:
+            self._limits = np.iinfo(in_c)
+            self._named = f"{type_} holds {self._limits.min} to {self._limits.max}"
+            self._names = [scalars[i].name for i in chosen]
         direct = in_c is np.float64
         self._buffer: Any = self._values if direct else np.zeros(len(chosen), in_c)
         references = [scalars[i].reference for i in chosen if scalars[i].entry == 0]
@@ -61,8 +69,19 @@ class Transfer:
         if self._boolean:
             self._buffer[:] = self._values >= 0.5
         else:
-            self._buffer[:] = np.rint(self._values) if self._whole else self._values
+            self._buffer[:] = self._rounded() if self._whole else self._values
         return self._transfer()
+
+    def _rounded(self) -> Vector:
+        """The nearest whole numbers. Raises Unfit."""
+        rounded, limits = np.rint(self._values), self._limits
+        # max + 1 is a power of two, so it is exact where max is not.
+        fits = (rounded >= limits.min) & (rounded < float(limits.max + 1))
+        if not fits.all():
+            i = int(np.argmin(fits))
+            value = float(self._values[i])
+            raise Unfit(f"{self._names[i]} cannot be {value!r}: {self._named}")
+        return rounded
 
 
 def transfers(

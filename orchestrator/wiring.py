@@ -5,14 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path as FilePath
 
 from hapticlink.orchestrator.conversion import SAME, Linear, conversion
-from hapticlink.orchestrator.description import Description, Scalar, describe
+from hapticlink.orchestrator.description import Description, describe
 from hapticlink.orchestrator.faults import Finding, InputFault
 from hapticlink.orchestrator.foreign import ForeignFmu, Value, Wire
 from hapticlink.orchestrator.foreign_checks import unknown
+from hapticlink.orchestrator.scalars import Scalar
 from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.starts import fitting
 from hapticlink.orchestrator.toml_lines import Path
 
 Starts = tuple[tuple[Scalar, bool | int | float | str], ...]
@@ -60,31 +63,33 @@ class Wiring:
 
     def _start(self, i: int, found: Description, name: str, value: Value) -> Starts:
         path: Path = ("fmu", i, "start", name)
-        scalars = self._settable(path, found, name)
+        scalars = self._settable(path, found, name, start=True)
         if not scalars:
             return ()
         values = value if isinstance(value, tuple) else (value,)
         if len(values) != len(scalars):
             self._find(path, f"{len(values)} values for the {len(scalars)} of {name}")
             return ()
-        for scalar, given in zip(scalars, values, strict=True):
-            if not isinstance(given, _takes(scalar)) or (
-                isinstance(given, bool) and scalar.type != "Boolean"
-            ):
-                self._find(path, f"{given!r}: {scalar.name} takes {_WORDS[_takes(scalar)]}")
-                return ()
-        return tuple(zip(scalars, values, strict=True))
+        try:
+            return tuple((s, fitting(s, given)) for s, given in zip(scalars, values, strict=True))
+        except ValueError as error:
+            self._find(path, str(error))
+            return ()
 
-    def _settable(self, path: Path, found: Description, name: str) -> tuple[Scalar, ...]:
+    def _settable(
+        self, path: Path, found: Description, name: str, start: bool = False
+    ) -> tuple[Scalar, ...]:
+        """The entries of `name`, where a value may come in: once, at the `start`, or always."""
+        able = attrgetter("startable" if start else "settable")
         named = [s for s in (*found.scalars, *found.strings) if name in (s.name, s.port)]
-        scalars = tuple(s for s in named if s.settable)
+        scalars = tuple(sorted(filter(able, named), key=lambda s: s.indices))
         if named and not scalars:
             what = named[0].causality
             what = what if named[0].variability != "constant" else f"constant {what}"
             self._find(path, f"{name} cannot be set: its causality is {what}")
         elif not scalars:
-            known = (s.port for s in (*found.scalars, *found.strings) if s.settable)
-            self._find(path, unknown("input or parameter", name, dict.fromkeys(known)))
+            known = dict.fromkeys(s.port for s in filter(able, (*found.scalars, *found.strings)))
+            self._find(path, unknown("input or parameter", name, known))
         return scalars
 
     # --- [[connection]] -------------------------------------------------------------------
@@ -168,12 +173,3 @@ def _converted(
                 ) from None
         found.append(replace(b, conversion=Linear(wire.factor, wire.offset).after(units)))
     return tuple(found)
-
-
-_WORDS = {bool: "true or false", int: "a whole number", (int, float): "a number", str: "text"}
-
-
-def _takes(scalar: Scalar) -> type | tuple[type, type]:
-    if scalar.type in ("Real", "Float64", "Float32"):
-        return (int, float)
-    return {"Boolean": bool, "String": str}.get(scalar.type, int)

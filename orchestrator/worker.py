@@ -43,12 +43,18 @@ class Worker:
         self._setters.append(self.instance.connect(scalars, range(len(scalars))))
         return len(self._setters) - 1
 
-    def set(self, key: int, values: Any) -> None:
-        self._setters[key](values)
+    def connect_derivatives(self, scalars: Any, orders: Any) -> int:
+        made = self.instance.connect_derivatives(scalars, orders, range(len(scalars)))
+        self._setters.append(made)
+        return len(self._setters) - 1
+
+    def jacobian(self, outputs: Any, inputs: Any) -> Any:
+        return self.instance.jacobian(outputs, inputs)
 
     def set_all(self, pending: Any) -> None:
+        """`pending`: (key, values as bytes) of setters, in order."""
         for key, values in pending:
-            self.set(key, values)
+            self._setters[key](np.frombuffer(values))
 
     def enter_initialization(self, stop_time: float) -> None:
         self.instance.enter_initialization(stop_time)
@@ -56,18 +62,21 @@ class Worker:
     def exit_initialization(self) -> None:
         self.instance.exit_initialization()
 
-    def read(self, pending: Any = ()) -> Any:
-        self.set_all(pending)
+    def read(self) -> bytes:
         self.instance.read()
-        return self.instance.outputs
+        return self.instance.outputs.tobytes()
 
-    def step(self, pending: Any, time: float, end: float, size: float) -> Any:
-        self.set_all(pending)
+    def step(self, time: float, end: float, size: float) -> Any:
+        """(outputs, or why they cannot be read, time in steps, steps taken in smaller ones)."""
+        outputs, fault = b"", None
         self.instance.step(time, end, size)
-        return self.read(), self.instance.step_time, self.instance.smaller_steps
+        try:
+            outputs = self.read()
+        except FmuFault as failed:  # told when somebody reads
+            fault = _told(failed)
+        return outputs, fault, self.instance.step_time, self.instance.smaller_steps
 
-    def save(self, pending: Any, slot: int) -> None:
-        self.set_all(pending)
+    def save(self, slot: int) -> None:
         self.instance.save(slot)
 
     def rollback(self, slot: int) -> None:
@@ -79,19 +88,24 @@ class Worker:
             instance.close()
 
 
+def _told(fault: FmuFault) -> tuple[Any, ...]:
+    return fault.what, fault.time, fault.messages, fault.passing
+
+
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer until `close`, or until there is nobody left to ask."""
     worker = Worker()
     call = ""
     while call != "close":
         try:
-            call, arguments = pickle.load(requests)
+            pending, call, arguments = pickle.load(requests)
         except EOFError:
             break
         try:
+            worker.set_all(pending)
             answer = ("answer", getattr(worker, call)(*arguments))
         except FmuFault as fault:
-            answer = ("fault", (fault.what, fault.time, fault.messages))
+            answer = ("fault", _told(fault))
         pickle.dump(answer, answers)
         answers.flush()
     worker.close()

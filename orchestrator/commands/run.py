@@ -16,12 +16,14 @@ Explain = Annotated[
 
 
 def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain = False) -> int:
-    """Run a scene: results as CSV, run.json and figures in OUT (default runs/<scene>)."""
+    """Run a scene: results as CSV, run.json, plan.txt and figures in OUT (default runs/<scene>)."""
     if explain:
         return _explain(scene, set or ())
+    from hapticlink.orchestrator import explain as explained
     from hapticlink.orchestrator import scene_file
     from hapticlink.orchestrator.commands.progress import progress
     from hapticlink.orchestrator.experiment import simulate
+    from hapticlink.orchestrator.plan import Plan
 
     read = scene_file.load(scene, set or ())
     folder = out or default_folder("runs", scene)
@@ -30,17 +32,19 @@ def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain =
     outcome = experiment.outcome
     if outcome.fault:
         print(f"hapticlink: {outcome.fault}", file=sys.stderr)
-    figures = []
+    others = []
     if outcome.end_time > 0:
         from hapticlink.orchestrator.figures import draw
 
-        figures = draw(experiment.results)
+        plan = "\n".join(explained.explain(Plan(experiment.system)))
+        (experiment.folder / "plan.txt").write_text(plan + "\n", encoding="utf-8")
+        others = ["plan.txt", *draw(experiment.results)]
     speed = outcome.end_time / outcome.wall_time
     ends = {"stop_when": f"ended by {experiment.system.ends_when}", "duration": "done"}
     print(f"{read.title}: {ends.get(outcome.reason, outcome.reason)} at {outcome.end_time:g} s")
     print(f"  {outcome.wall_time:.2f} s of run time, {speed:.1f} times real time")
     tables = (f"{clock.name}.csv" for clock in experiment.system.timeline.clocks)
-    print(f"  {folder}/: {', '.join([*tables, 'run.json', *figures])}")
+    print(f"  {folder}/: {', '.join([*tables, 'run.json', *others])}")
     return outcome.fault.exit_status if outcome.fault else 0
 
 

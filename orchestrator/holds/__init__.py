@@ -1,7 +1,8 @@
 """What stands on an input between two samples of its source. One hold a file.
 
 A hold's class says what it `needs` ("derivative": samples are the signal and then its derivative;
-"power": the connection carries it; or None), and whether it `gives_samples`, unchanged.
+"power": the connection carries it; "spring": it sets one; or None), whether it `gives_samples`,
+unchanged, and the `degree` of the polynomial in time that it is within a step; 0 where it stands.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from hapticlink.orchestrator.holds.mean import Mean
 from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.second_order import SecondOrder
+from hapticlink.orchestrator.holds.set_position import PassiveSetPosition
 from hapticlink.orchestrator.holds.site import Site
 from hapticlink.orchestrator.holds.smooth import Smooth
 from hapticlink.orchestrator.holds.zero_order import ZeroOrder
@@ -29,6 +31,9 @@ class HoldType(Protocol):
 
     @property
     def gives_samples(self) -> bool: ...
+
+    @property
+    def degree(self) -> int: ...
 
     def __call__(self, site: Site) -> Hold: ...
 
@@ -44,6 +49,7 @@ HOLDS: dict[str, HoldType] = {
     "smooth": Smooth,
     "passive": Passive,
     "nepce": NearlyEnergyPreserving,
+    "pspm": PassiveSetPosition,
     "latest": ZeroOrder,
     "mean": Mean,
 }

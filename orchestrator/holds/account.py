@@ -32,20 +32,30 @@ def repayment(excess: Vector, motion: Vector, largest: Vector) -> Vector:
 
 
 class Account:
-    """The base of both holds: zero order, plus `correct` once for every tick that is asked for."""
+    """The base of both holds: zero order, plus `correction` once for every tick that is asked for.
+
+    motion: the last displacement. straight, ahead: that of the step to come with the target's
+    velocity as it is, and as it has changed over the last step. largest of the last two samples;
+    swing, the most by which the mean of the source between two bookings ever left the sample held.
+    """
 
     needs: ClassVar[str | None] = "power"
     gives_samples: ClassVar[bool] = False
+    degree: ClassVar[int] = 0
 
     def __init__(self, site: Site) -> None:
         assert site.displacement is not None
-        self._displacement = site.displacement
+        self._displacement, self._velocity = site.displacement, site.velocity
+        self._seconds = site.seconds
         self._new: list[tuple[int, Vector]] = []
         self._stamp, self._tick = 0, -1
         self.sample = self._held = np.zeros(site.size)
         self._x = self._x_stamp = np.zeros(site.size)
         self._work, self._ideal = np.zeros(site.size), np.zeros(site.size)
-        self.motion, self.largest = np.zeros(site.size), np.zeros(site.size)
+        self.motion = self.straight = self.ahead = np.zeros(site.size)
+        self._v = self._gain = np.zeros(site.size)
+        self._steps = 0
+        self.largest, self.swing = np.zeros(site.size), np.zeros(site.size)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._new.append((stamp, sample.copy()))
@@ -54,6 +64,7 @@ class Account:
         if tick > self._tick or self._new:
             fresh = bool(self._new)
             self._book(tick)
+            self._look(2 * ahead)
             self._held = self.sample + self.correction(fresh)
         return self._held
 
@@ -61,6 +72,11 @@ class Account:
     def made(self) -> Vector:
         """J by axis, until now."""
         return self._work - self._ideal - self.sample * (self._x - self._x_stamp)
+
+    @property
+    def travelled(self) -> Vector:
+        """The displacement since the newest sample."""
+        return self._x - self._x_stamp
 
     def correction(self, fresh: bool) -> Vector:
         """What is added to the newest sample until the next tick; `fresh` with a new one."""
@@ -72,7 +88,11 @@ class Account:
         if self._tick < 0:
             self._x = self._x_stamp = x
             self._stamp, self.sample = self._new[0]
+            self._tick = tick
+            self._v = self._velocity().copy() if self._velocity else self._v
         self.motion, start, done = x - self._x, self._x, 0.0
+        self._steps, passed, mean = tick - self._tick, self._stamp, np.zeros_like(x)
+        first = self.sample
         self._work = self._work + self._held * self.motion
         for stamp, sample in self._new:
             if tick > self._tick:
@@ -80,6 +100,21 @@ class Account:
             there = start + self.motion * done
             self._ideal = self._ideal + (self.sample + sample) / 2 * (there - self._x_stamp)
             self.largest = np.maximum(np.abs(sample), np.abs(self.sample))
+            mean += (self.sample + sample) / 2 * (stamp - self._stamp)
             self._stamp, self._x_stamp, self.sample = stamp, there, sample
+        if self._stamp > passed:
+            self.swing = np.maximum(self.swing, np.abs(mean / (self._stamp - passed) - first))
         self._new.clear()
         self._tick, self._x = tick, x
+
+    def _look(self, step: float) -> None:
+        """Into the step to come, of `step` ticks and at least as long as the last."""
+        if self._velocity is None:
+            self.straight = self.ahead = self.motion
+            return
+        v, step = self._velocity().copy(), max(step, self._steps)
+        if self._steps:
+            self._gain = (v - self._v) / self._steps
+        self._v = v
+        self.straight = v * self._seconds(step)
+        self.ahead = self.straight + self._gain * (step / 2 * self._seconds(step))

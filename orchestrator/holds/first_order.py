@@ -18,6 +18,7 @@ from hapticlink.orchestrator.holds.site import Site
 class FirstOrder:
     needs: ClassVar[str | None] = None
     gives_samples: ClassVar[bool] = False
+    degree: ClassVar[int] = 1
 
     def __init__(self, site: Site) -> None:
         self._samples = History(2)

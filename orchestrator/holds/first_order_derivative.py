@@ -18,6 +18,7 @@ from hapticlink.orchestrator.holds.site import Site
 class FirstOrderDerivative:
     needs: ClassVar[str | None] = "derivative"
     gives_samples: ClassVar[bool] = False
+    degree: ClassVar[int] = 1
 
     def __init__(self, site: Site) -> None:
         self._size, self._seconds = site.size, site.seconds

@@ -20,6 +20,7 @@ from hapticlink.orchestrator.holds.site import Site
 class Hermite:
     needs: ClassVar[str | None] = "derivative"
     gives_samples: ClassVar[bool] = False
+    degree: ClassVar[int] = 3
 
     def __init__(self, site: Site) -> None:
         self._size, self._seconds = site.size, site.seconds

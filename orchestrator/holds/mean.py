@@ -22,6 +22,7 @@ Vector = NDArray[np.float64]
 class Mean:
     needs: ClassVar[str | None] = None
     gives_samples: ClassVar[bool] = False
+    degree: ClassVar[int] = 0
 
     def __init__(self, site: Site) -> None:
         self._stamp: int | None = None

@@ -1,19 +1,48 @@
-"""Passive hold: zero-order, and what energy it makes is taken back at once.
+"""Passive hold: zero-order, and a friction that keeps the energy it makes from being positive.
 
-F_held = F_n - made/dx where made > 0, 0 elsewhere: a passivity observer on the hold's own energy
-(`account`) and the series passivity controller of Hannaford & Ryu (IEEE Trans. Robotics and
-Automation 18, 2002), at every step of the target, with dx its last displacement; by axis, and
-never more than the larger of the last two samples. A force acts on the motion that follows, so
-what a period makes is known at its end and repaid in the next: nothing builds up.
+F_held = F_n - beta sign(d) c, by axis, at every step of the target, with d its displacement over
+the step as it is foreseen, v T + dv T/2 (v its velocity, dv what it gained in the last step):
+
+c = max(0, r + P/D),    P = made + r |x - x(t_n)|,    D = |d| + |v| T where P <= 0, |d| where P > 0
+
+made is the hold's energy (`account`), r the most by which the mean of the source between two
+bookings ever left the force that was held: the passivity observer. P is then the most that may
+turn out to have been made, and the controller, in series as that of Hannaford & Ryu (IEEE Trans.
+Robotics and Automation 18, 2002), keeps a reserve r D for the worst that the source may do over
+the next step. c is at most the larger of r and the last two samples.
+
+Theorem. Let the displacement dx of a step go the way foreseen, |dx| <= D, and let the mean of the
+source leave F_n by at most r (beta = 1). Then P' <= P + (r - c) |dx|, so that P <= 0 gives P' <= 0:
+nothing is ever made. Where P > 0, c >= r and P' <= P: what a larger swing than ever, R > r, makes
+is at most (R - r) |dx|, once, and all that is made at any time at most r |dx| of one step.
+
+No hold can do without such premises. made' - made = (F_held - mean) dx, and mean and dx come after
+F_held is chosen: whichever it is, even 0, one of mean = F_n +- r with one of dx = +-d makes r d or
+more, at every step. Where a step goes against what was foreseen, beta is halved (a friction that
+turns the target round is too large), and grows by a tenth a step after that.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.orchestrator.holds.account import Account, Vector, repayment
+from hapticlink.orchestrator.holds.account import Account, Vector
+from hapticlink.orchestrator.holds.site import Site
 
 
 class Passive(Account):
+    def __init__(self, site: Site) -> None:
+        super().__init__(site)
+        self._beta = np.ones(site.size)
+        self._foreseen = np.zeros(site.size)
+
     def correction(self, fresh: bool) -> Vector:
-        return repayment(np.maximum(self.made, 0.0), self.motion, self.largest)
+        turned = self.motion * self._foreseen < 0.0
+        self._beta = np.where(turned, self._beta / 2, np.minimum(1.1 * self._beta, 1.0))
+        self._foreseen = self.ahead
+        most = self.made + self.swing * np.abs(self.travelled)
+        way = np.abs(self.ahead) + np.where(most > 0.0, 0.0, np.abs(self.straight))
+        share = np.zeros_like(way)
+        np.divide(most, way, out=share, where=way > 0.0)
+        friction = np.clip(self.swing + share, 0.0, np.maximum(self.swing, self.largest))
+        return -np.sign(self.ahead) * self._beta * friction

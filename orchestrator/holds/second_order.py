@@ -20,6 +20,7 @@ from hapticlink.orchestrator.holds.site import Site
 class SecondOrder:
     needs: ClassVar[str | None] = None
     gives_samples: ClassVar[bool] = False
+    degree: ClassVar[int] = 2
 
     def __init__(self, site: Site) -> None:
         self._samples = History(3)

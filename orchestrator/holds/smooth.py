@@ -25,6 +25,7 @@ Vector = NDArray[np.float64]
 class Smooth:
     needs: ClassVar[str | None] = None
     gives_samples: ClassVar[bool] = False
+    degree: ClassVar[int] = 3
 
     def __init__(self, site: Site) -> None:
         self._samples = History(2)

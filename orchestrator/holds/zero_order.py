@@ -13,6 +13,7 @@ from hapticlink.orchestrator.holds.site import Site
 class ZeroOrder:
     needs: ClassVar[str | None] = None
     gives_samples: ClassVar[bool] = True
+    degree: ClassVar[int] = 0
 
     def __init__(self, site: Site) -> None:
         self._newest = np.zeros(site.size)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from hapticlink.orchestrator import rollback
-from hapticlink.orchestrator.crossings import port
+from hapticlink.orchestrator.crossings import carries_power
 from hapticlink.orchestrator.faults import InputFault
 from hapticlink.orchestrator.schemes import CAUSAL, phrases
 from hapticlink.orchestrator.schemes.operations import (
@@ -17,10 +17,10 @@ from hapticlink.orchestrator.schemes.operations import (
     Part,
     Record,
 )
+from hapticlink.orchestrator.step_sizes import VARIABLE
 from hapticlink.orchestrator.system import Connection, System
 
 Scheme = Callable[[System, Event], tuple[Operation, ...]]
-VARIABLE = "canHandleVariableCommunicationStepSize"
 
 
 def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]:
@@ -64,7 +64,7 @@ def _between(system: System, clock: str) -> list[Connection]:
 def _require_energy(system: System, clock: str, between: list[Connection]) -> None:
     """Raises InputFault where there is no energy to look at, or nothing to measure it against."""
     assert system.step_control is not None
-    if not any(port(c, system.power) for c in between):
+    if not any(carries_power(c, system.power) for c in between):
         raise InputFault(
             "[step_control] method = 'ecco' looks at the energy between plants, and no connection "
             f"between plants of {clock} carries power: name efforts and displacements in "

@@ -9,7 +9,8 @@ smaller error and no limit of the step beyond that of the plants.
 A plant takes constant inputs over each substep. Two neighbours of width h get
 (f1 + f2)/2 -+ (2/sqrt 3)(f2 - f1)/2, with f1, f2 the input at the two Gauss points of the pair:
 its mean and its first moment are those of the input up to the cubic, so substeps cost an error of
-order 4 (the commutator-free rule of Blanes and Moan 2006, for constant stages). It reads the
+order 4 (the commutator-free rule of Blanes and Moan 2006, for constant stages). A plant that can
+interpolate its inputs gets the hold's derivatives and needs no substeps. The scheme reads the
 future, so it claims no causality.
 """
 
@@ -96,10 +97,11 @@ def _step(system: System, event: Event, unit: Unit, loop: list[Connection]) -> I
     inside = {c.name for c in loop}
     for part in range(parts):
         for operation in phrases.feed(system, event, unit, part):
-            if isinstance(operation, Evaluate) and operation.connection in inside:
-                yield Blend(operation.connection, substep(part, parts, dticks))
-            else:
-                yield operation
+            match operation:
+                case Evaluate(name, order=0) if name in inside:
+                    yield Blend(name, substep(part, parts, dticks))
+                case _:
+                    yield operation
         yield Step(unit.name, dticks, part, parts)
 
 

@@ -50,18 +50,25 @@ class Push:
 @dataclass(frozen=True)
 class Evaluate:
     """Ask a hold, by what is known at this tick, for its value `ahead` of it: the middle of the
-    step over which a plant takes it, 0 for a sampled block."""
+    step over which a plant takes it, 0 for a sampled block.
+
+    A plant that takes inputs that vary gets the value at the beginning of its step of `width`, and
+    its derivatives up to `order`."""
 
     connection: str
     ahead: Fraction = Fraction(0)
+    order: int = 0
+    width: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True)
 class Set:
-    """Write all connected inputs of an FMU; `now` with the sources' newest outputs, no holds."""
+    """Write all connected inputs of an FMU; `now` with the sources' newest outputs, no holds;
+    with the `derivatives` that were evaluated."""
 
     fmu: str
     now: bool = False
+    derivatives: bool = False
 
 
 @dataclass(frozen=True)

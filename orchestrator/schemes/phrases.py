@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator
 from fractions import Fraction
 
+from hapticlink.orchestrator import input_derivatives
 from hapticlink.orchestrator.schemes.operations import (
     Evaluate,
     Event,
@@ -64,18 +65,20 @@ def publish_ended(system: System, event: Event, continuous: list[Unit]) -> Itera
 
 def feed(system: System, event: Event, unit: Unit, part: int = 0) -> Iterator[Operation]:
     """Set the inputs. A plant takes them over its whole step or substep, so it gets what a hold
-    gives for the middle of it; a sampled block what it gives for this tick."""
+    gives for the middle of it, or for its beginning with the derivatives there; a sampled block
+    what it gives for this tick."""
     incoming = system.into(unit.name)
-    ahead = Fraction(0)
+    width = Fraction(0)
     if not unit.sampled:
-        ahead = Fraction(
-            (2 * part + 1) * dticks(event, unit), 2 * system.substeps.get(unit.name, 1)
-        )
-    for connection in incoming:
-        if connection.hold:
-            yield Evaluate(connection.name, ahead)
+        width = Fraction(dticks(event, unit), system.substeps.get(unit.name, 1))
+    orders = {c.name: input_derivatives.order(system, c) for c in incoming if c.hold}
+    for name, order in orders.items():
+        if order:
+            yield Evaluate(name, part * width, order, width)
+        else:
+            yield Evaluate(name, part * width + width / 2)
     if incoming:
-        yield Set(unit.name)
+        yield Set(unit.name, derivatives=any(orders.values()))
 
 
 def dticks(event: Event, unit: Unit) -> int:

@@ -36,6 +36,9 @@ GAINS: dict[str, tuple[str, ...]] = {
 
 MEANS = ("zoh", "foh", "foh-derivative")
 """Holds that are also tried with the mean over the slow step in the other direction."""
+GUARDED = ("foh-derivative", "pspm")
+"""Holds of poses that are also tried with `passive` on the wrenches in the other direction."""
+WRENCHES = ("virtual_mechanism.F_hand", "virtual_mechanism.F_drift")
 
 
 def jobs() -> list[Job]:
@@ -53,7 +56,7 @@ def _references() -> Iterator[Job]:
 
 def _closed_loop() -> Iterator[Job]:
     """Lambda^-1 and P_c cross from the graphics rate; no power does."""
-    holds = _holds(("derivative", "power"))
+    holds = _holds(("derivative", "power", "spring"))
     for model, sync, bias, hold, (rate, seed, option) in product(
         MODELS, SYNC, BIAS, holds, _rates()
     ):
@@ -80,7 +83,9 @@ def _holds(without: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
     found: dict[str, tuple[str, ...]] = {n: (f"hold={n}",) for n in names}
     found = {n: options for n, options in found.items() if n not in ("latest", "mean")}
     means = {f"{n}, mean": (*found[n], "downsampling=mean") for n in MEANS if n in found}
-    return {**found, **means}
+    passive = tuple(f"holds.{wrench}=passive" for wrench in WRENCHES)
+    guarded = {f"{n}, passive": (*found[n], *passive) for n in GUARDED if n in found}
+    return {**found, **means, **guarded}
 
 
 def _rates() -> Iterator[tuple[str, str, str]]:

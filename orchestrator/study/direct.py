@@ -87,9 +87,9 @@ def _advice(grids: dict[str, Grid], coupling: dict[str, Grid], energy: dict[str,
         )
     said = (
         "Of the holds that last the 3 s with velocity terms left out and with them sent, the one "
-        "of the least largest tracking error; every number is the worse of the two. `a, mean` is "
-        "hold `a` from slow to fast and the mean over the slow step from fast to slow, where all "
-        "others give the latest sample."
+        "of the least largest tracking error; every number is the worse of the two. `a, b` is hold "
+        "`a` from slow to fast and `b` from fast to slow: the mean over the slow step, `passive`. "
+        "All others give the latest sample there, but `passive` and `nepce`: they stand there only."
     )
     return f"{fill(said, 108)}\n\n" + "\n".join(lines)
 

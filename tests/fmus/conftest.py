@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import sample_components
 
-from hapticlink.fmus import build
+from hapticlink.fmus import build, build_native
 from hapticlink.fmus.check import Session, session
 
 
@@ -17,6 +17,12 @@ from hapticlink.fmus.check import Session, session
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("fmus")
     return {c.name: build(c, folder) for c in sample_components.EVERY}
+
+
+@pytest.fixture(scope="session")
+def native_fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("native")
+    return {c.name: build_native(c, folder) for c in sample_components.EVERY}
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from pythonfmu.builder import FmuBuilder
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
+from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.description import describe
 from hapticlink.orchestrator.system import System, Unit, connect
 from hapticlink.orchestrator.ticks import Timeline
@@ -26,6 +27,14 @@ def own_temporary_folder(
     monkeypatch.setenv("TMPDIR", str(folder))
     monkeypatch.setattr(tempfile, "tempdir", None)
     return folder
+
+
+def status(*arguments: object) -> int:
+    """The exit status of a command."""
+    with pytest.raises(SystemExit) as ended:
+        main([str(a) for a in arguments])
+    assert isinstance(ended.value.code, int)
+    return ended.value.code
 
 
 def clock(name: str, timing: str, inputs: Sequence[str]) -> Component:
@@ -74,7 +83,8 @@ def stamped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Timeline, str
 
     def make(timeline: Timeline, coupling: str) -> System:
         units = tuple(
-            Unit(n, d, "graphics" if n == "graphics" else "haptics") for n, d in described.items()
+            Unit(n, d, timeline.of.get(n, "graphics" if n == "graphics" else "haptics"))
+            for n, d in described.items()
         )
         return System(units, tuple(connect(units, ROWS, "zoh", {})), timeline, coupling)
 

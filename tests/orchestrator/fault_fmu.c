@@ -1,9 +1,18 @@
 /* An FMI 2.0 co-simulation FMU that fails as its input `mode` says: 0 counts, 1 to 4 are the
-   statuses warning to fatal, 5 an abort, 6 never returns, 7 a discard that asks to end the simulation. */
+   statuses warning to fatal, 5 an abort, 6 never returns, 7 a discard that asks to end the simulation,
+   8 an error when it is read after the third step. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct { double mode, y; } Model;
+
+/* The file named by FAULT_FMU_LOG gets the last calls. */
+static void say(const char *what) {
+    const char *path = getenv("FAULT_FMU_LOG");
+    FILE *file = path ? fopen(path, "a") : NULL;
+    if (file) fprintf(file, "%s\n", what), fclose(file);
+}
 
 /* An importer may ask for every function of the standard; these are not called. */
 #define UNUSED(name) int name(void) { return 3; }
@@ -22,12 +31,13 @@ void *fmi2Instantiate(const char *name, int type, const char *guid, const char *
                       const void *callbacks, int visible, int logging) {
     return strcmp(guid, "{faults}") ? NULL : calloc(1, sizeof(Model));
 }
-void fmi2FreeInstance(void *c) { free(c); }
+void fmi2FreeInstance(void *c) { say("free"); free(c); }
 int fmi2SetupExperiment(void *c, int d, double t, double a, int s, double b) { return 0; }
 int fmi2EnterInitializationMode(void *c) { return 0; }
 int fmi2ExitInitializationMode(void *c) { return 0; }
-int fmi2Terminate(void *c) { return 0; }
+int fmi2Terminate(void *c) { say("terminate"); return 0; }
 int fmi2GetReal(void *c, const unsigned *vr, size_t n, double *value) {
+    if (((Model *)c)->mode == 8 && ((Model *)c)->y >= 3) return 3;
     for (size_t i = 0; i < n; i++) value[i] = vr[i] ? ((Model *)c)->y : ((Model *)c)->mode;
     return 0;
 }
@@ -41,7 +51,13 @@ int fmi2DoStep(void *c, double t, double h, int discard) {
     if (mode == 5) abort();
     for (; mode == 6;) ;
     m->y += 1;
-    return mode == 7 ? 2 : mode;
+    return mode == 7 ? 2 : mode == 8 ? 0 : mode;
+}
+/* As in pythonfmu's library: to be called once before the destructor. */
+static int released;
+void finalizePythonInterpreter(void) { released++; }
+__attribute__((destructor)) static void unload(void) {
+    say(released == 1 ? "unloaded after its interpreter" : "unloaded with its interpreter");
 }
 int fmi2GetBooleanStatus(void *c, int kind, int *value) {
     *value = kind == 3 && ((Model *)c)->mode == 7;

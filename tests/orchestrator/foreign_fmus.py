@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from fmpy import platform, sharedLibraryExtension
+from fmpy import platform, platform_tuple, sharedLibraryExtension
 from pythonfmu.builder import FmuBuilder
 
 from hapticlink.orchestrator import results
@@ -61,6 +61,8 @@ UNITS = """<UnitDefinitions>
 <Unit name="K"><BaseUnit K="1"/></Unit>
 <Unit name="deg"><BaseUnit rad="1" factor="0.017453292519943295"/></Unit>
 <Unit name="rad"><BaseUnit rad="1"/></Unit>
+<Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit>
+<Unit name="kN"><BaseUnit kg="1" m="1" s="-2" factor="1000"/></Unit>
 <Unit name="furlong"/>
 </UnitDefinitions>
 <ModelVariables>"""
@@ -105,16 +107,53 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 
 def c_fmu(folder: Path, guid: str = "{faults}") -> Path:
     """The FMU of fault_fmu.c; skips the test where there is no C compiler."""
+    return _compiled(folder, "fault_fmu.c", "faults", platform, DESCRIPTION.format(guid=guid))
+
+
+def _compiled(folder: Path, source: str, name: str, where: str, description: str) -> Path:
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
-    library, path = folder / f"faults{sharedLibraryExtension}", folder / "faults.fmu"
-    source = Path(__file__).parent / "fault_fmu.c"
-    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
+    library, path = folder / f"{name}{sharedLibraryExtension}", folder / f"{name}.fmu"
+    text = Path(__file__).parent / source
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, text], check=True)
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION.format(guid=guid))
-        archive.write(library, f"binaries/{platform}/faults{sharedLibraryExtension}")
+        archive.writestr("modelDescription.xml", description)
+        archive.write(library, f"binaries/{where}/{library.name}")
     return path
+
+
+NUMBERS = (
+    "Float64", "Float32", "Int64", "Int32", "Int16", "Int8",
+    "UInt64", "UInt32", "UInt16", "UInt8", "Boolean",
+)  # fmt: skip  # in the order of types_fmu3.c
+
+
+def c_fmu3(folder: Path) -> Path:
+    """The FMU of types_fmu3.c: input in_<type> and output out_<type> of every number type of FMI
+    3.0, parameters mode and text."""
+    rows = []
+    for k, kind in enumerate(NUMBERS):
+        how = "continuous" if kind.startswith("Float") else "discrete"
+        start = "false" if kind == "Boolean" else "0"
+        rows += [
+            f'<{kind} name="in_{kind}" valueReference="{2 * k}" causality="input" '
+            f'variability="{how}" start="{start}"/>',
+            f'<{kind} name="out_{kind}" valueReference="{2 * k + 1}" causality="output" '
+            f'variability="{how}"/>',
+        ]
+    outputs = "".join(f'<Output valueReference="{2 * k + 1}"/>' for k in range(len(NUMBERS)))
+    description = f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="types" instantiationToken="{{types}}">
+<CoSimulation modelIdentifier="types"/>
+<ModelVariables>{"".join(rows)}
+<Int32 name="mode" valueReference="22" causality="parameter" variability="fixed" start="0"/>
+<String name="text" valueReference="23" causality="parameter" variability="fixed"><Start value=""/>
+</String></ModelVariables>
+<ModelStructure>{outputs}</ModelStructure>
+</fmiModelDescription>
+"""
+    return _compiled(folder, "types_fmu3.c", "types", platform_tuple, description)
 
 
 PAIR = """

@@ -9,14 +9,8 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator import results
-from hapticlink.orchestrator.commands import main
 
-
-def status(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    assert isinstance(ended.value.code, int)
-    return ended.value.code
+from .conftest import status
 
 
 def test_a_mechanism_alone_runs_at_the_haptic_rate(

@@ -43,7 +43,7 @@ def test_a_spring_renewed_more_rarely_than_the_target_steps(
     path = np.cumsum(np.random.default_rng(seed).normal(size=(4 * ROWS + 1, 3)), axis=0)
     stiffness = np.array([100.0, 50.0, 2.0])
     source, held, x = np.zeros(3), np.zeros(3), np.zeros(3)
-    meter = Meter(source, held, x, sign)
+    meter = Meter(source.copy, held.copy, lambda: sign * x)
     for tick, place in enumerate(path):
         x[:] = place
         meter.move(tick)
@@ -65,7 +65,7 @@ def test_a_fast_spring_held_by_a_slow_target(every: int, seed: int) -> None:
     generator = np.random.default_rng(seed)
     frames = np.cumsum(generator.normal(size=2 * ROWS // every + 2))
     source, held, x = np.zeros(1), np.zeros(1), np.zeros(1)
-    meter = Meter(source, held, x, 1.0)
+    meter = Meter(source.copy, held.copy, x.copy)
     for n, (here, there) in enumerate(pairwise(frames)):
         x[:] = here
         meter.move(n * every)
@@ -106,7 +106,8 @@ def test_power_across_rates_is_told_and_kept_in_check(tmp_path: Path) -> None:
     assert {run["holds"][name] for name in forces} == {"passive"}
     reasons = run["holds_that_did_not_fit"]
     assert "carries no power" in reasons["virtual_mechanism.x -> controller.x_S"]["reason"]
-    assert made["passive"] < 0.1 * made["zoh"]
+    assert made["zoh"] > 0.1
+    assert made["passive"] < 0
 
 
 @pytest.mark.parametrize(

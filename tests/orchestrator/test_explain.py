@@ -35,6 +35,19 @@ def test_explain_tells_blocks_and_the_samples_behind_inputs(
     assert rows == [(t, t, "4" if t == "4" else "0") for t in "01234"]
 
 
+def test_a_run_keeps_what_explain_prints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--set", "duration=0.05", "--set", "graphics.rate={min=20, max=60, seed=2}"]
+    told = []
+    for how in (["--explain"], ["--out", str(tmp_path)]):
+        with pytest.raises(SystemExit, match="0"):
+            main(["run", "closed-loop", *how, *options])
+        told.append(capsys.readouterr().out)
+    assert (tmp_path / "plan.txt").read_text() == told[0]
+    assert "plan.txt" in told[1]
+
+
 def test_first_frame_ends_at_the_phase() -> None:
     base, period, first = Fraction(1, 1000), Fraction(1, 50), Fraction(7, 1000)
     assert list(periodic(period, base, 60, first))[:4] == [0, 7, 27, 47]

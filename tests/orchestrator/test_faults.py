@@ -3,6 +3,7 @@ no process and no folder stays behind."""
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -111,13 +112,33 @@ def test_an_exception_in_a_python_fmu(tmp_path: Path, isolate: str) -> None:
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-@pytest.mark.parametrize(("mode", "named"), [(1, None), (2, "discard"), (3, "error"), (4, "fatal")])
-def test_every_status(tmp_path: Path, mode: int, named: str | None, isolate: str) -> None:
+@pytest.mark.parametrize(
+    ("mode", "named", "calls"),
+    [
+        (1, None, ["terminate", "free"]),
+        (2, "discard", ["terminate", "free"]),
+        (3, "error", ["free"]),
+        (4, "fatal", []),
+    ],
+)
+def test_every_status(
+    tmp_path: Path,
+    mode: int,
+    named: str | None,
+    calls: list[str],
+    isolate: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What is called after a fault: FMI 2.0.5 sections 2.1.3 and 4.2.4."""
+    log = tmp_path / "log"
+    monkeypatch.setenv("FAULT_FMU_LOG", str(log))
     c_fmu(tmp_path)
     python_fmu(tmp_path, "Other")
     text = ONE.format("faults.fmu") + isolate + f"start.mode = {mode}\n" + OTHER
     experiment, found = run(tmp_path, text)
     fault = experiment.outcome.fault
+    said = log.read_text().splitlines() if log.exists() else []
+    assert [line for line in said if "unloaded" not in line] == calls
     if named is None:  # a warning is no fault
         assert fault is None
         return
@@ -193,13 +214,29 @@ def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path: Path) ->
 COMMAND = [sys.executable, "-c", "from hapticlink.orchestrator.commands import main; main()"]
 
 
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
+    tmp_path: Path, isolate: str
+) -> None:
+    c_fmu(tmp_path)
+    path = scene(tmp_path, ONE.format("faults.fmu") + isolate)
+    log = tmp_path / "log"
+    command = [*COMMAND, "run", str(path), "--out", str(tmp_path / "out")]
+    subprocess.run(command, check=True, env=os.environ | {"FAULT_FMU_LOG": str(log)})
+    assert log.read_text().splitlines() == ["terminate", "free", "unloaded after its interpreter"]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_a_signal_keeps_results_and_exits_with_1(
     tmp_path: Path, number: signal.Signals, isolate: str
 ) -> None:
     started = tmp_path / "started"
-    body = f"__import__('time').sleep(0.01); time > 0.3 and open({str(started)!r}, 'w').close()"
+    body = f"""__import__('time').sleep(0.01)
+        if time > 0.3 and self.steps % 10 == 0:
+            with open({str(started)!r} + 'ing', 'w') as file:
+                print(__import__('os').getpid(), file=file)
+            __import__('os').replace({str(started)!r} + 'ing', {str(started)!r})"""
     python_fmu(tmp_path, "Slow", body)
     path = scene(tmp_path, ONE.format("Slow.fmu") + isolate, duration=100)
     out = tmp_path / "out"
@@ -211,6 +248,8 @@ def test_a_signal_keeps_results_and_exits_with_1(
         _, said = running.communicate(timeout=60)
     assert running.returncode == 1
     assert b"interrupted at t = " in said
+    with pytest.raises(ProcessLookupError):  # the FMU's, when it has one of its own
+        os.kill(int(started.read_text()), 0)
     found = results.load(out)
     assert found.run["end"]["reason"] == "interrupted"
     assert found.haptics["time"][-1] == found.run["end"]["time"] >= 0.3
@@ -233,6 +272,42 @@ def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path: Path) -> None:
     np.testing.assert_array_equal(rows, np.arange(len(rows)) / 64)
     assert (out / "haptics.csv").stat().st_size > most - 100
     assert not list(out.glob(".*"))
+
+
+FILLS = """
+        if self.steps == {step}:
+            import contextlib
+            with contextlib.suppress(OSError), open({filler!r}, "wb", buffering=0) as file:
+                while file.write(bytes(4096)):
+                    pass"""
+
+
+@pytest.mark.skipif(shutil.which("unshare") is None, reason="no disk of one's own")
+@pytest.mark.parametrize("step", [50, 320])
+def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path: Path, step: int) -> None:
+    """A disk of 256 kB that fills up before any row is written, and with the last."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    body = "self.y = 1 / 3 + time" + FILLS.format(step=step, filler=str(disk / "filler"))
+    python_fmu(tmp_path, "Fine", body)
+    path = scene(tmp_path, ONE.format("Fine.fmu"), duration=5)
+    mount, told = f"mount -t tmpfs -o size=256k tmpfs {disk}", "No space left on device"
+    if subprocess.run(["unshare", "-rm", "sh", "-c", mount], check=False).returncode:
+        pytest.skip("no disk of one's own")
+    out = disk / "out"
+    command = f'{mount}; "$0" -c "$1" run {path} --out {out}; echo $?; cp -r {out} {tmp_path}'
+    ended = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", command, *(COMMAND[0], COMMAND[2])],
+        capture_output=True,
+        check=False,
+    )
+    assert ended.stdout.splitlines()[-1] == b"1", ended.stderr
+    assert told.encode() in ended.stderr
+    found = results.load(tmp_path / "out")
+    assert found.run["end"]["reason"] == "fault"
+    assert told in found.run["fault"]["message"]
+    assert found.run["end"]["time"] == found.haptics["time"][-1]
+    assert found.run["calls"]["one"]["step"] > 0
 
 
 def test_bad_fmus_are_refused_before_anything_runs(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import sys
+import uuid
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from hapticlink.orchestrator.description import describe
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.faults import SceneFault
 
-from .foreign_fmus import PAIR, python_fmu, run, scene, with_units
+from .foreign_fmus import PAIR, SLAVE, edited, python_fmu, python_fmu_of, run, scene, with_units
 
 SHIPPED = Path(pythonfmu.__file__).parent / "tests" / "slaves"
 
@@ -59,6 +60,36 @@ to = "decay.realIn"
     starts, ends = np.arange(8) / 16, np.arange(1, 9) / 16
     u = np.concatenate([[3.0], starts[1:]])
     np.testing.assert_allclose(slow["decay.realOut"][1:], 5 * u * np.exp(ends / 0.1), rtol=1e-14)
+
+
+STARTS = """
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
+
+class Starts(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.n, self.on, self.text, self.y = 0, False, "", 0.0
+        fixed = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed}
+        self.register_variable(Integer("n", **fixed))
+        self.register_variable(Boolean("on", **fixed))
+        self.register_variable(String("text", **fixed))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def do_step(self, time, size):
+        self.y = self.n + 0.5 * self.on + int(self.text == "Maß = 3") * 100.0
+        return True
+"""
+
+
+@pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
+def test_start_values_that_are_no_reals(tmp_path: Path, isolate: str) -> None:
+    python_fmu_of(tmp_path, STARTS, "starts")
+    one = '[[fmu]]\nname = "one"\npath = "Starts.fmu"\n' + isolate
+    starts = 'start = { n = -2147483648, on = true, text = "Maß = 3" }\n'
+    for given, expected in ((starts, -(2.0**31) + 100.5), ("", 0.0)):
+        experiment, found = run(tmp_path, one + given)
+        assert experiment.outcome.fault is None
+        assert found.haptics["one.y"][-1] == expected
 
 
 THREE = """
@@ -134,6 +165,94 @@ to = "three.u[2]"
     y = 2 * np.column_stack([np.ones(32), k[:-1], np.full(32, 3.0)]) + h["time"][1:, None]
     np.testing.assert_allclose(h["three.y"][1:], y, rtol=1e-15)
     np.testing.assert_array_equal(h["takes.y"][1:], k[:-1] + 10.0 * (k[:-1] % 2))
+
+
+def test_dependencies_on_an_array_are_those_on_its_entries(tmp_path: Path) -> None:
+    pytest.importorskip("pythonfmu3")
+
+    def declared(text: str) -> str:
+        for reference, inputs in ((2, "1"), (3, "")):
+            text = text.replace(
+                f'<Output valueReference="{reference}"/>',
+                f'<Output valueReference="{reference}" dependencies="{inputs}"/>',
+            )
+        return text
+
+    found = describe(edited(three(tmp_path), declared))
+    entry = found.port("u[2]", "input")
+    assert len(entry) == 1
+    follows = {s.name: found.follows(s, entry) for s in found.outputs}
+    assert follows == {**{f"y[{i}]": True for i in (1, 2, 3)}, "n": False, "f": True, "on": True}
+
+
+MANY = """self.value = {"u[1]": 0.0, "u[10]": 0.0, "u[2]": 0.0}
+        for n in self.value:
+            self.register_variable(Real(n, causality=Fmi2Causality.input,
+                                        getter=lambda n=n: self.value[n],
+                                        setter=lambda v, n=n: self.value.__setitem__(n, v)))"""
+
+
+def test_a_vector_goes_by_its_indices_not_by_the_order_of_the_file(tmp_path: Path) -> None:
+    text = SLAVE.format(name="Listed", body="self.y = self.value['u[2]'] - self.value['u[10]']")
+    text = text.replace('self.register_variable(Real("u", causality=Fmi2Causality.input))', MANY)
+    python_fmu_of(tmp_path, text, "listed")
+    found = describe(tmp_path / "Listed.fmu")
+    assert [s.name for s in found.port("u", "input")] == ["u[1]", "u[2]", "u[10]"]
+    fmu = '[[fmu]]\nname = "listed"\npath = "Listed.fmu"\nstart.u = [1.0, 2.0, 10.0]\n'
+    assert run(tmp_path, fmu)[1].haptics["listed.y"][-1] == -8.0
+
+
+DECAY = """
+from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Integer, Real
+
+class Decay(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.x, self.mode = 1.0, 1
+        self.register_variable(Real("x", causality=Fmi2Causality.output,
+                                    initial=Fmi2Initial.exact))
+        self.register_variable(Integer("mode", causality=Fmi2Causality.parameter,
+                                       variability=Fmi2Variability.fixed))
+
+    def do_step(self, time, size):
+        self.x *= 0.5 ** self.mode
+        return True
+"""
+DECAY_FMU = '[[fmu]]\nname = "decay"\npath = "Decay.fmu"\n'
+MODES = """<TypeDefinitions><SimpleType name="Mode"><Enumeration>
+<Item name="slow" value="1"/><Item name="fast" value="3"/>
+</Enumeration></SimpleType></TypeDefinitions>
+<ModelVariables>"""
+
+
+def decay(folder: Path) -> None:
+    """x (an output with a start of its own) halves `mode` times a step; mode is slow or fast."""
+
+    def enumerated(text: str) -> str:
+        text = text.replace("<ModelVariables>", MODES)
+        head, tail = text.split('name="mode"', 1)
+        return (
+            head + 'name="mode"' + tail.replace("<Integer", '<Enumeration declaredType="Mode"', 1)
+        )
+
+    edited(python_fmu_of(folder, DECAY, uuid.uuid4().hex), enumerated)
+
+
+def test_states_take_their_start_and_enumerations_the_names_of_their_items(tmp_path: Path) -> None:
+    decay(tmp_path)
+    for start, first, share in (('mode = "fast", x = 4', 4.0, 0.125), ("mode = 1", 1.0, 0.5)):
+        x = run(tmp_path, f"{DECAY_FMU}start = {{ {start} }}\n")[1].haptics["decay.x"]
+        np.testing.assert_array_equal(x, first * share ** np.arange(len(x)))
+
+
+@pytest.mark.parametrize(
+    ("start", "message"),
+    [('mode = "fats"', "mode is one of slow, fast"), ("mode = 1.5", "mode takes a whole number")],
+)
+def test_items_that_an_enumeration_does_not_have(tmp_path: Path, start: str, message: str) -> None:
+    decay(tmp_path)
+    found = findings(tmp_path, f"{DECAY_FMU}start = {{ {start} }}\n")
+    assert message in found["fmu[0] (decay).start.mode"][1]
 
 
 def test_a_filter_between_our_blocks_takes_the_place_of_a_connection(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds import HOLDS, Site
-from hapticlink.orchestrator.holds.account import repayment
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.kinds import Projector, Semidefinite, Unwrapped
 
@@ -155,100 +154,3 @@ def test_a_wrapped_angle_is_continued_over_the_seam() -> None:
         wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
         hold.push(k, np.array([wrapped, wrapped]), k)
     assert hold.value(4)[1] == pytest.approx(3.4)
-
-
-# --- holds that keep account of energy ----------------------------------------------------
-
-
-def account(name: str, forces: Vector, motion: Vector, every: int) -> Vector:
-    """What a hold of forces renewed every so many ticks has made at each renewal (J)."""
-    x = np.concatenate([[0.0], np.cumsum(motion)])
-    now = np.zeros(1)
-    hold = HOLDS[name](Site(1, displacement=lambda: now))
-    held, made, ideal = 0.0, [], 0.0
-    for tick in range(len(x)):
-        now[:] = x[tick]
-        if tick % every == 0 and (n := tick // every) < len(forces):
-            hold.push(tick, forces[n : n + 1], tick)
-            if n:
-                ideal += (forces[n - 1] + forces[n]) / 2 * (x[tick] - x[tick - every])
-            made.append(held - ideal)
-        if tick < len(motion):
-            held += hold.value(tick)[0] * motion[tick]
-    return np.array(made)
-
-
-forces = st.lists(st.floats(-10, 10), min_size=4, max_size=40).map(np.array)
-
-
-@given(forces, st.integers(1, 8), st.floats(1e-4, 1.0), st.booleans())
-def test_passive_holds_leave_nothing_made_but_the_last_period(
-    forces: Vector, every: int, speed: float, back: bool
-) -> None:
-    """Any force on a steady motion: what a period made is gone when the next has passed."""
-    motion = np.full(every * len(forces), -speed if back else speed)
-    first = np.concatenate([[0.0], -np.diff(forces) / 2 * motion[0] * every])  # zoh, a period
-    tiny = 1e-12 * 10 * np.abs(motion).sum()
-    assert np.allclose(account("zoh", forces, motion, every), np.cumsum(first), atol=tiny)
-    assert np.all(account("passive", forces, motion, every) <= np.maximum(first, 0.0) + tiny)
-    assert np.allclose(account("nepce", forces, motion, every), first, atol=tiny)
-    rest = np.concatenate([forces, np.full(2, forces[-1])])
-    motion = np.full(every * len(rest), motion[0])
-    assert account("passive", rest, motion, every)[-1] <= tiny
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_passive_holds_make_next_to_nothing_of_random_smooth_signals(seed: int) -> None:
-    """A spring on random motion, renewed every fifth tick: a tenth of what zero order makes."""
-    generator = np.random.default_rng(seed)
-    t = np.arange(4001)
-    rates, phases = generator.uniform(0.005, 0.05, 8), generator.uniform(0, 6.28, 8)
-    x = np.sin(np.outer(t, rates) + phases).sum(axis=1)
-    spring = -100.0 * (x[::5] - x[0])
-    made = {n: account(n, spring, np.diff(x), 5)[-1] for n in ("zoh", "passive", "nepce")}
-    assert made["zoh"] > 0
-    assert made["passive"] < 0.1 * made["zoh"]
-    assert abs(made["nepce"]) < 0.1 * made["zoh"]
-
-
-def wall(stiffness: float, every: int, limit: float) -> tuple[float, float, float]:
-    """(peak mm, peak to peak of the last 0.5 s in mm, energy mJ) of a hand's push on a wall."""
-    mass, damping, period, substeps = 0.04, 0.8, 1e-3, 40
-    quantum = 2 * np.pi * 0.010 / 1024
-    x, v, energy, base, held, path = 0.029, 0.0, 0.0, 0.0, 0.0, []
-    before = np.floor(x / quantum) * quantum
-    for k in range(1500):
-        measured = np.floor(x / quantum) * quantum
-        moved, before = measured - before, measured
-        energy += held * moved
-        if k % every == 0:
-            base = min(max(stiffness * (measured - 0.030), 0.0), 2.0)
-        # The wall's force opposes x: what it absorbs is -(energy made).
-        excess, largest = np.array([max(-energy, 0.0)]), np.array([limit * abs(moved) / period])
-        control = -float(repayment(excess, np.array([moved]), largest)[0])
-        held = min(max(base + control, -2.0), 2.0)
-        for _ in range(substeps):
-            v += period / substeps * (400.0 * (0.033 - x) - damping * v - held) / mass
-            x += period / substeps * v
-        path.append(x * 1e3)
-    return max(path), max(path[-500:]) - min(path[-500:]), energy * 1e3
-
-
-@pytest.mark.parametrize(
-    ("stiffness", "every", "limit", "expected"),
-    [
-        (400, 1, 0.0, (33.53, 0.001, -0.32)),
-        (2500, 1, 0.0, (31.79, 1.658, -17.6)),
-        (2500, 1, 0.8, (31.79, 0.080, -1.81)),
-        (400, 5, 0.0, (34.07, 5.277, -69.67)),
-        (400, 5, 0.8, (33.90, 0.001, -1.44)),
-    ],
-)
-def test_passivity_controller_on_a_virtual_wall(
-    stiffness: float, every: int, limit: float, expected: tuple[float, float, float]
-) -> None:
-    """The passivity controller of Hannaford & Ryu, alpha <= 0.8: rows computed independently."""
-    peak, swing, energy = wall(stiffness, every, limit)
-    assert peak == pytest.approx(expected[0], abs=0.006)
-    assert swing == pytest.approx(expected[1], abs=0.0006)
-    assert energy == pytest.approx(expected[2], abs=0.006 if abs(expected[2]) < 10 else 0.06)

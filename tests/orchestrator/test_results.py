@@ -1,5 +1,6 @@
 """CSV files give back the very floats."""
 
+import json
 import math
 from pathlib import Path
 
@@ -9,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.orchestrator.faults import InputFault
-from hapticlink.orchestrator.results import CHUNK, Recorder, load, read_table
+from hapticlink.orchestrator.results import (
+    CHUNK,
+    Recorder,
+    load,
+    read_table,
+    write_json,
+    write_over,
+)
 
 
 @given(st.lists(st.floats(allow_nan=False), min_size=3, max_size=3))
@@ -61,3 +69,18 @@ def test_nan_is_written_as_such(tmp_path: Path) -> None:
 def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputFault, match="not the folder of a run"):
         load(tmp_path)
+
+
+def test_the_end_of_a_run_is_written_over_what_is_there(tmp_path: Path) -> None:
+    """The first that fits, on no more bytes than there were; where none fits, all stays."""
+    path = tmp_path / "run.json"
+    write_json(path, {"end": "running"}, room=100)
+    size = path.stat().st_size
+    for contents, found in (
+        ([{"end": "x" * 200}, {"end": "fault"}], "fault"),
+        ([{"end": "done", "more": "y" * 50}, {"end": "fault"}], "done"),
+        ([{"end": "x" * 200}], "done"),
+    ):
+        write_over(path, *contents)
+        assert path.stat().st_size == size
+        assert json.loads(path.read_text())["end"] == found

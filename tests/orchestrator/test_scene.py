@@ -4,7 +4,7 @@ import pytest
 
 from hapticlink.orchestrator import scene_file
 from hapticlink.orchestrator.faults import InputFault, SceneFault
-from hapticlink.orchestrator.scene import VariableRate
+from hapticlink.orchestrator.rates import VariableRate
 from hapticlink.orchestrator.toml_lines import key_lines
 
 GOOD = """title = "A bar"

@@ -35,7 +35,7 @@ def test_a_graphics_block_that_nothing_depends_on_changes_no_bit(
 ) -> None:
     options = ("controller.topology=false", "controller.impedance=false")
     without = haptics("closed-loop", tmp_path / "without", *options)
-    assert "graphics" not in {b.clock for b in blocks(scene_file.load("closed-loop", options))}
+    assert "graphics" not in {b.rate for b in blocks(scene_file.load("closed-loop", options))}
     monkeypatch.setattr(needs, "graphics_block", lambda scene: ["to look at"])
     shown = simulate("closed-loop", tmp_path / "with", [SHORT, *options])
     assert "virtual_environment.x[1]" in shown.results.graphics.columns

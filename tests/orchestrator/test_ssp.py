@@ -24,18 +24,24 @@ def export(source: str, folder: Path, *options: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("name", "options"),
     [
-        (),
-        ("graphics.rate={ min = 20, max = 60, seed = 3 }", "hold=foh"),
-        ("coupling=jacobi", "graphics.align=tick", "holds.virtual_environment.P_c=delayed"),
+        ("closed-loop", ()),
+        ("closed-loop", ("graphics.rate={ min = 20, max = 60, seed = 3 }", "hold=foh")),
+        (
+            "closed-loop",
+            ("coupling=jacobi", "graphics.align=tick", "holds.virtual_environment.P_c=delayed"),
+        ),
+        ("closed-loop-direct", ("hold=pspm", "holds.virtual_mechanism.F_drift=passive")),
     ],
 )
-def test_a_shipped_scene_comes_back_to_the_bit(tmp_path: Path, options: tuple[str, ...]) -> None:
+def test_a_shipped_scene_comes_back_to_the_bit(
+    tmp_path: Path, name: str, options: tuple[str, ...]
+) -> None:
     options = ("duration=0.25", *options)
     flags = [text for option in options for text in ("--set", option)]
-    path = export("closed-loop", tmp_path, *flags)
-    simulate("closed-loop", tmp_path / "a", options)
+    path = export(name, tmp_path, *flags)
+    simulate(name, tmp_path / "a", options)
     again = simulate(str(path), tmp_path / "b")
     assert again.outcome.fault is None
     for table in ("haptics.csv", "graphics.csv"):
@@ -125,7 +131,7 @@ def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path: Path
         ('endConnector="u"', 'endConnector="w"', "names c.w, which is not there"),
         ('startElement="a b"', 'startElement="ab"', "names ab.y, which is not there"),
         ('kind="input"', 'kind="inward"', "is no SSP 1.0"),
-        ("fmu\"><ssd", "fmu\" type=\"application/x-ssp-package\"><ssd", "put the FMUs of inner"),
+        ("fmu\"><ssd", "fmu\" type=\"application/x-ssp-package\"><ssd", "system of another"),
         ("resources/a.ssv", "resources/b.ssv", "holds no resources/b.ssv"),
     ],
 )  # fmt: skip

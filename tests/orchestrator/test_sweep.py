@@ -17,12 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.builder import FmuBuilder
 
-from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.energy import Energy
 from hapticlink.orchestrator.faults import InputFault
 from hapticlink.orchestrator.results import Results, Table
 from hapticlink.orchestrator.sweep import figure, grid, row, table
 from hapticlink.orchestrator.sweep.grid import Axis, listed, parse
+
+from .conftest import status
 
 # --- what is varied ---------------------------------------------------------------------------
 
@@ -164,13 +165,6 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
 
 
 # --- whole sweeps -----------------------------------------------------------------------------
-
-
-def status(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main([str(a) for a in arguments])
-    assert isinstance(ended.value.code, int)
-    return ended.value.code
 
 
 def read(folder: Path) -> list[dict[str, str]]:

@@ -1,0 +1,67 @@
+"""What a native FMU holds, as bytes by name."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import uuid
+from collections.abc import Sequence
+from pathlib import Path
+
+from hapticlink.components.component import Component
+from hapticlink.fmus.archive import check_functions, digest
+from hapticlink.fmus.documentation import documentation
+from hapticlink.fmus.icon import icon
+from hapticlink.fmus.model_description import model_description
+from hapticlink.fmus.native.compiler import (
+    FLAGS,
+    SUFFIX,
+    TARGETS,
+    compile_library,
+    compiler_version,
+)
+from hapticlink.fmus.native.source import component_header
+
+WRAPPER = Path(__file__).parent / "fmi2.c"
+
+
+def entries(
+    component: Component, *, stop_time: float, step_size: float, platforms: Sequence[str]
+) -> dict[str, bytes]:
+    """Every file of the FMU, with a binary for each of `platforms`.
+
+    The GUID is a hash of what the binaries are made of, so a platform's binary does not depend on
+    which others are there. Raises FmuError where the component gives no FMU.
+    """
+    check_functions(component)
+
+    def describe(guid: str) -> bytes:
+        return model_description(
+            component, guid, stop_time=stop_time, step_size=step_size, needs_tool=False
+        )
+
+    files = {
+        "documentation/index.html": documentation(component),
+        "model.png": icon(component.timing),
+    }
+    made_by = [compiler_version(), *FLAGS, TARGETS]
+    content = {
+        **files,
+        "component.h": component_header(component).encode(),
+        "fmi2.c": WRAPPER.read_bytes(),
+        "compiler": json.dumps(made_by).encode(),
+        "xml": describe(""),
+    }
+    guid = f"{{{uuid.UUID(digest(content)[:32])}}}"
+    files["modelDescription.xml"] = describe(guid)
+    with tempfile.TemporaryDirectory(prefix="hapticlink-") as name:
+        room = Path(name)
+        (room / "component.h").write_bytes(
+            f'#define GUID "{guid}"\n'.encode() + content["component.h"]
+        )
+        (room / "fmi2.c").write_bytes(content["fmi2.c"])
+        for platform in platforms:
+            library = compile_library(room / "fmi2.c", room / "library", platform)
+            entry = f"binaries/{platform}/{component.name}{SUFFIX[platform]}"
+            files[entry] = library.read_bytes()
+    return files

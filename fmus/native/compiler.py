@@ -1,0 +1,111 @@
+"""C to a shared library, for this machine or another, by the compiler in the package `ziglang`.
+
+The same source, platform and version of ziglang give the same bytes, wherever it runs.
+"""
+
+from __future__ import annotations
+
+import os
+import platform as machine
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import fmpy
+
+from hapticlink.fmus.errors import FmuError
+
+_ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
+TARGETS = {
+    # Old enough for the systems in use; newer ones run it too.
+    "linux64": ("aarch64-linux-gnu.2.17" if _ARM_LINUX else "x86_64-linux-gnu.2.17",),
+    "win64": ("x86_64-windows-gnu",),
+    "darwin64": ("x86_64-macos.11.0", "aarch64-macos.11.0"),
+}
+"""What each platform of FMI 2.0 (section 2.3) is compiled for. linux64 is x86-64, on an ARM machine
+with Linux ARM, where importers look in the same folder; darwin64 holds both."""
+PLATFORMS = tuple(TARGETS)
+SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
+# Contracted to a fused multiply-add, a product and a sum are rounded once where CasADi's virtual
+# machine rounds twice. The search for vectors takes a time that grows with the square of a
+# straight line's length; what it found did not run faster.
+_ARITHMETIC = ("-ffp-contract=off", "-fno-slp-vectorize")
+FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", *_ARITHMETIC, "-g0", "-s", "-fvisibility=hidden")
+_HEADERS = Path(fmpy.__file__).parent / "c-code"
+
+
+def host_platform() -> str:
+    """The platform of FMI 2.0 that this process can load. Raises FmuError where it is none."""
+    if fmpy.platform not in TARGETS:
+        raise FmuError(f"native FMUs are made for {', '.join(TARGETS)}; this is {fmpy.platform}")
+    return fmpy.platform
+
+
+def compiler_version() -> str:
+    """Of ziglang. Raises FmuError where it is not installed."""
+    try:
+        return version("ziglang")
+    except PackageNotFoundError:
+        raise FmuError(
+            "native FMUs are compiled with ziglang, which is not installed: "
+            "pip install 'hapticlink[native]', or take packaging = \"python\""
+        ) from None
+
+
+def compile_library(
+    source: Path | str,
+    library: Path | str,
+    platform: str | None = None,
+    options: Iterable[str] = (),
+) -> Path:
+    """Compile the C file `source` to the shared library `library` and return its path.
+
+    platform is one of PLATFORMS, this machine's by default. The FMI headers are on the include
+    path, and only what is declared FMI2_Export is exported; `options` are further arguments of
+    the compiler (-DNAME=VALUE, -fvisibility=default). Raises FmuError with the compiler's words.
+    """
+    compiler_version()
+    source, library = Path(source).resolve(), Path(library).resolve()
+    targets = TARGETS[platform or host_platform()]
+    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
+        slices = [_compiled(source, Path(room), target, options) for target in targets]
+        library.write_bytes(slices[0] if len(slices) == 1 else universal(slices))
+    return library
+
+
+def _compiled(source: Path, room: Path, target: str, options: Iterable[str]) -> bytes:
+    made = room / target
+    made.mkdir()
+    flags = [*FLAGS, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags, *options]
+    # A Mach-O file holds the path that it was written to, so this is the same everywhere.
+    command += [f"-I{_HEADERS}", "-o", "library", str(source)]
+    # What zig makes of its C library stays in its own cache; what it makes of ours does not.
+    environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(room / "cache")}
+    done = subprocess.run(
+        command, cwd=made, env=environment, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise FmuError(f"{source.name} does not compile for {target}:\n{done.stderr.strip()}")
+    return (made / "library").read_bytes()
+
+
+_CPU = {0x01000007: 3, 0x0100000C: 0}  # x86-64 and ARM64, with the subtype "all" of each
+_PAGE = 14  # log2 of the larger page size of the two
+
+
+def universal(slices: Iterable[bytes]) -> bytes:
+    """One Mach-O file of a library for several processors (<mach-o/fat.h>): a big-endian header
+    0xCAFEBABE, count, and (cputype, subtype, offset, size, alignment) of each slice."""
+    slices = list(slices)
+    head = struct.pack(">II", 0xCAFEBABE, len(slices))
+    body, at = b"", 1 << _PAGE
+    for part in slices:
+        cpu = struct.unpack_from("<I", part, 4)[0]
+        head += struct.pack(">IIIII", cpu, _CPU[cpu], at + len(body), len(part), _PAGE)
+        body += part + bytes(-len(part) % (1 << _PAGE))
+    return head.ljust(at, b"\0") + body

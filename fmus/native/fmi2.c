@@ -1,0 +1,325 @@
+/* The FMI 2.0.5 co-simulation interface of one component, beside the C that CasADi writes of its
+   functions. component.h, generated, holds both the sizes and the functions:
+
+       x0 = initialize(u, p),   x' = step(x, u, p, t, h),   y = output(x, u, p, t)
+
+   All reals stand in one array [inputs | parameters | outputs]; a place is a value reference.
+
+       continuous   doStep: SUBSTEPS times x <- step(x, u, p, t, h/SUBSTEPS);
+                    get: y = output(x, u, p, t), evaluated when asked for
+       sampled      doStep: y <- output(x, u, p, t_k), then x <- step(...); get: that y
+
+   Up to the end of initialisation mode both kinds answer a get with y = output(x0, u, p, t) of the
+   values set so far. The Python FMU (python_slave.py) does the same operations in the same order.
+   Nothing is shared between instances: the tables are constant, the rest stands in a Model. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+
+#include "component.h"
+
+typedef const fmi2ValueReference *References;
+
+enum { SETTABLE = N_U + N_P, REALS = N_U + N_P + N_Y };
+
+typedef struct { /* what fmi2GetFMUstate saves and serialises; without padding */
+    char guid[40];
+    double time;
+    long long initialized, start_due, output_due; /* due: to be computed before it is read */
+    double reals[REALS], x[N_X];
+} State;
+
+typedef struct {
+    State now;
+    fmi2CallbackFunctions callbacks;
+    double trial[N_X], after[N_X];
+    char name[];
+} Model;
+
+/* --- messages ------------------------------------------------------------------------------- */
+
+static fmi2Status fail(const Model *m, fmi2Status status, const char *format, ...) {
+    static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
+                                             "logStatusError", "logStatusFatal"};
+    char text[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    const fmi2CallbackFunctions *to = &m->callbacks;
+    to->logger(to->componentEnvironment, m->name, status, categories[status], text);
+    return status;
+}
+
+typedef struct { char text[32]; } Number;
+
+/* The shortest text that reads back as the same double. */
+static Number number(double value) {
+    Number n;
+    if (isnan(value)) strcpy(n.text, "nan");
+    else for (int digits = 15; digits < 18; digits++) {
+        snprintf(n.text, sizeof n.text, "%.*g", digits, value);
+        if (strtod(n.text, NULL) == value) break;
+    }
+    return n;
+}
+
+static int first_not_finite(const double *values, int n) {
+    for (int i = 0; i < n; i++) if (!isfinite(values[i])) return i;
+    return -1;
+}
+
+/* Which state is not finite, the likely cause, and what becomes of it. */
+static fmi2Status not_finite(const Model *m, fmi2Status status, const double *x, double time,
+                             const char *result) {
+    char cause[512] = "inputs and parameters are finite; take a smaller step or more substeps";
+    for (int i = 0, shown = 0; i < SETTABLE && shown < 3; i++) {
+        if (isfinite(m->now.reals[i])) continue;
+        size_t used = shown ? strlen(cause) : 0;
+        snprintf(cause + used, sizeof cause - used, "%s%s = %s",
+                 shown++ ? ", " : "not finite before: ", names[i], number(m->now.reals[i]).text);
+    }
+    int i = first_not_finite(x, N_X);
+    return fail(m, status, "%s became %s at t = %s; %s; %s", state_names[i], number(x[i]).text,
+                number(time).text, cause, result);
+}
+
+/* --- the component's functions -------------------------------------------------------------- */
+
+static void evaluate_output(Model *m, double time) {
+    const double *arguments[] = {m->now.x, m->now.reals, m->now.reals + N_U, &time};
+    double *results[] = {m->now.reals + SETTABLE};
+    output(arguments, results, NULL, NULL, 0);
+}
+
+/* Bring x0 and y up to date with what was set. */
+static void refresh(Model *m) {
+    if (m->now.start_due) {
+        const double *arguments[] = {m->now.reals, m->now.reals + N_U};
+        double *results[] = {m->now.x};
+        initialize(arguments, results, NULL, NULL, 0);
+        m->now.start_due = 0;
+    }
+    if (m->now.output_due) {
+        evaluate_output(m, m->now.time);
+        m->now.output_due = 0;
+    }
+}
+
+static void restart(Model *m) {
+    memset(&m->now, 0, sizeof m->now);
+    memcpy(m->now.guid, GUID, sizeof GUID);
+    memcpy(m->now.reals, starts, SETTABLE * sizeof(double));
+    m->now.start_due = m->now.output_due = 1;
+}
+
+/* --- life of an instance -------------------------------------------------------------------- */
+
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+const char *fmi2GetVersion(void) { return fmi2Version; }
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
+                              fmi2Boolean logging) {
+    if (!callbacks || !callbacks->logger || !name || !guid) return NULL;
+    Model *m = calloc(1, sizeof(Model) + strlen(name) + 1);
+    if (!m) return NULL;
+    strcpy(m->name, name);
+    m->callbacks = *callbacks;
+    restart(m);
+    if (type == fmi2CoSimulation && !strcmp(guid, GUID)) return m;
+    if (type != fmi2CoSimulation) fail(m, fmi2Error, "this FMU is for co-simulation only");
+    else fail(m, fmi2Error, "the guid %s is not that of this binary, %s", guid, GUID);
+    free(m);
+    return NULL;
+}
+
+void fmi2FreeInstance(fmi2Component c) { free(c); }
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
+                               const fmi2String categories[]) {
+    return fmi2OK; /* failures are always logged, and there is nothing else to say */
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
+                               fmi2Real start, fmi2Boolean has_stop, fmi2Real stop) {
+    ((Model *)c)->now.time = start;
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    Model *m = c;
+    refresh(m);
+    if (first_not_finite(m->now.x, N_X) >= 0)
+        return not_finite(m, fmi2Error, m->now.x, m->now.time, "initialisation goes on");
+    m->now.initialized = 1;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
+
+fmi2Status fmi2Reset(fmi2Component c) {
+    restart(c);
+    return fmi2OK;
+}
+
+/* --- values --------------------------------------------------------------------------------- */
+
+fmi2Status fmi2GetReal(fmi2Component c, References vr, size_t n, fmi2Real value[]) {
+    Model *m = c;
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] >= REALS)
+            return fail(m, fmi2Error, "unknown value reference %u; %d are known", vr[i], REALS);
+        if (vr[i] >= SETTABLE) refresh(m);
+        value[i] = m->now.reals[vr[i]];
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real value[]) {
+    Model *m = c;
+    for (size_t i = 0; i < n; i++) { /* all are looked at before any is set */
+        if (vr[i] >= REALS)
+            return fail(m, fmi2Error, "unknown value reference %u; %d are known", vr[i], REALS);
+        if (vr[i] >= SETTABLE)
+            return fail(m, fmi2Error, "%s is an output; it cannot be set", names[vr[i]]);
+        if (m->now.initialized && is_fixed[vr[i]])
+            return fail(m, fmi2Error, "parameter %s is fixed; set it before the end of "
+                        "initialisation mode", names[vr[i]]);
+    }
+    for (size_t i = 0; i < n; i++) m->now.reals[vr[i]] = value[i];
+    if (!m->now.initialized) m->now.start_due = 1;
+    if (!m->now.initialized || !SAMPLED) m->now.output_due = 1;
+    return fmi2OK;
+}
+
+#define HAS_NO(verb, kind, type)                                                                \
+    fmi2Status fmi2##verb##kind(fmi2Component c, References vr, size_t n, type value[]) {       \
+        return n ? fail(c, fmi2Error, "no variable is of type " #kind) : fmi2OK;                \
+    }
+HAS_NO(Get, Integer, fmi2Integer)
+HAS_NO(Get, Boolean, fmi2Boolean)
+HAS_NO(Get, String, fmi2String)
+HAS_NO(Set, Integer, const fmi2Integer)
+HAS_NO(Set, Boolean, const fmi2Boolean)
+HAS_NO(Set, String, const fmi2String)
+
+/* --- stepping ------------------------------------------------------------------------------- */
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolean no_way_back) {
+    Model *m = c;
+    double time, h = size / SUBSTEPS;
+    const double *arguments[] = {m->trial, m->now.reals, m->now.reals + N_U, &time, &h};
+    double *results[] = {m->after};
+    if (m->now.start_due) refresh(m);
+    memcpy(m->trial, m->now.x, sizeof m->trial);
+    for (int k = 0; k < SUBSTEPS; k++) {
+        time = start + k * size / SUBSTEPS;
+        step(arguments, results, NULL, NULL, 0);
+        memcpy(m->trial, m->after, sizeof m->trial);
+    }
+    if (first_not_finite(m->trial, N_X) >= 0) {
+        m->now.time = start;
+        return not_finite(m, fmi2Discard, m->trial, start + size,
+                          "the state stays as before the step");
+    }
+    if (SAMPLED) evaluate_output(m, start);
+    memcpy(m->now.x, m->trial, sizeof m->trial);
+    m->now.time = start + size;
+    m->now.output_due = !SAMPLED;
+    return fmi2OK;
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c) {
+    return fail(c, fmi2Error, "no step is ever pending");
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
+    *value = ((Model *)c)->now.time;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    if (kind != fmi2Terminated) return fmi2Discard;
+    *value = fmi2False;
+    return fmi2OK;
+}
+
+#define NOT_KEPT(name, type)                                                                    \
+    fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) { return fmi2Discard; }
+NOT_KEPT(fmi2GetStatus, fmi2Status)
+NOT_KEPT(fmi2GetIntegerStatus, fmi2Integer)
+NOT_KEPT(fmi2GetStringStatus, fmi2String)
+
+/* --- derivatives, which modelDescription.xml does not promise -------------------------------- */
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, References vr, size_t n,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+    return fail(c, fmi2Error, "inputs are constant over a step");
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, References vr, size_t n,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+    return fail(c, fmi2Error, "there are no derivatives of outputs");
+}
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, References unknown, size_t n,
+                                        References known, size_t k, const fmi2Real seed[],
+                                        fmi2Real derivative[]) {
+    return fail(c, fmi2Error, "there are no directional derivatives");
+}
+
+/* --- FMU state: bytes, so that saving and serialising are the same, bit for bit -------------- */
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    Model *m = c;
+    if (!*state) *state = malloc(sizeof(State));
+    if (!*state) return fail(m, fmi2Error, "no memory for an FMU state");
+    memcpy(*state, &m->now, sizeof(State));
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+    Model *m = c;
+    if (!state || memcmp(state, GUID, sizeof GUID))
+        return fail(m, fmi2Error, "this FMU state was not saved by this FMU");
+    memcpy(&m->now, state, sizeof(State));
+    return fmi2OK;
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    if (state) {
+        free(*state);
+        *state = NULL;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
+    *size = sizeof(State);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[],
+                                 size_t size) {
+    if (size < sizeof(State)) return fail(c, fmi2Error, "too few bytes for the FMU state");
+    memcpy(bytes, state, sizeof(State));
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
+                                   fmi2FMUstate *state) {
+    if (size != sizeof(State) || memcmp(bytes, GUID, sizeof GUID))
+        return fail(c, fmi2Error, "this FMU state was not saved by this FMU");
+    if (!*state) *state = malloc(sizeof(State));
+    if (!*state) return fail(c, fmi2Error, "no memory for an FMU state");
+    memcpy(*state, bytes, sizeof(State));
+    return fmi2OK;
+}

@@ -1,0 +1,71 @@
+"""The C text of a component: what `fmi2.c` includes as component.h, but for its GUID."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable
+
+import casadi as ca
+
+from hapticlink.components.component import Component, Variable
+
+
+def component_header(component: Component) -> str:
+    """Sizes, names, start values and functions; the same text for the same component.
+
+    The functions are `static`, so their names (initialize, step, output) meet no one else's.
+    """
+    settable = (*component.inputs, *component.parameters)
+    fixed = [False] * len(component.start_inputs)
+    fixed += [v.variability == "fixed" for v in component.parameters for _ in v.names]
+    starts = (*component.start_inputs, *component.start_parameters)
+    sizes = {
+        "N_U": len(component.start_inputs),
+        "N_P": len(component.start_parameters),
+        "N_Y": sum(v.size for v in component.outputs),
+        "N_X": sum(v.size for v in component.states),
+        "SUBSTEPS": component.substeps,
+        "SAMPLED": int(component.timing == "sampled"),
+    }
+    return "\n".join(
+        [
+            *(f"#define {name} {value}" for name, value in sizes.items()),
+            _table("char *const names", _texts((*settable, *component.outputs))),
+            _table("char *const state_names", _texts(component.states)),
+            _table("double starts", map(_number, starts)),
+            _table("char is_fixed", (str(int(flag)) for flag in fixed)),
+            "#define CASADI_SYMBOL_EXPORT static",
+            _functions(component),
+        ]
+    )
+
+
+def _table(declared: str, entries: Iterable[str]) -> str:
+    """With a last 0, as a C table is never empty."""
+    return f"static const {declared}[] = {{{', '.join([*entries, '0'])}}};"
+
+
+def _texts(variables: Iterable[Variable]) -> Iterable[str]:
+    """A percent sign is doubled: FMI's logger takes a message for a format (section 2.1.5)."""
+    return (json.dumps(name.replace("%", "%%")) for v in variables for name in v.names)
+
+
+def _number(value: float) -> str:
+    if math.isfinite(value):
+        return repr(float(value))
+    return "NAN" if math.isnan(value) else "INFINITY" if value > 0 else "-INFINITY"
+
+
+def _functions(component: Component) -> str:
+    """Each instruction of CasADi's virtual machine is a statement on local variables.
+
+    CasADi asks at each read and write whether there is an argument or a result; `fmi2.c` gives them
+    all. With these branches the time to compile grows with the square of the length.
+    """
+    generator = ca.CodeGenerator("component")
+    for function in (component.initialize, component.step, component.output):
+        generator.add(function if function.is_a("SXFunction") else function.expand())
+    text = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", generator.dump())
+    return re.sub(r"if \(res\[\d+\]!=0\) ", "", text)

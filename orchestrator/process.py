@@ -1,0 +1,93 @@
+"""A worker process and the call that it is at: sent, then waited for.
+
+A watchdog kills a process that is late; the waiting read then ends like any other death.
+"""
+
+from __future__ import annotations
+
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from time import monotonic
+from typing import Any
+
+ENDING = 10.0
+"""Seconds that a process may take to end when nobody asks it anything any more."""
+WATCH = 0.05
+"""Seconds between two looks at the clock."""
+
+
+class Died(Exception):
+    """The process ended without an answer; says how."""
+
+
+class Process:
+    """`send` a call, then take its `answer`; one call at a time. `busy`: the answer is due."""
+
+    def __init__(self, module: str) -> None:
+        # -P: the worker's imports do not depend on the folder that the user stands in.
+        command = [sys.executable, "-P", "-m", module]
+        self._popen = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self._popen.stdin is not None
+        assert self._popen.stdout is not None
+        self._requests, self._answers = self._popen.stdin, self._popen.stdout
+        self._ended = threading.Event()
+        self._deadline: float | None = None
+        self._late = self.busy = False
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def _watch(self) -> None:
+        while not self._ended.wait(WATCH):
+            if self._deadline is not None and monotonic() > self._deadline:
+                self._late = True
+                self._popen.kill()
+                return
+
+    def send(self, message: Any, allowed: float) -> None:
+        """Raises Died. The answer may take `allowed` seconds from now."""
+        self._allowed, self._sent, self.busy = allowed, monotonic(), True
+        try:
+            pickle.dump(message, self._requests)
+            self._requests.flush()
+        except OSError:
+            raise self._died() from None
+
+    def answer(self, allowed: float | None = None) -> Any:
+        """Raises Died. `allowed`: seconds from now instead."""
+        now = monotonic()
+        if allowed is not None:
+            self._allowed, self._sent = allowed, now
+        # An answer that is there already is taken, however late it is asked for.
+        self._deadline = max(self._sent + self._allowed, now + 2 * WATCH)
+        try:
+            found = pickle.load(self._answers)
+        except Exception:  # the end of the stream, or what is left of an answer cut in two
+            raise self._died() from None
+        finally:
+            self._deadline = None
+        self.busy = False
+        return found
+
+    def _died(self) -> Died:
+        self.busy = False
+        code = self.end()
+        if self._late:
+            return Died(f"did not answer within {self._allowed:g} s and was ended")
+        if code < 0:
+            return Died(f"ended by {signal.Signals(-code).name}")
+        return Died(f"ended with exit status {code}")
+
+    def end(self) -> int:
+        """The exit status of a process that has nothing more to do; killed where it lingers."""
+        self._ended.set()
+        for stream in (self._requests, self._answers):
+            with suppress(OSError):  # bytes that a dead process has not taken
+                stream.close()
+        try:
+            return self._popen.wait(ENDING)
+        except subprocess.TimeoutExpired:
+            self._popen.kill()
+            return self._popen.wait()

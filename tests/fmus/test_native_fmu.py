@@ -1,0 +1,314 @@
+"""What is special about native FMUs: the binary, its compiler, and the bits of the Python FMU."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import struct
+import subprocess
+import sys
+import zipfile
+from array import array
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sample_components
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from hypothesis import given
+from hypothesis import strategies as st
+from named_fmu import Named
+
+from hapticlink.fmus import FmuError, build_native, check_fmu
+from hapticlink.fmus.blocks import component
+from hapticlink.fmus.build import build
+from hapticlink.fmus.check import session
+from hapticlink.fmus.native import compile_library, compiler
+from hapticlink.fmus.native.source import component_header
+from hapticlink.orchestrator import blocks, scene_file
+from hapticlink.orchestrator.timeline import timeline
+
+OPTIONS = ("sensing=encoders", "controller.bias=full", "mechanism.directions=true")
+NAMES = ("hand", "controller", "haptic_device", "virtual_mechanism", "virtual_environment")
+H = 1 / 512
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
+    """Each block of the report's experiment as a Python and as a native FMU."""
+    scene = scene_file.load("closed-loop", OPTIONS)
+    time, folder = timeline(scene), tmp_path_factory.mktemp("both")
+    made = {
+        b.name: component(b.made_by, blocks.settled(scene, b, time), H)
+        for b in blocks.blocks(scene)
+    }
+    made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"}, H)
+    return {n: (build(c, folder / "p"), build_native(c, folder / "n")) for n, c in made.items()}
+
+
+def driven(path: Path) -> np.ndarray:
+    """All reals after each of 60 steps under changing inputs, the last 20 from a saved state."""
+    rows = []
+    with session(path) as at:
+        slave = at.instance()
+        slave.setupExperiment(startTime=0.0)
+        slave.enterInitializationMode()
+        rows.append(slave.getReal(at.reals))
+        slave.exitInitializationMode()
+        references = [v.valueReference for v in at.inputs]
+        starts = np.array([float(v.start) for v in at.inputs])
+        draw = np.random.default_rng(1)
+
+        def steps(first: int, last: int) -> None:
+            for k in range(first, last):
+                if references:
+                    slave.setReal(references, starts + 0.01 * draw.standard_normal(len(starts)))
+                slave.doStep(k * H, H)
+                rows.append(slave.getReal(at.reals))
+
+        steps(0, 20)
+        state = slave.getFMUState()
+        steps(20, 40)
+        slave.setFMUState(state)
+        slave.freeFMUState(state)
+        rows.append(slave.getReal(at.reals))
+        steps(20, 40)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("name", [*NAMES, "discrete_equivalent"])
+def test_every_block_gives_the_bits_of_its_python_fmu(both, name):
+    by_python, by_c = map(driven, both[name])
+    assert np.isfinite(by_c).all()
+    np.testing.assert_array_equal(by_c, by_python)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_contract_of_the_blocks(both, name):
+    assert check_fmu(both[name][1]) == []
+
+
+def test_the_same_component_gives_the_same_bytes(native_fmus, tmp_path):
+    again = build_native(sample_components.spring(), tmp_path)
+    assert again.read_bytes() == native_fmus["spring"].read_bytes()
+
+
+def test_the_archive_is_self_contained(native_fmus, tmp_path):
+    """No Python in it, and none needed: its library loads and names itself without."""
+    with zipfile.ZipFile(native_fmus["spring"]) as archive:
+        names = archive.namelist()
+        archive.extractall(tmp_path)
+    (library,) = (n for n in names if n.startswith("binaries/"))
+    assert set(names) == {library, "documentation/index.html", "model.png", "modelDescription.xml"}
+    assert b"python" not in (tmp_path / library).read_bytes().lower()
+    description = (tmp_path / "modelDescription.xml").read_text()
+    assert 'needsExecutionTool="false"' in description
+    assert 'canBeInstantiatedOnlyOncePerProcess="false"' in description
+    version = ctypes.CDLL(str(tmp_path / library)).fmi2GetVersion
+    version.restype = ctypes.c_char_p
+    assert version() == b"2.0"
+
+
+def sections(elf: bytes) -> dict[str, tuple[int, bytes]]:
+    """Name -> (size, content) of an ELF64 file's sections (System V gABI, chapter 4)."""
+    (table,) = struct.unpack_from("<Q", elf, 0x28)
+    size, count, names_at = struct.unpack_from("<HHH", elf, 0x3A)
+    rows = [struct.unpack_from("<IIQQQQ", elf, table + size * i) for i in range(count)]
+    names = elf[rows[names_at][4] :]
+    return {
+        names[row[0] : names.index(b"\0", row[0])].decode(): (row[5], elf[row[4] :][: row[5]])
+        for row in rows
+    }
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads an ELF file")
+@pytest.mark.parametrize("name", ["virtual_mechanism", "controller"])
+def test_nothing_is_exported_but_fmi2_and_nothing_is_shared(both, name):
+    """Every defined symbol is a function of FMI; no byte of the library can be written by one
+    instance and read by another."""
+    with zipfile.ZipFile(both[name][1]) as archive:
+        found = sections(archive.read(f"binaries/linux64/{name}.so"))
+    symbols, texts = found[".dynsym"][1], found[".dynstr"][1]
+    exported = set()
+    for at in range(24, len(symbols), 24):
+        text, _, _, section = struct.unpack_from("<IBBH", symbols, at)
+        if section:
+            exported.add(texts[text : texts.index(b"\0", text)].decode())
+    assert {"fmi2Instantiate", "fmi2DoStep", "fmi2GetFMUstate"} <= exported
+    assert [n for n in exported if not n.startswith("fmi2")] == []
+    assert found.get(".data", (0, b""))[0] == found.get(".bss", (0, b""))[0] == 0
+
+
+def test_a_message_has_its_status_and_category(native_fmus):
+    with session(native_fmus["fragile"]) as at:
+        said = []
+        slave = FMU2Slave(
+            guid=at.description.guid,
+            unzipDirectory=at.folder,
+            modelIdentifier="fragile",
+            instanceName="mine",
+        )
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _, *about: said.append(about))
+        slave.instantiate(callbacks=callbacks)
+        slave.setupExperiment()
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        slave.setReal([0], [100.0])
+        with pytest.raises(FMICallException):
+            slave.doStep(0.0, 0.1)
+        slave.freeInstance()
+    ((name, status, category, message),) = said
+    assert (name, status, category) == (b"mine", 2, b"logStatusDiscard")
+    assert message.startswith(b"r[2] became nan at t = 0.1; ")
+
+
+def test_the_last_successful_time_after_a_discard(native_fmus):
+    """FMI 2.0.5 section 4.2.2: fmi2GetRealStatus answers after fmi2Discard."""
+    with session(native_fmus["fragile"]) as at:
+        fmu = Named(at).start()
+        fmu.step(0.0, 0.25)
+        fmu.set(u=100.0)
+        with pytest.raises(FMICallException):
+            fmu.step(0.25, 0.25)
+        time = ctypes.c_double()
+        fmu.slave.fmi2GetRealStatus(fmu.slave.component, 2, ctypes.byref(time))
+        assert time.value == 0.25
+
+
+@pytest.mark.parametrize("call", ["getInteger", "getBoolean", "getReal"])
+def test_an_unknown_reference_is_an_error_that_leaves_the_instance_whole(native_fmus, call):
+    with session(native_fmus["spring"]) as at:
+        fmu = Named(at).start()
+        with pytest.raises(FMICallException) as raised:
+            getattr(fmu.slave, call)([99])
+        assert raised.value.status == 3
+        assert fmu.get("a") == [-4.0]
+
+
+def test_another_guid_is_refused(native_fmus):
+    with session(native_fmus["spring"]) as at:
+        at.description.guid = "{another}"
+        with pytest.raises(Exception, match="Failed to instantiate"):
+            at.instance()
+        assert any("the guid {another} is not that of this binary" in m for m in at.messages)
+        at._instances.clear()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_instances_and_saved_states_are_freed(both):
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    with session(both["virtual_mechanism"][1]) as at:
+
+        def lives(count: int) -> None:
+            for _ in range(count):
+                slave = at.instance("x" * 20000)
+                for _ in range(20):
+                    state = slave.getFMUState()
+                    slave.setFMUState(state)
+                    slave.freeFMUState(state)
+                at._instances.remove(slave)  # its library stays loaded for the next
+                slave.fmi2FreeInstance(slave.component)
+
+        lives(20)
+        before = resident()
+        lives(100)  # 2 MB of names, 2 MB of states
+        assert resident() - before < 2**19
+
+
+def universal_parts(data: bytes) -> list[tuple[int, bytes]]:
+    (count,) = struct.unpack_from(">I", data, 4)
+    rows = (struct.unpack_from(">IIIII", data, 8 + 20 * i) for i in range(count))
+    return [(cpu, data[at : at + size]) for cpu, _, at, size, _ in rows]
+
+
+def test_a_mac_binary_holds_both_processors(tmp_path):
+    """Compiled from here; magic numbers and processor types of <mach-o/loader.h>."""
+    path = build_native(sample_components.stateless(), tmp_path, platforms=("darwin64",))
+    with zipfile.ZipFile(path) as archive:
+        data = archive.read("binaries/darwin64/gain.dylib")
+    assert data[:4] == bytes.fromhex("cafebabe")
+    parts = universal_parts(data)
+    assert [cpu for cpu, _ in parts] == [0x01000007, 0x0100000C]
+    for cpu, part in parts:
+        assert struct.unpack_from("<II", part) == (0xFEEDFACF, cpu)
+        assert b"_fmi2DoStep" in part
+        assert str(tmp_path.parent).encode() not in part
+
+
+@pytest.mark.skipif(
+    "HAPTICLINK_TEST_WINDOWS" not in os.environ,
+    reason="set HAPTICLINK_TEST_WINDOWS: the first build for Windows makes its C library (minutes)",
+)
+def test_a_windows_binary(tmp_path):
+    path = build_native(sample_components.stateless(), tmp_path, platforms=("win64",))
+    with zipfile.ZipFile(path) as archive:
+        data = archive.read("binaries/win64/gain.dll")
+    assert data[:2] == b"MZ"
+    (header,) = struct.unpack_from("<I", data, 0x3C)
+    assert data[header : header + 4] == b"PE\0\0"
+    assert struct.unpack_from("<H", data, header + 4) == (0x8664,)
+    assert b"fmi2DoStep\0" in data
+
+
+def test_without_ziglang_the_extra_is_named(tmp_path, monkeypatch):
+    def missing(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(compiler, "version", missing)
+    with pytest.raises(FmuError, match=r"pip install 'hapticlink\[native\]'"):
+        build_native(sample_components.stateless(), tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_version_of_ziglang_is_another_guid(tmp_path, native_fmus, monkeypatch):
+    monkeypatch.setattr(compiler, "version", lambda name: "0.0")
+    other = build_native(sample_components.stateless(), tmp_path)
+    with session(native_fmus["gain"]) as one, session(other) as two:
+        assert one.description.guid != two.description.guid
+
+
+def test_c_that_does_not_compile_says_where(tmp_path):
+    source = tmp_path / "broken.c"
+    source.write_text("int broken(void) { return nothing; }\n")
+    with pytest.raises(FmuError, match=r"broken\.c does not compile for .*\n.*broken\.c:1:27"):
+        compile_library(source, tmp_path / "broken.so")
+    assert list(tmp_path.iterdir()) == [source]
+
+
+def test_a_library_of_ones_own(tmp_path):
+    source = tmp_path / "own.c"
+    source.write_text(
+        '#include "fmi2Functions.h"\n'
+        "int hidden(void) { return VALUE; }\n"
+        "FMI2_Export int shown(void) { return hidden() + 1; }\n"
+    )
+    library = compile_library(source, tmp_path / "own.so", options=["-DVALUE=41"])
+    # In another process: a library stays loaded to the end of this one.
+    code = (
+        "import ctypes, sys; own = ctypes.CDLL(sys.argv[1]); "
+        "print(own.shown(), hasattr(own, 'hidden'))"
+    )
+    command = [sys.executable, "-c", code, str(library)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["42", "False"]
+
+
+@given(value=st.floats(), percent=st.booleans())
+def test_start_values_and_names_stand_in_the_c_text(value, percent):
+    """Every double comes back from its text, and a percent sign is no format."""
+    from hapticlink.components.component import Block, Variable
+
+    name = "load%" if percent else "load"
+    b = Block(inputs=[Variable(name, (), "1", value)], outputs=[Variable("y")])
+    made = b.component("c", "", "sampled", initial={}, step={}, output={"y": b.u[name]})
+    text = component_header(made)
+    literal = text.split("starts[] = {")[1].split(",")[0]
+    known = literal.replace("NAN", "nan").replace("INFINITY", "inf")
+    assert array("d", [float(known)]).tobytes() == array("d", [value]).tobytes() or value != value
+    assert ('"load%%"' in text) is percent

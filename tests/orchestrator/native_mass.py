@@ -1,0 +1,103 @@
+"""The two masses of `oscillator` as compiled FMUs that take inputs varying within a step."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from fmpy import platform, sharedLibraryExtension
+
+from hapticlink.orchestrator.description import Description, describe
+
+from . import oscillator
+
+REALS = (
+    "a", "b", "d", "x", "v", "acc", "F", "dF", "k", "c", "p", "q", "side", "warm", "sign",
+    "brittle", "fine", "failure", "offered", "calls",
+)  # fmt: skip
+"""By value reference, as in mass_fmu.c."""
+FLAGS = (
+    "canInterpolateInputs",
+    "canHandleVariableCommunicationStepSize",
+    "canGetAndSetFMUstate",
+    "providesDirectionalDerivative",
+)
+INPUTS = {"one": {"a": "F"}, "two": {"a": "x1", "b": "v1", "d": "a1"}}
+OUTPUTS = {
+    "one": {"x": "x", "v": "v", "acc": "a", "calls": "calls"},
+    "two": {"x": "x", "v": "v", "F": "F", "dF": "der(F)", "calls": "calls"},
+}
+FEEDS = {"a": ["F"], "F": ["x1", "v1"], "der(F)": ["x1", "v1", "a1"]}
+"""What an output depends on directly."""
+K, C, K_C, C_C = oscillator.K, oscillator.C, oscillator.K_C, oscillator.C_C
+COMMON = {"warm": oscillator.WARM, "sign": 1.0, "offered": 1.0}
+OWN = {
+    "one": {"k": K, "c": C, "p": 1.0, "q": 0.0, "side": 1.0, **COMMON},
+    "two": {"k": K + K_C, "c": C + C_C, "p": K_C, "q": C_C, "side": 2.0, **COMMON},
+}
+
+
+def native(
+    folder: Path,
+    name: str,
+    flags: tuple[str, ...] = FLAGS,
+    nominal: Mapping[str, float] | None = None,
+    **values: float,
+) -> Description:
+    """`one` takes a force, `two` a motion, with parameters that differ from the oscillator's in
+    `values`; skips the test where there is no C compiler."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    start = {**dict.fromkeys(REALS, 0.0), **OWN[name], **values}
+    library, path = folder / f"{name}{sharedLibraryExtension}", folder / f"{name}.fmu"
+    source = Path(__file__).parent / "mass_fmu.c"
+    numbers = ",".join(map(repr, start.values()))
+    how = ["-O1", "-shared", "-fPIC", f"-DSTART={numbers}", "-o", library, source]
+    subprocess.run([compiler, *how], check=True)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", _description(name, flags, nominal or {}, start))
+        archive.write(library, f"binaries/{platform}/mass{sharedLibraryExtension}")
+    return describe(path)
+
+
+def _description(
+    name: str, flags: tuple[str, ...], nominal: Mapping[str, float], start: Mapping[str, float]
+) -> str:
+    rows: list[str] = []
+    places: dict[str, int] = {}
+    for reference, real in enumerate(REALS):
+        inputs, outputs = INPUTS[name], OUTPUTS[name]
+        called = inputs.get(real) or outputs.get(real) or real
+        if real in inputs:
+            what, text = 'causality="input"', f'<Real start="{start[real]}"/>'
+        elif real in outputs:
+            size = f' nominal="{nominal[called]}"' if called in nominal else ""
+            what, text = 'causality="output"', f"<Real{size}/>"
+        elif real in REALS[8:-1]:
+            what = 'causality="parameter" variability="fixed"'
+            text = f'<Real start="{start[real]}"/>'
+        else:
+            continue
+        rows.append(
+            f'<ScalarVariable name="{called}" valueReference="{reference}" {what}>{text}'
+            "</ScalarVariable>"
+        )
+        places[called] = len(rows)
+    unknowns = "".join(
+        f'<Unknown index="{places[y]}" dependencies="'
+        f'{" ".join(str(places[u]) for u in FEEDS.get(y, []))}"/>'
+        for y in OUTPUTS[name].values()
+    )
+    capable = " ".join(f'{flag}="true"' for flag in flags)
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="mass">
+<CoSimulation modelIdentifier="mass" {capable}/>
+<ModelVariables>{"".join(rows)}</ModelVariables>
+<ModelStructure><Outputs>{unknowns}</Outputs></ModelStructure>
+</fmiModelDescription>
+"""

@@ -1,0 +1,123 @@
+"""SSPs of others, written out: systems, connections and parameters as SSP 1.0 spells them."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+from .foreign_fmus import python_fmu, with_units
+
+HEAD = """<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription version="1.0" name="nested"
+ xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+ xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"
+ xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+ xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping">
+"""
+TAIL = """
+<ssd:Units>
+<ssc:Unit name="m"><ssc:BaseUnit m="1"/></ssc:Unit>
+<ssc:Unit name="cm"><ssc:BaseUnit m="1" factor="0.01"/></ssc:Unit>
+<ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit>
+<ssc:Unit name="N"><ssc:BaseUnit kg="1" m="1" s="-2"/></ssc:Unit>
+</ssd:Units>
+<ssd:DefaultExperiment startTime="0.0" stopTime="0.2"/>
+</ssd:SystemStructureDescription>"""
+
+
+def connectors(**kinds: str) -> str:
+    """`name="kind"` or `name="kind unit"`."""
+    made = []
+    for name, text in kinds.items():
+        kind, _, unit = text.partition(" ")
+        real = f'<ssc:Real unit="{unit}"/>' if unit else "<ssc:Real/>"
+        made.append(f'<ssd:Connector name="{name}" kind="{kind}">{real}</ssd:Connector>')
+    return f"<ssd:Connectors>{''.join(made)}</ssd:Connectors>"
+
+
+def component(name: str, fmu: str, bindings: str = "") -> str:
+    return f'<ssd:Component name="{name}" source="resources/{fmu}.fmu">{bindings}</ssd:Component>'
+
+
+def system(name: str, ports: str, elements: str, lines: str, bindings: str = "") -> str:
+    inside = f"<ssd:Elements>{elements}</ssd:Elements><ssd:Connections>{lines}</ssd:Connections>"
+    return f'<ssd:System name="{name}">{ports}{bindings}{inside}</ssd:System>'
+
+
+def line(start: str, end: str, linear: str = "", how: str = "") -> str:
+    """`element.connector`, or `connector` of the system itself; linear is "factor offset"."""
+    text = ""
+    for which, (element, _, connector) in (
+        ("start", start.rpartition(".")),
+        ("end", end.rpartition(".")),
+    ):
+        text += f' {which}Element="{element}"' if element else ""
+        text += f' {which}Connector="{connector}"'
+    inside = ""
+    if linear:
+        factor, offset = linear.split()
+        inside = f'<ssc:LinearTransformation factor="{factor}" offset="{offset}"/>'
+    return f"<ssd:Connection{text} {how}>{inside}</ssd:Connection>"
+
+
+def values(*parameters: tuple[str, str], units: str = "") -> str:
+    """A parameter set; a value is written as "0.5", or "0.5 mm"."""
+    made = ""
+    for name, text in parameters:
+        number, _, unit = text.partition(" ")
+        kind = "Boolean" if number in ("true", "false") else "Real"
+        of = f' unit="{unit}"' if unit else ""
+        made += f'<ssv:Parameter name="{name}"><ssv:{kind} value="{number}"{of}/></ssv:Parameter>'
+    space = 'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"'
+    return (
+        f'<ssv:ParameterSet version="1.0" name="p" {space}><ssv:Parameters>{made}</ssv:Parameters>'
+        f"{units}</ssv:ParameterSet>"
+    )
+
+
+def mapping(*entries: tuple[str, str, str], version: str = 'version="1.0"') -> str:
+    """(source, target, transformation) of each entry."""
+    made = "".join(
+        f'<ssm:MappingEntry source="{a}" target="{b}">{t}</ssm:MappingEntry>' for a, b, t in entries
+    )
+    spaces = (
+        'xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping" '
+        'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"'
+    )
+    return f"<ssm:ParameterMapping {version} {spaces}>{made}</ssm:ParameterMapping>"
+
+
+def linear(factor: float, offset: float) -> str:
+    return f'<ssc:LinearTransformation factor="{factor}" offset="{offset}"/>'
+
+
+def binding(set_: str = "", map_: str = "", about: str = "", map_about: str = "") -> str:
+    inside = f"<ssd:ParameterValues>{set_}</ssd:ParameterValues>" if set_ else ""
+    if map_ or map_about:
+        inside += f"<ssd:ParameterMapping {map_about}>{map_}</ssd:ParameterMapping>"
+    return f"<ssd:ParameterBinding {about}>{inside}</ssd:ParameterBinding>"
+
+
+def bindings(*each: str) -> str:
+    return f"<ssd:ParameterBindings>{''.join(each)}</ssd:ParameterBindings>"
+
+
+def ssp(folder: Path, root: str, tail: str = TAIL, **entries: str | bytes) -> str:
+    """Gives puts out 1000 gain (mm), Takes what it gets (m), Plain what it gets, times gain."""
+    with_units(python_fmu(folder, "Gives", "self.y = 1000.0 * self.gain"), y="mm", gain="m")
+    with_units(python_fmu(folder, "Takes", "self.y = self.u if self.on else -1.0"), u="m")
+    python_fmu(folder, "Plain", "self.y = self.gain * self.u")
+    with zipfile.ZipFile(folder / "their.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", HEAD + root + tail)
+        for name, text in entries.items():
+            archive.writestr(f"resources/{name.replace('_', '.')}", text)
+        for name in ("Gives.fmu", "Takes.fmu", "Plain.fmu"):
+            archive.write(folder / name, f"resources/{name}")
+    return str(folder / "their.ssp")
+
+
+ON = bindings(binding(values(("on", "true"))))
+TABLE = (
+    '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
+    "</ssc:BooleanMappingTransformation>"
+)

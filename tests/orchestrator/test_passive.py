@@ -1,0 +1,173 @@
+"""Holds that keep account of the energy that they make: what they prove, on forces and motions
+without FMUs, and what no hold can."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.holds import HOLDS, Site
+from hapticlink.orchestrator.holds.account import repayment
+
+Vector = NDArray[np.float64]
+
+
+def account(name: str, forces: Vector, motion: Vector, every: int) -> Vector:
+    """What a hold of forces renewed every so many ticks has made at each renewal (J)."""
+    x = np.concatenate([[0.0], np.cumsum(motion)])
+    now = np.zeros(1)
+    hold = HOLDS[name](Site(1, displacement=lambda: now))
+    held, made, ideal = 0.0, [], 0.0
+    for tick in range(len(x)):
+        now[:] = x[tick]
+        if tick % every == 0 and (n := tick // every) < len(forces):
+            hold.push(tick, forces[n : n + 1], tick)
+            if n:
+                ideal += (forces[n - 1] + forces[n]) / 2 * (x[tick] - x[tick - every])
+            made.append(held - ideal)
+        if tick < len(motion):
+            held += hold.value(tick)[0] * motion[tick]
+    return np.array(made)
+
+
+forces = st.lists(st.floats(-10, 10), min_size=4, max_size=40).map(np.array)
+
+
+@given(forces, st.integers(1, 8), st.floats(1e-4, 1.0), st.booleans())
+def test_passive_holds_leave_nothing_made_but_the_last_period(
+    forces: Vector, every: int, speed: float, back: bool
+) -> None:
+    """Any force on a steady motion: what a period made is gone when the next has passed."""
+    motion = np.full(every * len(forces), -speed if back else speed)
+    first = np.concatenate([[0.0], -np.diff(forces) / 2 * motion[0] * every])  # zoh, a period
+    tiny = 1e-12 * 10 * np.abs(motion).sum()
+    assert np.allclose(account("zoh", forces, motion, every), np.cumsum(first), atol=tiny)
+    assert np.all(account("passive", forces, motion, every) <= np.maximum(first, 0.0) + tiny)
+    assert np.allclose(account("nepce", forces, motion, every), first, atol=tiny)
+    rest = np.concatenate([forces, np.full(2, forces[-1])])
+    motion = np.full(every * len(rest), motion[0])
+    assert account("passive", rest, motion, every)[-1] <= tiny
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_passive_holds_make_next_to_nothing_of_random_smooth_signals(seed: int) -> None:
+    """A spring on random motion, renewed every fifth tick: a tenth of what zero order makes."""
+    generator = np.random.default_rng(seed)
+    t = np.arange(4001)
+    rates, phases = generator.uniform(0.005, 0.05, 8), generator.uniform(0, 6.28, 8)
+    x = np.sin(np.outer(t, rates) + phases).sum(axis=1)
+    spring = -100.0 * (x[::5] - x[0])
+    made = {n: account(n, spring, np.diff(x), 5)[-1] for n in ("zoh", "passive", "nepce")}
+    assert made["zoh"] > 0
+    assert made["passive"] < 0.1 * made["zoh"]
+    assert abs(made["nepce"]) < 0.1 * made["zoh"]
+
+
+@settings(max_examples=200)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([(1, 1), (5, 1), (1, 5), (3, 2), (2, 7)]),
+    st.booleans(),
+)
+def test_passive_makes_nothing_at_any_sample_where_the_way_is_foreseen(
+    seed: int, rates: tuple[int, int], known: bool
+) -> None:
+    """Random forces and random speeds, either way, at random rates: the theorem of `passive`.
+    Where no swing as large was seen at rest before, what is made stays below one step's."""
+    generator = np.random.default_rng(seed)
+    every, step = rates  # ticks between samples, ticks of a step of the target
+    now, speed = np.zeros(1), np.zeros(1)
+    hold = HOLDS["passive"](Site(1, displacement=lambda: now, velocity=lambda: speed))
+    start = 2 * step * every
+    swing = 5.0 if every >= step else 10.0  # of a mean that leaves what is held, within +-5
+    if known:
+        hold.push(0, np.array([-swing]), 0)
+        hold.value(0, step / 2)
+        hold.push(start // 2, np.array([swing]), start // 2)
+        hold.value(start // 2, step / 2)
+
+    held = work = ideal = moved = longest = force = at_sample = 0.0
+    begin = start
+    for tick in range(start, start + 60 * step * every):
+        there = float(now[0]) + moved * (tick - begin)
+        if (tick - start) % every == 0:
+            fresh = float(generator.choice([-5.0, 5.0, generator.uniform(-5.0, 5.0)]))
+            if tick > start:
+                ideal += (force + fresh) / 2 * (there - at_sample)
+                made = work + held * (there - float(now[0])) - ideal
+                assert made <= swing * longest + 1e-9
+            force, at_sample = fresh, there
+            hold.push(tick, np.array([force]), tick)
+        if (tick - start) % step == 0:
+            work += held * (there - float(now[0]))
+            now[:], before, begin = there, float(speed[0]), tick
+            speed[:] = generator.normal()
+            held = float(hold.value(tick, step / 2)[0])
+            gained = float(speed[0]) - before if tick > start else 0.0
+            share = generator.choice([1.0, generator.uniform(0.0, 1.0)])
+            moved = float(share * (speed[0] + gained / 2))
+            longest = 0.0 if known else max(longest, abs(moved) * max(step, every))
+
+
+@pytest.mark.parametrize("name", ["zoh", "passive", "nepce"])
+def test_no_hold_withstands_a_motion_that_waits_for_its_force(name: str) -> None:
+    """A source within +-1 and a motion that goes whichever way makes more, once the force is held:
+    at least |F| |dx| a step, whatever is held. So a hold's theorem has to foresee the motion."""
+    now = np.zeros(1)
+    hold = HOLDS[name](Site(1, displacement=lambda: now))
+    force, made = 0.0, []
+    for tick in range(50):
+        hold.push(tick, np.array([force]), tick)
+        held = hold.value(tick)[0]
+        fresh = max((-1.0, 1.0), key=lambda f: abs(held - (force + f) / 2))
+        excess = held - (force + fresh) / 2
+        made.append(abs(excess) * 0.1)
+        now += 0.1 * np.sign(excess)
+        force = fresh
+    assert min(made) >= 0.1 * 0.5 - 1e-12
+
+
+def wall(stiffness: float, every: int, limit: float) -> tuple[float, float, float]:
+    """(peak mm, peak to peak of the last 0.5 s in mm, energy mJ) of a hand's push on a wall."""
+    mass, damping, period, substeps = 0.04, 0.8, 1e-3, 40
+    quantum = 2 * np.pi * 0.010 / 1024
+    x, v, energy, base, held, path = 0.029, 0.0, 0.0, 0.0, 0.0, []
+    before = np.floor(x / quantum) * quantum
+    for k in range(1500):
+        measured = np.floor(x / quantum) * quantum
+        moved, before = measured - before, measured
+        energy += held * moved
+        if k % every == 0:
+            base = min(max(stiffness * (measured - 0.030), 0.0), 2.0)
+        # The wall's force opposes x: what it absorbs is -(energy made).
+        excess, largest = np.array([max(-energy, 0.0)]), np.array([limit * abs(moved) / period])
+        control = -float(repayment(excess, np.array([moved]), largest)[0])
+        held = min(max(base + control, -2.0), 2.0)
+        for _ in range(substeps):
+            v += period / substeps * (400.0 * (0.033 - x) - damping * v - held) / mass
+            x += period / substeps * v
+        path.append(x * 1e3)
+    return max(path), max(path[-500:]) - min(path[-500:]), energy * 1e3
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "every", "limit", "expected"),
+    [
+        (400, 1, 0.0, (33.53, 0.001, -0.32)),
+        (2500, 1, 0.0, (31.79, 1.658, -17.6)),
+        (2500, 1, 0.8, (31.79, 0.080, -1.81)),
+        (400, 5, 0.0, (34.07, 5.277, -69.67)),
+        (400, 5, 0.8, (33.90, 0.001, -1.44)),
+    ],
+)
+def test_passivity_controller_on_a_virtual_wall(
+    stiffness: float, every: int, limit: float, expected: tuple[float, float, float]
+) -> None:
+    """The passivity controller of Hannaford & Ryu, alpha <= 0.8: rows computed independently."""
+    peak, swing, energy = wall(stiffness, every, limit)
+    assert peak == pytest.approx(expected[0], abs=0.006)
+    assert swing == pytest.approx(expected[1], abs=0.0006)
+    assert energy == pytest.approx(expected[2], abs=0.006 if abs(expected[2]) < 10 else 0.06)
