@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks import mechanisms
-from benchmarks.ours import COMPILER, Ours
+from benchmarks.ours import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.specs import Mechanism
 
@@ -30,7 +30,7 @@ def measure(out: Path, quick: bool, told: Callable[[str, int, int], None]) -> li
             count = ours.component.step.n_instructions()
             builds.append(time.perf_counter() - began)
         runs = [ours.virtual_machine()]
-        if COMPILER and bodies <= 100:  # the compiler's own time grows faster than the code
+        if bodies <= 100:  # the compiler's own time grows faster than the code
             runs.append(ours.native(out / ".compiled"))
         costs = [min(run(STEPS)[2] for _ in range(3)) / STEPS * 1e6 for run in runs]
         rows.add(name, bodies, min(builds), count, *costs, *[float("nan")] * (2 - len(costs)))

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import mechanisms, reference
-from benchmarks.ours import COMPILER, Ours
+from benchmarks.ours import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs import Linkage, Mechanism
@@ -133,8 +133,7 @@ def tasks(
     for rate in case.rates:
         for integrator, stabilization in case.settings:
             name, key = f"{integrator}, {stabilization}", (integrator, stabilization, rate)
-            if COMPILER:
-                yield NATIVE, name, rate, lambda k=key: ours(*k).native(folder)
+            yield NATIVE, name, rate, lambda k=key: ours(*k).native(folder)
             yield MACHINE, name, rate, lambda k=key: ours(*k).virtual_machine()
         for peer in codes:
             for method in peer.METHODS:

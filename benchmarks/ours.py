@@ -1,30 +1,27 @@
 """Our virtual mechanism, run two ways: CasADi's virtual machine, as a Python FMU does, and the
-same function as generated C in a loop in C, as a native FMU does (needs a C compiler)."""
+same function as C in a loop in C, generated and compiled as for a native FMU."""
 
 from __future__ import annotations
 
 import ctypes
 import hashlib
-import shutil
-import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 
 from hapticlink.components.component import Component
 from hapticlink.components.mechanism import virtual_mechanism
 from hapticlink.components.specs import Linkage, Mechanism
-
-COMPILER = shutil.which("gcc") or shutil.which("cc")
-# Straight-line code of 1e5 lines takes -O2 minutes and gains a tenth.
-OPTIMISE = "-O1"
+from hapticlink.fmus.native import compile_library
+from hapticlink.fmus.native.source import functions
 
 _DRIVER = """
-void run(long steps, double* x, double* y, const double* u, const double* p,
+FMI2_Export void run(long steps, double* x, double* y, const double* u, const double* p,
          const double* h, casadi_int* iw, double* w) {
   double t = 0;
   const double* arg[ARGUMENTS] = {0};
@@ -93,7 +90,7 @@ class Ours:
         return run
 
     def native(self, folder: Path) -> Callable[[int], tuple[float, float, float]]:
-        """As C. Raises RuntimeError without a C compiler."""
+        """As C."""
         advance = self.advance(folder)
 
         def run(steps: int) -> tuple[float, float, float]:
@@ -127,36 +124,15 @@ class Ours:
         return float(found[0]), float(found[1])
 
 
-def _compiled(step, folder: Path) -> Path:
+def _compiled(step: ca.Function, folder: Path) -> Path:
     """A shared library with `run`, kept under the hash of its source."""
-    if COMPILER is None:
-        raise RuntimeError("no C compiler: install gcc or another `cc`")
     folder.mkdir(parents=True, exist_ok=True)
-    import casadi as ca
-
-    generator = ca.CodeGenerator("step", {"with_header": False})
-    generator.add(step)
     sizes = f"#define ARGUMENTS {step.sz_arg()}\n#define RESULTS {step.sz_res()}\n"
-    source = generator.dump() + sizes + _DRIVER
+    source = sizes + '#include "fmi2Functions.h"\n' + functions([step]) + _DRIVER
     library = folder / f"{hashlib.sha256(source.encode()).hexdigest()[:16]}.so"
     if not library.exists():
         text, made = library.with_suffix(".c"), library.with_suffix(".part")
         text.write_text(source)
-        subprocess.run(
-            [
-                COMPILER,
-                OPTIMISE,
-                "-march=native",
-                "-shared",
-                "-fPIC",
-                "-Wl,-Bsymbolic",
-                "-o",
-                made,
-                text,
-                "-lm",
-            ],
-            check=True,
-        )
-        made.rename(library)
+        compile_library(text, made).rename(library)
         text.unlink()
     return library

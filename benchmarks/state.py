@@ -8,9 +8,10 @@ from pathlib import Path
 
 import benchmarks
 import hapticlink.components
+import hapticlink.fmus.native
 from hapticlink.fmus.cache import sources
 
-PACKAGES = ("hapticlink", "casadi", "numpy", "scipy", "mujoco", "pin", "exudyn")
+PACKAGES = ("hapticlink", "casadi", "ziglang", "numpy", "scipy", "mujoco", "pin", "exudyn")
 
 
 def versions() -> dict[str, str]:
@@ -27,7 +28,8 @@ def versions() -> dict[str, str]:
 def begin(out: Path, rows: tuple[str, ...]) -> None:
     """Keep the files `rows` in `out` only if they were made by these sources and versions."""
     path = out / "state.json"
-    now = {"sources": sources(hapticlink.components, benchmarks), "versions": versions()}
+    made_by = sources(hapticlink.components, hapticlink.fmus.native, benchmarks)
+    now = {"sources": made_by, "versions": versions()}
     if not path.exists() or json.loads(path.read_text()) != now:
         for name in rows:
             (out / name).unlink(missing_ok=True)

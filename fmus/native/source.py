@@ -36,8 +36,7 @@ def component_header(component: Component) -> str:
             _table("char *const state_names", _texts(component.states)),
             _table("double starts", map(_number, starts)),
             _table("char is_fixed", (str(int(flag)) for flag in fixed)),
-            "#define CASADI_SYMBOL_EXPORT static",
-            _functions(component),
+            functions((component.initialize, component.step, component.output)),
         ]
     )
 
@@ -58,14 +57,16 @@ def _number(value: float) -> str:
     return "NAN" if math.isnan(value) else "INFINITY" if value > 0 else "-INFINITY"
 
 
-def _functions(component: Component) -> str:
-    """Each instruction of CasADi's virtual machine is a statement on local variables.
+def functions(made: Iterable[ca.Function]) -> str:
+    """Static C functions: each instruction of CasADi's virtual machine is a statement on local
+    variables.
 
     CasADi asks at each read and write whether there is an argument or a result; `fmi2.c` gives them
     all. With these branches the time to compile grows with the square of the length.
     """
     generator = ca.CodeGenerator("component")
-    for function in (component.initialize, component.step, component.output):
+    for function in made:
         generator.add(function if function.is_a("SXFunction") else function.expand())
-    text = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", generator.dump())
+    text = "#define CASADI_SYMBOL_EXPORT static\n" + generator.dump()
+    text = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", text)
     return re.sub(r"if \(res\[\d+\]!=0\) ", "", text)

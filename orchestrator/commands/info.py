@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
     """Tell what a scene consists of: rates, FMUs, connections, holds; what it needs and leaves out,
     and what that saves. Without SCENE, list the shipped scenes."""
-    from hapticlink.orchestrator import blocks, scene_file, stamps, system, timeline
+    from hapticlink.orchestrator import blocks, scene_file, scene_names, stamps, system, timeline
     from hapticlink.orchestrator.plan import Plan
 
     if scene is None:
-        for name in scene_file.shipped():
+        for name in scene_names.shipped():
             print(f"{name}: {scene_file.load(name).title}")
         return 0
     read = scene_file.load(scene, set or ())

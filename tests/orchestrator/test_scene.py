@@ -2,7 +2,7 @@
 
 import pytest
 
-from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator import scene_file, scene_names
 from hapticlink.orchestrator.faults import InputFault, SceneFault
 from hapticlink.orchestrator.rates import VariableRate
 from hapticlink.orchestrator.toml_lines import key_lines
@@ -124,8 +124,8 @@ def test_sensing_reaches_the_device() -> None:
 
 
 def test_every_shipped_scene_is_good_and_found_by_name() -> None:
-    assert "closed-loop" in scene_file.shipped()
-    for name in scene_file.shipped():
+    assert "closed-loop" in scene_names.shipped()
+    for name in scene_names.shipped():
         assert scene_file.load(name).title
     with pytest.raises(InputFault, match="did you mean closed-loop"):
         scene_file.load("closed-lop")
@@ -148,7 +148,7 @@ def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:
 
 def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
     base, top = tmp_path / "base.toml", tmp_path / "top.toml"
-    base.write_text(scene_file.find("closed-loop")[1])
+    base.write_text(scene_names.find("closed-loop")[1])
     top.write_text(f'extends = "{base}"\nduration = 1.0\n[hand]\nwrench = [1.0, 0.0, 0.0]\n')
     scene = scene_file.load(str(top))
     assert scene.duration == 1.0
