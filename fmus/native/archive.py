@@ -56,9 +56,8 @@ def entries(
     files["modelDescription.xml"] = describe(guid)
     with tempfile.TemporaryDirectory(prefix="hapticlink-") as name:
         room = Path(name)
-        (room / "component.h").write_bytes(
-            f'#define GUID "{guid}"\n'.encode() + content["component.h"]
-        )
+        head = f'#define GUID "{guid}"\n'.encode()
+        (room / "component.h").write_bytes(head + content["component.h"])
         (room / "fmi2.c").write_bytes(content["fmi2.c"])
         for platform in platforms:
             library = compile_library(room / "fmi2.c", room / "library", platform)

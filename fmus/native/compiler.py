@@ -66,11 +66,14 @@ def compile_library(
 
     platform is one of PLATFORMS, this machine's by default. The FMI headers are on the include
     path, and only what is declared FMI2_Export is exported; `options` are further arguments of
-    the compiler (-DNAME=VALUE, -fvisibility=default). Raises FmuError with the compiler's words.
+    the compiler (-DNAME=VALUE, -fvisibility=default). Raises FmuError, with the compiler's
+    words where the source does not compile.
     """
     compiler_version()
     source, library = Path(source).resolve(), Path(library).resolve()
-    targets = TARGETS[platform or host_platform()]
+    targets = TARGETS.get(platform or host_platform())
+    if targets is None:
+        raise FmuError(f"no platform {platform!r}; there are {', '.join(PLATFORMS)}")
     with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
         slices = [_compiled(source, Path(room), target, options) for target in targets]
         library.write_bytes(slices[0] if len(slices) == 1 else universal(slices))

@@ -266,6 +266,11 @@ def test_without_ziglang_the_extra_is_named(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_unknown_platform_is_named(tmp_path):
+    with pytest.raises(FmuError, match="no platform 'amiga'; there are linux64, win64, darwin64"):
+        build_native(sample_components.stateless(), tmp_path, platforms=("amiga",))
+
+
 def test_another_version_of_ziglang_is_another_guid(tmp_path, native_fmus, monkeypatch):
     monkeypatch.setattr(compiler, "version", lambda name: "0.0")
     other = build_native(sample_components.stateless(), tmp_path)
