@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 import uuid
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-from fmpy import platform, platform_tuple, sharedLibraryExtension
+from fmpy import platform, platform_tuple
 from pythonfmu.builder import FmuBuilder
 
 from hapticlink.orchestrator import results
 from hapticlink.orchestrator.experiment import Experiment, simulate
+
+from .compiled import compiled
 
 SLAVE = """
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
@@ -106,17 +105,12 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def c_fmu(folder: Path, guid: str = "{faults}") -> Path:
-    """The FMU of fault_fmu.c; skips the test where there is no C compiler."""
-    return _compiled(folder, "fault_fmu.c", "faults", platform, DESCRIPTION.format(guid=guid))
+    """The FMU of fault_fmu.c."""
+    return _packed(folder, "fault_fmu.c", "faults", platform, DESCRIPTION.format(guid=guid))
 
 
-def _compiled(folder: Path, source: str, name: str, where: str, description: str) -> Path:
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler")
-    library, path = folder / f"{name}{sharedLibraryExtension}", folder / f"{name}.fmu"
-    text = Path(__file__).parent / source
-    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, text], check=True)
+def _packed(folder: Path, source: str, name: str, where: str, description: str) -> Path:
+    library, path = compiled(source, folder, name), folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description)
         archive.write(library, f"binaries/{where}/{library.name}")
@@ -153,7 +147,7 @@ def c_fmu3(folder: Path) -> Path:
 <ModelStructure>{outputs}</ModelStructure>
 </fmiModelDescription>
 """
-    return _compiled(folder, "types_fmu3.c", "types", platform_tuple, description)
+    return _packed(folder, "types_fmu3.c", "types", platform_tuple, description)
 
 
 PAIR = """

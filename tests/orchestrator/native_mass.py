@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-import pytest
 from fmpy import platform, sharedLibraryExtension
 
 from hapticlink.orchestrator.description import Description, describe
 
 from . import oscillator
+from .compiled import compiled
 
 REALS = (
     "a", "b", "d", "x", "v", "acc", "F", "dF", "k", "c", "p", "q", "side", "warm", "sign",
@@ -49,16 +47,10 @@ def native(
     **values: float,
 ) -> Description:
     """`one` takes a force, `two` a motion, with parameters that differ from the oscillator's in
-    `values`; skips the test where there is no C compiler."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler")
+    `values`."""
     start = {**dict.fromkeys(REALS, 0.0), **OWN[name], **values}
-    library, path = folder / f"{name}{sharedLibraryExtension}", folder / f"{name}.fmu"
-    source = Path(__file__).parent / "mass_fmu.c"
-    numbers = ",".join(map(repr, start.values()))
-    how = ["-O1", "-shared", "-fPIC", f"-DSTART={numbers}", "-o", library, source]
-    subprocess.run([compiler, *how], check=True)
+    path, numbers = folder / f"{name}.fmu", ",".join(map(repr, start.values()))
+    library = compiled("mass_fmu.c", folder, name, f"-DSTART={numbers}")
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", _description(name, flags, nominal or {}, start))
         archive.write(library, f"binaries/{platform}/mass{sharedLibraryExtension}")

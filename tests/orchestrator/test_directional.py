@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import shutil
-import subprocess
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +10,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fmpy import sharedLibraryExtension
 
 from hapticlink.orchestrator.description import Description
 from hapticlink.orchestrator.directional import derivatives
@@ -22,6 +19,7 @@ from hapticlink.orchestrator.run import Outcome
 from hapticlink.orchestrator.scalars import Scalar
 from hapticlink.orchestrator.system import System
 
+from .compiled import compiled
 from .coupled import ROWS, simulate, system
 from .native_mass import FLAGS, native
 
@@ -147,13 +145,8 @@ int fmi3GetDirectionalDerivative(void *c, const unsigned *unknown, size_t nu, co
 
 def test_fmi3_arrays_are_derived_whole(tmp_path: Path) -> None:
     """Of single entries of arrays, in any order; the arrays' sizes are what the standard asks."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler")
-    library = tmp_path / f"linear{sharedLibraryExtension}"
     (tmp_path / "linear.c").write_text(LINEAR)
-    how = ["-shared", "-fPIC", "-o", library, tmp_path / "linear.c"]
-    subprocess.run([compiler, *how], check=True)
+    library = compiled(tmp_path / "linear.c", tmp_path, "linear")
     sizes = {
         "u": (5, 3, "input"),
         "w": (6, 1, "input"),
