@@ -1,7 +1,5 @@
 """The local model (B.15) against the mechanism's own matrices: cost of a step and error of the tip.
 
-python benchmarks/local_model.py
-
 The five-bar of Table 6.1 alone under the wrench of chapter 6, matrices from a joint-synchronised
 copy. Cost: instructions of a step, and the least time of 20 repetitions of 2000 steps.
 """
@@ -9,6 +7,7 @@ copy. Cost: instructions of a step, and the least time of 20 repetitions of 2000
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import perf_counter
 
@@ -42,11 +41,11 @@ def microseconds(block: Component) -> float:
     return min(times) * 1e6
 
 
-def costs() -> None:
+def costs() -> Iterator[str]:
     linkage = scene_file.load("five-bar").linkage
     assert linkage is not None
-    print("| matrices | integrator | stabilisation | instructions | us a step |")
-    print("|---|---|---|---|---|")
+    yield "| matrices | integrator | stabilisation | instructions | us a step |"
+    yield "|---|---|---|---|---|"
     for name, frame, stabilization in (
         ("own", None, "projection"),
         ("own", None, "baumgarte"),
@@ -55,7 +54,7 @@ def costs() -> None:
         for integrator in ("semi-implicit-euler", "rk4"):
             spec = Mechanism(integrator=integrator, stabilization=stabilization)  # type: ignore[arg-type]
             block = virtual_mechanism(linkage, spec, step_s=STEP, frame_s=frame)
-            print(
+            yield (
                 f"| {name} | {integrator} | {stabilization} | {block.step.n_instructions()} "
                 f"| {microseconds(block):.1f} |"
             )
@@ -68,23 +67,37 @@ def tip(folder: Path, *options: str) -> tuple[np.ndarray, float]:
     return way, float(found["virtual_mechanism.closure_error"].max())
 
 
-def errors() -> None:
-    print("\n| integrator | frames | .25 s | .5 s | 1 s | closure, 1 s |")
-    print("|---|---|---|---|---|---|")
+def errors(rates: tuple[int, ...], told: Callable[[str, int, int], None]) -> Iterator[str]:
+    yield "| integrator | frames | .25 s | .5 s | 1 s | closure, 1 s |"
+    yield "|---|---|---|---|---|---|"
+    cases = [(i, r) for i in ("semi-implicit-euler", "rk4") for r in rates]
     with tempfile.TemporaryDirectory() as room:
         own, _ = tip(Path(room) / "own", "duration=1.0")
-        for integrator in ("semi-implicit-euler", "rk4"):
-            for rate in (10, 30, 60, 512):
-                options = [*HELD, "duration=1.0", f"mechanism.integrator={integrator}"]
-                options.append(f"graphics={{rate={rate}, sync='joint'}}")
-                folder = Path(room) / f"{integrator}-{rate}"
-                held, opened = tip(folder, *options)
-                gap = np.linalg.norm(held - own[: len(held)], axis=1) * 1e3
-                at = [gap[: round(t * 512) + 1].max() for t in (0.25, 0.5, 1.0)]
-                shown = " | ".join(f"{e:.3g} mm" for e in (*at, opened * 1e3))
-                print(f"| {integrator} | {rate} Hz | {shown} |")
+        for k, (integrator, rate) in enumerate(cases):
+            told(f"local model: {integrator} at {rate} Hz", k, len(cases))
+            options = [*HELD, "duration=1.0", f"mechanism.integrator={integrator}"]
+            options.append(f"graphics={{rate={rate}, sync='joint'}}")
+            held, opened = tip(Path(room) / f"{k}", *options)
+            gap = np.linalg.norm(held - own[: len(held)], axis=1) * 1e3
+            at = [gap[: round(t * 512) + 1].max() for t in (0.25, 0.5, 1.0)]
+            shown = " | ".join(f"{e:.3g} mm" for e in (*at, opened * 1e3))
+            yield f"| {integrator} | {rate} Hz | {shown} |"
 
 
-if __name__ == "__main__":
-    costs()
-    errors()
+def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+    """Write README.md to `out`."""
+    told("local model: cost of a step", 0, 1)
+    cost, error = list(costs()), list(errors((30, 60) if quick else (10, 30, 60, 512), told))
+    page = [
+        "# The local model of interaction\n",
+        f"Made by `{command}`. Five-bar of Table 6.1 under the wrench of chapter 6, no device;",
+        "times of one machine, compare them within the table.\n",
+        "## Cost of a step at 512 Hz\n",
+        *cost,
+        "\n## Error\n",
+        "Largest distance of the operational point from the mechanism with its own matrices (rk4",
+        "and projection), and the largest gap of the loop in 1 s.\n",
+        *error,
+    ]
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "README.md").write_text("\n".join(page) + "\n", encoding="utf-8")

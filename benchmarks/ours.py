@@ -101,16 +101,17 @@ class Ours:
 
         return run
 
-    def advance(self, folder: Path) -> Callable[[np.ndarray, int], np.ndarray]:
-        """(state, steps) -> state, compiled; overwrites the state given."""
+    def advance(self, folder: Path) -> Callable[..., np.ndarray]:
+        """(state, steps, h) -> state, compiled; overwrites the state given."""
         step = self.component.step
         call = ctypes.CDLL(str(_compiled(step, folder))).run
         double = ctypes.POINTER(ctypes.c_double)
         iw, w = np.zeros(step.sz_iw() + 1, dtype=np.int64), np.zeros(step.sz_w() + 1)
-        h, y = np.array([self.h]), np.zeros_like(self.start)
+        y = np.zeros_like(self.start)
 
-        def run(x: np.ndarray, steps: int) -> np.ndarray:
-            pointers = [a.ctypes.data_as(double) for a in (x, y, self.u, self.p, h)]
+        def run(x: np.ndarray, steps: int, h: float = self.h) -> np.ndarray:
+            size = np.array([h])
+            pointers = [a.ctypes.data_as(double) for a in (x, y, self.u, self.p, size)]
             work = iw.ctypes.data_as(ctypes.c_void_p), w.ctypes.data_as(double)
             call(ctypes.c_long(steps), *pointers, *work)
             return (y if steps % 2 else x).copy()

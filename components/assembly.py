@@ -15,7 +15,7 @@ from hapticlink.components.component import Component
 from hapticlink.components.linkage import LinkageModel, loop_name
 
 STEPS = 12
-MU = 1e-9  # relative to trace(W W')/m
+MU = 1e-9  # as in closure.py
 TOLERANCE = 1e-9  # of the start pose's gap, m
 
 

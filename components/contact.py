@@ -31,7 +31,9 @@ from hapticlink.components.reach import near
 from hapticlink.components.specs import Linkage
 
 FAR = 1e9  # m
-RANK = 1e-6  # share of the largest eigenvalue below which a direction takes no part in F_env
+# Share of the largest eigenvalue below which a direction takes no part in F_env; nor does one
+# that the loops lock.
+RANK = 1e-6
 
 
 def places(linkage: Linkage, contacts: Contacts) -> int:
@@ -130,11 +132,14 @@ def contact_forces(
     return ContactForces(Q, energy, ca.if_else(least < FAR, least, contacts.margin))
 
 
-def equivalent_wrench(Lambda_inv: ca.SX, acceleration: ca.SX, length_scale: ca.SX) -> ca.SX:
-    """F of least scaled norm with Lambda^-1 F = a: S (S Lambda^-1 S)^+ S a."""
+def equivalent_wrench(
+    Lambda_inv: ca.SX, open_mobility: ca.SX, acceleration: ca.SX, length_scale: ca.SX
+) -> ca.SX:
+    """F of least scaled norm with Lambda^-1 F = a: S (S Lambda^-1 S)^+ S a; open_mobility is
+    J D^-1 J' of the open linkage."""
     S = resisted.scaling(length_scale)
     values, vectors = resisted.eigen(S @ Lambda_inv @ S)
-    largest = ca.fmax(ca.fmax(values[0], values[1]), values[2])
-    kept = values > RANK * largest
+    least = resisted.locked(open_mobility, length_scale)
+    kept = values > ca.fmax(RANK * resisted.largest(values), least)
     inverse = ca.if_else(kept, 1 / ca.if_else(kept, values, 1), 0)
     return S @ (vectors @ (inverse * (vectors.T @ (S @ acceleration))))

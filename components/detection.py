@@ -9,8 +9,8 @@ of places, each with a flag: no iteration, no branch.
     polygon     each end's nearest point of the boundary, and the corner that is nearest to
                 the inside of the segment
 
-Closest points: Ericson, Real-Time Collision Detection (2005), sections 5.1.2 and 5.1.9. The
-segment itself must stay outside: a link may sink in by its radius, no deeper.
+A link that sinks in deeper than its radius is still pushed back by the way that it came, up to the
+middle of the obstacle, where another way out is as short (closest.py).
 """
 
 from __future__ import annotations
@@ -19,12 +19,20 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from hapticlink.components.closest import (
+    TINY,
+    along,
+    between,
+    edges,
+    nearest_on_boundary,
+    select,
+    way_out,
+)
 from hapticlink.components.component import Signals, Variable
 from hapticlink.components.contact_specs import Contacts, Pair
 from hapticlink.components.linkage import LinkageModel
 from hapticlink.components.reach import counterclockwise, near
 
-TINY = 1e-300
 COLUMNS = ("1", "m", "m", "m", "m", "1", "1")
 """A row of the `contacts` port: active, point in the body (x, y), point and normal of the plane."""
 
@@ -93,54 +101,27 @@ def _ends(model: LinkageModel, body: str) -> list[ca.SX]:
     return [ca.SX(list(end)) for end in shape.capsule]
 
 
-def _edges(corners: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
-    """(start, end, normal to the right) of each edge."""
-    number = corners.shape[0]
-    found = []
-    for k in range(number):
-        a, b = corners[k, :].T, corners[(k + 1) % number, :].T
-        along = b - a
-        found.append((a, b, ca.vertcat(along[1], -along[0]) / ca.norm_2(along)))
-    return found
-
-
-def _select(condition: ca.SX, one: list[ca.SX], other: list[ca.SX]) -> list[ca.SX]:
-    return [ca.if_else(condition, a, b) for a, b in zip(one, other, strict=True)]
-
-
 def _in_corner(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:
     at = model.frames[body].point(end)
     walls = [
-        [ca.dot(at - a, -outward), a, -outward] for a, _, outward in _edges(p["enclosure.corners"])
+        [ca.dot(at - a, -outward), a, -outward] for a, _, outward in edges(p["enclosure.corners"])
     ]
-    first, second = _select(walls[0][0] < walls[1][0], walls[0] + walls[1], walls[1] + walls[0]), []
+    first, second = select(walls[0][0] < walls[1][0], walls[0] + walls[1], walls[1] + walls[0]), []
     first, second = first[:3], first[3:]
     for wall in walls[2:]:
         nearer, next_one = wall[0] < first[0], wall[0] < second[0]
-        second = _select(nearer, first, _select(next_one, wall, second))
-        first = _select(nearer, wall, first)
+        second = select(nearer, first, select(next_one, wall, second))
+        first = select(nearer, wall, first)
     return [Touch(body, ca.SX(1), end, plane, normal) for _, plane, normal in (first, second)]
-
-
-def _along(ends: list[ca.SX], world: list[ca.SX], target: ca.SX) -> ca.SX:
-    """Share of the way from the first end to the second that is nearest to `target`, unclamped."""
-    if len(ends) == 1:
-        return ca.SX(0)
-    span = world[1] - world[0]
-    return ca.dot(target - world[0], span) / ca.dot(span, span)
-
-
-def _between(ends: list[ca.SX], s: ca.SX) -> ca.SX:
-    return ends[0] if len(ends) == 1 else ends[0] + s * (ends[1] - ends[0])
 
 
 def _on_disc(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) -> Touch:
     center, radius = p[f"{pair.obstacle}.center"], p[f"{pair.obstacle}.radius"]
     world = [model.frames[pair.body].point(end) for end in ends]
-    s = ca.fmin(ca.fmax(_along(ends, world, center), 0), 1)
-    away = _between(world, s) - center
+    s = ca.fmin(ca.fmax(along(ends, world, center), 0), 1)
+    away = between(world, s) - center
     normal = away / (ca.norm_2(away) + TINY)
-    return Touch(pair.body, ca.SX(1), _between(ends, s), center + radius * normal, normal)
+    return Touch(pair.body, ca.SX(1), between(ends, s), center + radius * normal, normal)
 
 
 def _on_polygon(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) -> list[Touch]:
@@ -148,39 +129,33 @@ def _on_polygon(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) 
     world = [model.frames[pair.body].point(end) for end in ends]
     found = []
     for end, at in zip(ends, world, strict=True):
-        plane, normal = _nearest_on_boundary(_edges(corners), at)
+        plane, normal = nearest_on_boundary(edges(corners), at)
         found.append(Touch(pair.body, ca.SX(1), end, plane, normal))
     if len(ends) == 2:
         found.append(_nearest_corner(pair.body, ends, world, corners))
     return found
 
 
-def _nearest_on_boundary(walls: list[tuple[ca.SX, ca.SX, ca.SX]], at: ca.SX) -> list[ca.SX]:
-    """[point, normal] of the boundary nearest to a point: the edge's normal, or off a corner."""
-    best: list[ca.SX] = []
-    for a, b, outward in walls:
-        s = ca.dot(at - a, b - a) / ca.dot(b - a, b - a)
-        point = a + ca.fmin(ca.fmax(s, 0), 1) * (b - a)
-        away = at - point
-        distance = ca.norm_2(away)
-        on_edge = ca.logic_and(s >= 0, s <= 1)
-        normal = ca.if_else(on_edge, outward, away / (distance + TINY))
-        this = [distance, point, normal]
-        best = _select(distance < best[0], this, best) if best else this
-    return best[1:]
-
-
 def _nearest_corner(body: str, ends: list[ca.SX], world: list[ca.SX], corners: ca.SX) -> Touch:
-    """The corner nearest to the inside of the segment, not active where none faces it."""
-    far = ca.SX(1e9)
+    """The corner nearest to the inside of the segment, not active where none faces it.
+
+    The plane stands along the segment. Its normal points to the segment; where the segment has
+    sunk in past the corner, no deeper than its way out, to the side where it gets out.
+    """
+    span = world[1] - world[0]
+    side = ca.vertcat(-span[1], span[0]) / ca.norm_2(span)
+    heights = [ca.dot(side, world[0] - corners[k, :].T) for k in range(corners.shape[0])]
+    depth, outward = way_out(world, corners, side, heights)
+    up = ca.if_else(ca.dot(outward, side) >= 0, 1, -1)
     best: list[ca.SX] = []
-    for k in range(corners.shape[0]):
+    for k, height in enumerate(heights):
         corner = corners[k, :].T
-        s = _along(ends, world, corner)
+        s = along(ends, world, corner)
         inside = ca.logic_and(s > 0, s < 1)
-        s = ca.fmin(ca.fmax(s, 0), 1)
-        away = _between(world, s) - corner
-        distance = ca.if_else(inside, ca.norm_2(away), far)
-        this = [distance, inside, _between(ends, s), corner, away / (ca.norm_2(away) + TINY)]
-        best = _select(distance < best[0], this, best) if best else this
+        sunk = ca.logic_and(depth <= up * height, depth < 0)
+        sign = ca.if_else(sunk, up, ca.if_else(height >= 0, 1, -1))
+        distance = ca.if_else(inside, sign * height, ca.SX(1e9))
+        point = between(ends, ca.fmin(ca.fmax(s, 0), 1))
+        this = [distance, inside, point, corner, sign * side]
+        best = select(distance < best[0], this, best) if best else this
     return Touch(body, *best[1:])

@@ -250,19 +250,6 @@ class LinkageModel:
         return ca.jtimes(poses, self.q, weights * self.rate(self.rate(poses)), True)
 
     @cached_property
-    def C(self) -> ca.SX:
-        """Christoffel matrix (2.11), (2.12) as corrected; Ddot - 2C is skew."""
-        n, D = self.q.numel(), self.D
-        dD = [ca.reshape(ca.jacobian(ca.vec(D), self.q)[:, i], n, n) for i in range(n)]
-        C = ca.SX(n, n)
-        for k in range(n):
-            for j in range(n):
-                C[k, j] = 0.5 * sum(
-                    (dD[i][k, j] + dD[j][k, i] - dD[k][i, j]) * self.qd[i] for i in range(n)
-                )
-        return C
-
-    @cached_property
     def kinetic_energy(self) -> ca.SX:
         poses, weights = self._bodies
         return 0.5 * ca.dot(weights, self.rate(poses) ** 2)

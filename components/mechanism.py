@@ -88,7 +88,9 @@ def virtual_mechanism(
         applied += forces.Q
         energy += forces.energy
         felt = space.terms.J_h @ space.response(forces.Q)[0]
-        F_env = contact.equivalent_wrench(space.Lambda_inv, felt, block.p["length_scale"])
+        F_env = contact.equivalent_wrench(
+            space.Lambda_inv, space.open_mobility, felt, block.p["length_scale"]
+        )
         output |= {"F_env": F_env, "contact_gap": forces.gap}
     qdd, multipliers = space.motion(applied)
     output |= {

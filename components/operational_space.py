@@ -61,6 +61,13 @@ class OperationalSpace:
         return self.mobility(self.terms.J_h)
 
     @cached_property
+    def open_mobility(self) -> ca.SX:
+        """J_h D^-1 J_h' of the linkage with its loops open, 3 x 3."""
+        inertia = self.terms.inertia
+        passed = inertia.inward(self.terms.J_h.T)
+        return passed.T @ ca.diag(inertia.d_inv) @ passed
+
+    @cached_property
     def a_bias(self) -> ca.SX:
         """3 x 1: m/s2, m/s2, rad/s2."""
         return self.terms.J_h @ self._bias[0] + self.terms.Jdot_qd

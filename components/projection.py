@@ -20,7 +20,7 @@ from hapticlink.components.tree import TreeInertia
 
 REPEATS = 3  # of the pose
 RATE_REPEATS = 2
-MU = 1e-6  # relative to trace(W D^-1 W')/m
+MU = 1e-6  # as in closure.py
 
 
 def projection(model: LinkageModel, inertia: TreeInertia) -> ca.Function:

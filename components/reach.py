@@ -2,7 +2,8 @@
 
 A chain of revolute joints keeps every point of a body within the sum of its links' lengths of
 the joint on the ground. A prismatic or free joint on the way has no such bound. Loops only make
-the reach smaller. Lengths are those of the scene.
+the reach smaller. Lengths are those of the scene: this is structure, settled once. Pairs within
+reach are evaluated at every pose.
 """
 
 from __future__ import annotations

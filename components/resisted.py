@@ -5,6 +5,9 @@ the scaled mobility S Lambda^-1 S is in 1/kg throughout; its small eigenvalues a
 The report takes an SVD (B.14) at the graphics rate since SVDs have no guaranteed run time; a
 fixed number of cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, section 8.5)
 has one, and a 3 x 3 matrix is diagonal to rounding after five sweeps.
+
+Small is against the largest of them, and against the same linkage's with its loops open: where
+the loops lock the hand in all directions, what is left of Lambda^-1 is rounding.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import casadi as ca
 
 SWEEPS = 5
 TINY = 1e-300
+LOCKED = 1e-10  # share of the open linkage's mobility that is rounding
 
 
 def scaling(length_scale: ca.SX) -> ca.SX:
@@ -38,9 +42,18 @@ def eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.diag(A), V
 
 
-def _ratios_and_ranks(eigenvalues: ca.SX) -> tuple[list[ca.SX], list[ca.SX]]:
-    """Share of the largest, and place in ascending order (0 the smallest, ties by index)."""
-    largest = ca.fmax(ca.fmax(eigenvalues[0], eigenvalues[1]), eigenvalues[2])
+def locked(open_mobility: ca.SX, length_scale: ca.SX) -> ca.SX:
+    """The eigenvalue below which a direction is locked, 1/kg; open_mobility: J D^-1 J'."""
+    S = scaling(length_scale)
+    return LOCKED * ca.trace(S @ open_mobility @ S)
+
+
+def largest(eigenvalues: ca.SX) -> ca.SX:
+    return ca.fmax(ca.fmax(eigenvalues[0], eigenvalues[1]), eigenvalues[2])
+
+
+def _ranks(eigenvalues: ca.SX) -> list[ca.SX]:
+    """Places in ascending order (0 the smallest, ties by index)."""
     ranks = []
     for i in range(3):
         below = [
@@ -49,19 +62,26 @@ def _ratios_and_ranks(eigenvalues: ca.SX) -> tuple[list[ca.SX], list[ca.SX]]:
             if j != i
         ]
         ranks.append(below[0] + below[1])
-    return [eigenvalues[i] / (largest + TINY) for i in range(3)], ranks
+    return ranks
 
 
-def count(eigenvalues: ca.SX, before: ca.SX, tolerance: ca.SX, hysteresis: ca.SX) -> ca.SX:
-    """Number of resisted directions: ratio below `tolerance`, or below `hysteresis` times it
-    for the `before` smallest, which were resisted before."""
-    ratios, ranks = _ratios_and_ranks(eigenvalues)
-    bounds = [tolerance * ca.if_else(rank < before, hysteresis, 1) for rank in ranks]
-    return sum((r < b for r, b in zip(ratios, bounds, strict=True)), start=ca.SX(0))
+def count(
+    eigenvalues: ca.SX,
+    before: ca.SX,
+    tolerance: ca.SX,
+    hysteresis: ca.SX,
+    least: ca.SX | float = TINY,
+) -> ca.SX:
+    """Number of resisted directions: below `least`, or with a share of the largest below
+    `tolerance`, times `hysteresis` for the `before` smallest, which were resisted before."""
+    most, number = largest(eigenvalues), ca.SX(0)
+    for i, rank in enumerate(_ranks(eigenvalues)):
+        share = tolerance * ca.if_else(rank < before, hysteresis, 1)
+        number += eigenvalues[i] < ca.fmax(share * most, least)
+    return number
 
 
 def projector(eigenvalues: ca.SX, vectors: ca.SX, number: ca.SX) -> ca.SX:
     """P_c, orthogonal projector (3 x 3, dimensionless) on the `number` smallest directions."""
-    _, ranks = _ratios_and_ranks(eigenvalues)
-    chosen = ca.vertcat(*(ca.if_else(rank < number, 1, 0) for rank in ranks))
+    chosen = ca.vertcat(*(ca.if_else(r < number, 1, 0) for r in _ranks(eigenvalues)))
     return vectors @ ca.diag(chosen) @ vectors.T

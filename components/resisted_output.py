@@ -26,18 +26,20 @@ def resisted_directions(
     """For a block with state n_resisted that starts at q0 and steps from q to q1."""
     p, before, q = block.p, block.x["n_resisted"], space.model.q
     S = resisted.scaling(p["length_scale"])
+    least = resisted.locked(space.open_mobility, p["length_scale"])
     scaled = ca.Function(
-        "scaled", [q, block.u.vector, p.vector], [S @ space.Lambda_inv @ S], {"cse": True}
+        "scaled", [q, block.u.vector, p.vector], [S @ space.Lambda_inv @ S, least], {"cse": True}
     )
     tolerance, hysteresis = p["rank_tolerance"], p["hysteresis"]
 
-    def values(at: ca.SX) -> tuple[ca.SX, ca.SX]:
-        return resisted.eigen(scaled(at, block.u.vector, p.vector))
+    def number(at: ca.SX, before: ca.SX) -> ca.SX:
+        mobility, least = scaled(at, block.u.vector, p.vector)
+        return resisted.count(resisted.eigen(mobility)[0], before, tolerance, hysteresis, least)
 
-    (first, _), (after, _), (now, vectors) = values(q0), values(q1), values(q)
+    now, vectors = resisted.eigen(scaled(q, block.u.vector, p.vector)[0])
     return ResistedDirections(
-        first=resisted.count(first, ca.SX(0), tolerance, hysteresis),
-        after=resisted.count(after, before, tolerance, hysteresis),
+        first=number(q0, ca.SX(0)),
+        after=number(q1, before),
         output={
             "P_c": resisted.projector(now, vectors, before),
             "n_constraints": before,

@@ -9,10 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 Point = tuple[float, float]
 Vector3 = tuple[float, float, float]
+# The units of the three, x, y and theta, for what reads the annotations.
+Wrench = Annotated[Vector3, "N, N, N.m"]
+Stiffness = Annotated[Vector3, "N/m, N/m, N.m/rad"]
+Damping = Annotated[Vector3, "N.s/m, N.s/m, N.m.s/rad"]
+Inertia = Annotated[Vector3, "kg, kg, kg.m2"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,8 +195,8 @@ class GraphicsCopy:
     """
 
     sync: Literal["operational", "joint"] = "operational"
-    stiffness: Vector3 = (1000.0, 1000.0, 10000.0)
-    damping: Vector3 = (100.0, 100.0, 10000.0)
+    stiffness: Stiffness = (1000.0, 1000.0, 10000.0)
+    damping: Damping = (100.0, 100.0, 10000.0)
     joint_stiffness: float = 1e4
     joint_damping: float = 200.0
     substeps: int = 20
@@ -260,8 +265,8 @@ class Topology:
 class Teleoperation:
     """Position channels of the four-channel controller: K_pc and B_pc of section B.6."""
 
-    stiffness: Vector3 = (100.0, 100.0, 0.5)
-    damping: Vector3 = (70.0, 70.0, 0.375)
+    stiffness: Stiffness = (100.0, 100.0, 0.5)
+    damping: Damping = (70.0, 70.0, 0.375)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -275,8 +280,8 @@ class Controller:
 
     impedance: bool = True
     bias: Literal["none", "full"] = "none"
-    damping: Vector3 | None = None
-    stiffness: Vector3 | None = None
+    damping: Damping | None = None
+    stiffness: Stiffness | None = None
     teleoperation: Teleoperation | Literal[False] = field(default_factory=Teleoperation)
     topology: Topology | bool = True
     contact: bool = False
@@ -287,8 +292,8 @@ class ConstantHand:
     """A constant wrench (N, N, N.m) at the handle, with an optional damping to ground."""
 
     type: Literal["constant"] = "constant"
-    wrench: Vector3
-    damping: Vector3 | None = None
+    wrench: Wrench
+    damping: Damping | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,7 +302,7 @@ class ProfileHand:
 
     type: Literal["profile"] = "profile"
     table: tuple[tuple[float, float, float, float], ...]
-    damping: Vector3 | None = None
+    damping: Damping | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,11 +311,11 @@ class ArmHand:
     the grip's K_gr, B_gr. target: rows (t s, x m, y m, theta rad), linear, held after."""
 
     type: Literal["arm"] = "arm"
-    mass: Vector3 = (1.0, 1.0, 0.002)
-    stiffness: Vector3 = (300.0, 300.0, 1.0)
-    damping: Vector3 = (10.0, 10.0, 0.02)
-    grip_stiffness: Vector3 = (2000.0, 2000.0, 5.0)
-    grip_damping: Vector3 = (20.0, 20.0, 0.05)
+    mass: Inertia = (1.0, 1.0, 0.002)
+    stiffness: Stiffness = (300.0, 300.0, 1.0)
+    damping: Damping = (10.0, 10.0, 0.02)
+    grip_stiffness: Stiffness = (2000.0, 2000.0, 5.0)
+    grip_damping: Damping = (20.0, 20.0, 0.05)
     target: tuple[tuple[float, float, float, float], ...]
 
 
@@ -320,8 +325,8 @@ class SpringHand:
     rows (t s, x m, y m, theta rad), linear, held after."""
 
     type: Literal["spring"] = "spring"
-    stiffness: Vector3
-    damping: Vector3 | None = None
+    stiffness: Stiffness
+    damping: Damping | None = None
     target: tuple[tuple[float, float, float, float], ...] = ((0.0, 0.0, 0.0, 0.0),)
 
 

@@ -61,7 +61,7 @@ class Advancer:
         ]
         self._order = min((ORDER.get(c.hold or "", 1) for c in between), default=1)
         ours = [c for c in system.connections if c.hold and {c.source, c.target} & {*plants}]
-        self._holds = [live.holds[c.name] for c in ours]
+        self._holds = [*(live.holds[c.name] for c in ours), *live.springs]
         self._bonds = []
         for c in between:
             if found := bond(c, system, board):
@@ -139,6 +139,8 @@ class Advancer:
     def _save(self) -> Any:
         for instance in self._instances:
             instance.save(SLOT)
+        # What never changes of a hold, where it stands and how ticks are told, are functions: not
+        # copied. A spring's account is shared, and goes back in its place.
         holds = [deepcopy(vars(hold)) for hold in self._holds]
         return self._values.copy(), holds, self._meters.mark(deep=True)
 

@@ -1,14 +1,36 @@
-"""What the shape of [iteration] and [step_control] cannot say; each yields (path, message)."""
+"""What the shape of `coupling`, [iteration] and [step_control] cannot say."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
+from hapticlink.orchestrator.faults import Finding
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.ticks import exact
 from hapticlink.orchestrator.toml_lines import Path
 
+if TYPE_CHECKING:
+    from hapticlink.orchestrator.system import Connection, Unit
+
 Problem = tuple[Path, str]
+
+
+def unfit(
+    scene: Scene, units: Iterable[Unit], connections: Iterable[Connection]
+) -> Iterator[Finding]:
+    """That nothing is there for `coupling = "iterated"` to iterate or interpolate."""
+    plants = {u.name: u.clock for u in units if not u.sampled}
+    between = any(
+        c.source in plants and plants[c.source] == plants.get(c.target) and not c.initial
+        for c in connections
+    )
+    if scene.coupling == "iterated" and not between:
+        yield scene.place(
+            ("coupling",),
+            "'iterated' makes connected plants of one rate agree at the end of their step, and "
+            "there are none: take it out (docs/coupling.md)",
+        )
 
 
 def check(scene: Scene) -> Iterator[Problem]:

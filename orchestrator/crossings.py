@@ -10,10 +10,12 @@ account of energy goes, as a default, to every connection across clocks that car
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from hapticlink.orchestrator.conversion import BASES
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.kinds import KINDS
 from hapticlink.orchestrator.iteration import INTERPOLATING
@@ -74,6 +76,19 @@ def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
     """Whether an entry of a connection does."""
     power = tuple(power)
     return any(paired(c, entry, power) for entry in c.inputs)
+
+
+def turns(c: Connection, units: Mapping[str, Unit]) -> dict[int, float]:
+    """A whole turn in the unit of each entry of a connection that is an angle: 2 pi / factor, where
+    its only base unit is rad; 2 pi where the source tells no unit."""
+    source = units[c.source].description
+    found = {i: source.unit(s) for i, s in enumerate(c.outputs)}
+    angle = tuple(int(b == "rad") for b in BASES)
+    return {
+        i: math.tau / (unit.factor if unit else 1.0)
+        for i, unit in found.items()
+        if unit is None or unit.base == angle or (unit.base is None and unit.name == "rad")
+    }
 
 
 def derivative(c: Connection, units: Mapping[str, Unit]) -> str | None:
@@ -185,7 +200,8 @@ def _misfit(
         )
     if needs == "power" and not carries_power(c, power):
         return (
-            f"{c.name} carries no power: no [[power]] pairs {c.target}.{c.target_port} with a "
-            "displacement, so there is no energy to keep account of"
+            f"it carries no power that is known: write a [[power]] that pairs the effort "
+            f"{c.target}.{c.target_port} with a displacement (docs/holds.md, Energy), or take "
+            "another hold"
         )
     return None

@@ -2,7 +2,7 @@
 
 held  = sum F_held,j . (x_{j+1} - x_j)               over the target's steps
 ideal = sum (F_n + F_{n+1})/2 . (x(t_{n+1}) - x(t_n))   over the source's samples
-made  = held - ideal
+made  = held - ideal,   most = the largest that made was at any sample
 
 Each held effort is paired with the displacement that follows it: a spring K sampled with a
 zero-order hold makes 1/2 K sum dx^2 (paired with the displacement before it, the same leak would
@@ -36,6 +36,7 @@ class Energy:
     held: float
     ideal: float
     until: float
+    most: float
 
 
 class _Sums(NamedTuple):
@@ -46,6 +47,7 @@ class _Sums(NamedTuple):
     ideal: float
     sample: int
     row: int
+    most: float
 
 
 class Meter:
@@ -61,7 +63,7 @@ class Meter:
         self._ticks: list[int] = []
         self._moves: list[Vector] = []
         self._efforts: list[Vector] = []
-        self._work = self._ideal = 0.0
+        self._work = self._ideal = self._most = 0.0
         self._full = ROWS
 
     def sample(self, stamp: int) -> None:
@@ -104,10 +106,10 @@ class Meter:
     def energy(self, seconds: float) -> Energy:
         """The account; `seconds` is the base."""
         if not self._stamps or not self._ticks:
-            return Energy(0.0, 0.0, 0.0, 0.0)
+            return Energy(0.0, 0.0, 0.0, 0.0, 0.0)
         book = self._book()
         until = self._stamps[book.sample] * seconds
-        return Energy(book.work - book.ideal, book.work, book.ideal, until)
+        return Energy(book.work - book.ideal, book.work, book.ideal, until, book.most)
 
     def _book(self) -> _Sums:
         """All sums up to the newest sample that the target has moved past."""
@@ -123,20 +125,24 @@ class Meter:
             done = np.array(self._efforts[: len(ticks) - 1]) * np.diff(x, axis=0)
             work[1:] = done.sum(axis=1).cumsum()
         there = np.stack([np.interp(stamps, ticks, column) for column in x.T], axis=1)
-        ideal = ((efforts[:-1] + efforts[1:]) / 2 * np.diff(there, axis=0)).sum()
+        ideal = np.zeros(len(stamps))
+        done = (efforts[:-1] + efforts[1:]) / 2 * np.diff(there, axis=0)
+        ideal[1:] = done.sum(axis=1).cumsum()
+        held = np.interp(stamps, ticks, work)
         return _Sums(
-            self._work + float(np.interp(stamps[-1], ticks, work)),
+            self._work + float(held[-1]),
             self._work + float(work[row]),
-            self._ideal + float(ideal),
+            self._ideal + float(ideal[-1]),
             sample,
             row,
+            max(self._most, float((held - ideal).max()) + self._work - self._ideal),
         )
 
     def _fold(self) -> None:
         """Forget the rows that are summed up; where a slow source keeps them, allow for more."""
         if self._stamps:
             book = self._book()
-            self._work, self._ideal = book.work_at_row, book.ideal
+            self._work, self._ideal, self._most = book.work_at_row, book.ideal, book.most
             del self._stamps[: book.sample], self._samples[: book.sample]
             del self._ticks[: book.row], self._moves[: book.row], self._efforts[: book.row]
         self._full = max(ROWS, 2 * len(self._ticks))

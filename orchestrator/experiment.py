@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import platform
-import tempfile
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from hapticlink.orchestrator import scene_file, told
+from hapticlink.orchestrator import folders, rooms, scene_file, told, watchdog
 from hapticlink.orchestrator.blocks import blocks, fmu_files
 from hapticlink.orchestrator.faults import Fault
+from hapticlink.orchestrator.instances import isolated
 from hapticlink.orchestrator.plan import Plan
 from hapticlink.orchestrator.rates import VariableRate
 from hapticlink.orchestrator.results import Results, load, write_json, write_over
 from hapticlink.orchestrator.run import Outcome, Progress, run
 from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.schemes import order
 from hapticlink.orchestrator.stamps import delays
 from hapticlink.orchestrator.system import System, from_scene
 from hapticlink.orchestrator.timeline import timeline
@@ -57,16 +58,19 @@ def simulate(
     begin = perf_counter()
     read = scene if isinstance(scene, Scene) else scene_file.load(scene, options)
     folder = Path(folder)
-    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
+    with rooms.room() as room:
         time = timeline(read)
-        system = from_scene(read, time, fmu_files(read, time, Path(room)))
+        system = from_scene(read, time, fmu_files(read, time, room))
         plan = Plan(system)
         ages = delays(plan)  # makes all blocks: a ring of sampled blocks is found here
         built = perf_counter() - begin
-        folder.mkdir(parents=True, exist_ok=True)
+        folders.clear(folders.made(folder))
         story = _story(read, system, options) | {"delays": {k: asdict(v) for k, v in ages.items()}}
         write_json(folder / "run.json", story | {"end": {"reason": "running"}}, ROOM)
-        outcome = run(plan, folder, progress)
+        alone = isolated(system.units)
+        risky = any(fmu.name not in alone for fmu in read.fmu)
+        with watchdog.beside(folder) if risky else nullcontext():
+            outcome = run(plan, folder, progress)
     try:
         write_json(folder / "run.json", story | _ending(system, outcome, built))
     except OSError as error:
@@ -88,11 +92,13 @@ def _story(scene: Scene, system: System, options: Sequence[str]) -> dict[str, An
         "versions": {name: version(name) for name in (*PACKAGES, *_compilers(scene))}
         | {"python": platform.python_version()},
         "seeds": _seeds(scene, system),
+        "files": ["run.json", *(f"{c.name}.csv" for c in system.timeline.clocks)],
         "rates": [c.name for c in system.timeline.clocks],
         "clocks": told.clocks(system.timeline),
         "base": f"{base.numerator}/{base.denominator} s",
         "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.units},
         "coupling": system.coupling,
+        "loops": [asdict(loop) for loop in order.loops(system)],
         "connections": [c.name for c in system.connections],
     } | told.holds(system)
 
@@ -110,9 +116,14 @@ def _seeds(scene: Scene, system: System) -> dict[str, int]:
 
 def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
     fault = outcome.fault
+    failed = fault and {
+        "kind": type(fault).__name__,
+        "time": getattr(fault, "time", None),
+        "message": str(fault),
+    }
     return {
         "end": {"reason": outcome.reason, "time": outcome.end_time},
-        "fault": None if fault is None else {"kind": type(fault).__name__, "message": str(fault)},
+        "fault": failed,
         "calls": outcome.calls,
         "links": outcome.links,
         "isolated": outcome.isolated,

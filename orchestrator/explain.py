@@ -8,19 +8,29 @@ from dataclasses import fields
 from itertools import groupby
 
 from hapticlink.orchestrator.plan import Plan
+from hapticlink.orchestrator.schemes import order
 from hapticlink.orchestrator.schemes.operations import Event, Operation, Repeat
 from hapticlink.orchestrator.stamps import uses
 from hapticlink.orchestrator.system import System
-from hapticlink.orchestrator.ticks import Clock
+from hapticlink.orchestrator.ticks import Clock, exact
 
-ROWS = 600
+LEGEND = """\
+Time is counted in ticks. What is done at an instant is a block; instants of one kind share one:
+  get        read an FMU's outputs              set      write an FMU's inputs
+  push       give a hold the newest sample      step     an FMU's doStep, over `dticks` ticks
+  evaluate   ask a hold for its value           record   write a row of a rate's table
+`ahead n`: for a time n ticks after the instant. More: docs/holds.md, docs/coupling.md.
+"""
+PRINTED = 600
+"""Events of a table that somebody reads off a screen."""
 
 
-def explain(plan: Plan, rows: int = ROWS) -> Iterator[str]:
-    """Clocks, the block of each kind of event, then a table up to the end of the first hyperperiod
-    in which all phases have begun, or of the first `rows` events."""
+def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
+    """Clocks, the block of each kind of event, then a table of the whole run, or of as much of it
+    as tells the rest (`_last`); of the first `rows` events where it is to be cut."""
     system, timeline = plan.system, plan.system.timeline
     base = timeline.base
+    yield LEGEND
     yield f"ticks of {base.numerator}/{base.denominator} s, {system.coupling}"
     for clock in timeline.clocks:
         units = ", ".join(
@@ -30,37 +40,42 @@ def explain(plan: Plan, rows: int = ROWS) -> Iterator[str]:
         )
         yield f"  {clock.name}: {_steps(clock)}: {units}"
     yield from _holds(system)
-    until, names = _shown(plan, rows)
+    for loop in order.loops(system):
+        yield f"  loop {loop.ring}: {', '.join(loop.fmus)} in this order"
+    last, names = _last(system), dict[Event, str]()
+    events: dict[int, str] = {}
+    cut = False
+    for tick, event in plan:
+        if tick > last or (cut := len(events) == rows):
+            break
+        events[tick] = names.setdefault(event, _letters(len(names)))
     yield ""
     for event, name in names.items():
         yield f"block {name}: {_kind(event)}"
         yield from _lines(plan.block(event), "  ")
     yield ""
     yield "tick, time (s), block, FMU that is set: each input @ the tick its newest sample is of"
-    events = {tick: names[event] for tick, event in plan if tick <= until}
     connections = {c.name: c for c in system.connections}
-    made = ((u.tick, connections[u.connection], u.stamp) for u in uses(plan, until))
+    made = ((u.tick, connections[u.connection], u.stamp) for u in uses(plan, max(events)))
     for (tick, target), group in groupby(made, key=lambda use: (use[0], use[1].target)):
         inputs = " ".join(f"{c.target_port}@{stamp}" for _, c, stamp in group)
         yield f"{tick:>8}  {timeline.seconds(tick):<12.9g} {events[tick]:<3} {target}: {inputs}"
+    if cut:
+        yield f"cut after {rows} events; a run writes them all to plan.txt"
 
 
-def _shown(plan: Plan, rows: int) -> tuple[int, dict[Event, str]]:
-    """The last tick to show, and a name for each kind of event until then."""
-    clocks = plan.system.timeline.clocks
-    until = plan.system.timeline.end
+def _last(system: System) -> int:
+    """The last tick of the table: that of the first hyperperiod in which all phases have begun and
+    constant latencies are over, the end of a run in which nothing comes round."""
+    timeline = system.timeline
+    clocks, late = timeline.clocks, [c.latency for c in system.connections if c.latency]
+    drawn = any(way.loss or way.max not in (None, way.min) for way in late)
     periods = [c.period for c in clocks if c.period]
-    if len(periods) == len(clocks):
-        begun = max(c.first % c.longest for c in clocks)
-        until = min(until, begun + math.lcm(*periods))
-    names: dict[Event, str] = {}
-    last = 0
-    for count, (tick, event) in enumerate(plan):
-        if count >= rows or tick > until:
-            break
-        last = tick
-        names.setdefault(event, _letters(len(names)))
-    return last, names
+    if drawn or len(periods) < len(clocks):
+        return timeline.end
+    begun = max(c.first % c.longest for c in clocks)
+    begun += max((math.ceil(exact(way.min) / timeline.base) for way in late), default=0)
+    return min(timeline.end, begun + math.lcm(*periods))
 
 
 def _letters(n: int) -> str:

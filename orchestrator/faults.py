@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 
@@ -20,21 +21,36 @@ class InputFault(Fault):
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault of a scene: where (dotted key), on which line or by which option, what."""
+    """One fault of a scene: where (dotted key), on which line or by which option, what. `file` is
+    that of a scene which this one extends."""
 
     key: str
     message: str
     line: int | None = None
     option: str | None = None
+    file: str = ""
 
     def __str__(self) -> str:
-        place = self.option or (f"line {self.line}" if self.line else "")
+        line = f"line {self.line}" if self.line else ""
+        place = self.option or ", ".join(part for part in (self.file, line) if part)
         return ": ".join(part for part in (place, self.key, self.message) if part)
 
 
 def unplaced(path: Sequence[str | int], message: str) -> Finding:
     """A finding in a scene that no file wrote."""
     return Finding(".".join(map(str, path)), message)
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """The nearest of what there is, or all of it."""
+    known = list(known)
+    found = difflib.get_close_matches(name, known, 1)
+    return f"did you mean {found[0]!r}?" if found else f"there are {', '.join(known) or 'none'}"
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    """That there is no `kind` of this name, with the nearest that there is."""
+    return f"no {kind} {name!r}; {near(name, known)}"
 
 
 class SceneFault(InputFault):
@@ -63,12 +79,13 @@ class FmuFault(Fault):
         self.fmu, self.what, self.time, self.messages = fmu, what, time, tuple(messages)
         self.passing = passing
         said = "".join(f"\n  {fmu} says: {m}" for m in messages)
-        super().__init__(f"{fmu}: {what} at t = {time!r} s{said}")
+        super().__init__(f"{fmu}: {what} at t = {time:.6g} s{said}")
 
 
 class Interrupted(Fault):
-    """The user ended the run (Ctrl-C)."""
+    """The user ended the run (Ctrl-C), at a time (s) or before it began."""
 
-    def __init__(self, time: float) -> None:
+    def __init__(self, time: float | None = None) -> None:
         self.time = time
-        super().__init__(f"interrupted at t = {time!r} s")
+        when = "before the run" if time is None else f"at t = {time:.6g} s"
+        super().__init__(f"interrupted {when}")

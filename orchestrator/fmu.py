@@ -12,7 +12,6 @@ import ctypes
 import os
 import shutil
 import sys
-import tempfile
 import time as clock
 from collections.abc import Callable, Sequence
 from itertools import count
@@ -22,6 +21,7 @@ import numpy as np
 from fmpy import extract, fmi2
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator import rooms
 from hapticlink.orchestrator.conversion import SAME
 from hapticlink.orchestrator.description import Description
 from hapticlink.orchestrator.directional import Matrix, derivatives
@@ -89,7 +89,7 @@ class Instance:
         self._status = 0
         self._slave: Any = None
         self._key = next(_keys)
-        self._folder = folder or tempfile.mkdtemp(prefix="hapticlink-")
+        self._folder = folder or rooms.new()
 
     def __enter__(self) -> Instance:
         try:

@@ -3,12 +3,12 @@ against the FMUs themselves. Each check yields (path in the file, message with r
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path as FilePath
 
 from hapticlink.orchestrator.blocks import blocks
+from hapticlink.orchestrator.faults import unknown
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.toml_lines import Path
@@ -41,11 +41,3 @@ def check(scene: Scene) -> Iterator[Problem]:
             yield ("connection", i, "factor"), "0.0 passes nothing on: take the connection out"
     if scene.faults.timeout <= 0:
         yield ("faults", "timeout"), f"{scene.faults.timeout} s: a timeout is more than 0"
-
-
-def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """That there is no `kind` of this name, with the nearest that there is."""
-    known = list(known)
-    near = difflib.get_close_matches(name, known, 1)
-    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known) or 'none'}"
-    return f"no {kind} {name!r}; {hint}"

@@ -8,7 +8,7 @@ import numpy as np
 
 from hapticlink.orchestrator.board import Board
 from hapticlink.orchestrator.bonds import bond, reader
-from hapticlink.orchestrator.crossings import derivative
+from hapticlink.orchestrator.crossings import derivative, turns
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.hold import Hold, Vector
 from hapticlink.orchestrator.holds.kinds import Projector, Semidefinite, Unwrapped
@@ -19,10 +19,11 @@ from hapticlink.orchestrator.springs import Spring, spring
 from hapticlink.orchestrator.system import Connection, System
 
 
-def make_holds(system: System, board: Board) -> dict[str, Hold]:
-    """By connection; those that set one spring share its account."""
+def make_holds(system: System, board: Board) -> tuple[dict[str, Hold], list[SetPoint]]:
+    """By connection; and the accounts of springs, each shared by those that set it."""
     shared: dict[Spring, SetPoint] = {}
-    return {c.name: make_hold(c, system, board, shared) for c in system.connections if c.hold}
+    holds = {c.name: make_hold(c, system, board, shared) for c in system.connections if c.hold}
+    return holds, [*shared.values()]
 
 
 def make_hold(
@@ -38,8 +39,8 @@ def make_hold(
     elif connection.kind == "semidefinite" and not kind.gives_samples:
         hold = Semidefinite(lambda: kind(site), size)
     elif connection.kind == "angle":
-        angles = [i for i, s in enumerate(connection.outputs) if s.unit in ("rad", None)]
-        hold = Unwrapped(lambda: kind(site), angles)
+        turned = turns(connection, system.unit)
+        hold = Unwrapped(lambda: kind(site), list(turned), list(turned.values()))
     if connection.latency:
         hold = Late(hold, Link(connection.latency, system.timeline.base))
     if kind.needs == "derivative" and (name := derivative(connection, system.unit)):
@@ -53,6 +54,7 @@ class _Beside:
 
     def __init__(self, hold: Hold, derivative: Callable[[], Vector]) -> None:
         self._hold, self._derivative, self.value = hold, derivative, hold.value
+        self.link: Link | None = getattr(hold, "link", None)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._hold.push(stamp, np.concatenate([sample, self._derivative()]), arrival)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from hapticlink.orchestrator import jacobians
+from hapticlink.orchestrator import jacobians, start_checks
 from hapticlink.orchestrator.board import Board
 from hapticlink.orchestrator.faults import FmuFault
 from hapticlink.orchestrator.fixed_points import Matrix, Newton, Vector
@@ -61,8 +61,8 @@ def initialize(system: System, instances: Mapping[str, Instance], board: Board) 
             break
     else:
         _solve(system, instances, board, agree & np.isfinite(values), first, sweep)
+    start_checks.require_finite(instances)
     for instance in instances.values():
-        instance.require_finite()
         instance.exit_initialization()
 
 

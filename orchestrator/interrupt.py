@@ -19,10 +19,21 @@ class Flag:
         return self.raised
 
 
+came = Flag()
+"""A signal before a run: told by KeyboardInterrupt, and kept, as an import that catches everything
+may lose that."""
+
+
+def remember(number: int, frame: FrameType | None) -> None:
+    came.raised = True
+    raise KeyboardInterrupt
+
+
 @contextmanager
 def watch() -> Iterator[Flag]:
     """Within, the first signal raises the flag; a second one acts as it did before."""
     flag = Flag()
+    flag.raised = bool(came)
     if threading.current_thread() is not threading.main_thread():
         yield flag  # only the main thread gets signals
         return

@@ -12,7 +12,6 @@ from hapticlink.orchestrator.holding import make_holds
 from hapticlink.orchestrator.initialize import initialize
 from hapticlink.orchestrator.instances import instance, isolated
 from hapticlink.orchestrator.isolated import Isolated
-from hapticlink.orchestrator.latency import Late
 from hapticlink.orchestrator.meters import Meters
 from hapticlink.orchestrator.results import Recorder
 from hapticlink.orchestrator.scalars import Scalar
@@ -49,7 +48,7 @@ class Live:
             made = instance(unit, view, system.faults, unit.name in self.isolated)
             self.instances[unit.name] = stack.enter_context(made)
         stack.callback(self._dismiss)
-        self.holds = make_holds(system, self.board)
+        self.holds, self.springs = make_holds(system, self.board)
         self.meters = Meters(system, self.board)
         self.setters: dict[str, Call] = {}
         self.varying_setters: dict[str, Call] = {}
@@ -103,9 +102,11 @@ class Live:
 
     def links(self) -> dict[str, dict[str, int]]:
         """What became of the samples of connections with a latency."""
-        late = {n: h.link for n, h in self.holds.items() if isinstance(h, Late)}
+        links = {n: getattr(h, "link", None) for n, h in self.holds.items()}
         return {
-            n: {"sent": k.sent, "lost": k.lost, "overtaken": k.overtaken} for n, k in late.items()
+            n: {"sent": k.sent, "lost": k.lost, "overtaken": k.overtaken}
+            for n, k in links.items()
+            if k
         }
 
 

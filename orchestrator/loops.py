@@ -154,7 +154,7 @@ class Loop:
         worst = int(np.argmax(np.where(np.isnan(shares), np.inf, shares)))
         other = "newton" if self._settings.method == "aitken" else "more iterations (most)"
         raise Unconverged(
-            f"{self._names[worst]} does not converge at t = {self._seconds(tick)!r} s: after "
+            f"{self._names[worst]} does not converge at t = {self._seconds(tick):.6g} s: after "
             f"{found.iterations} iterations ({self._settings.method}) its value at the end of the "
             f"step is {found.point[worst]:.9g} where the FMUs give "
             f"{found.point[worst] + found.residual[worst]:.9g}; take a higher rate, or in "

@@ -1,9 +1,10 @@
-"""What further hands and the local model need. Each check yields (path in the file, message)."""
+"""What further hands, the local model and `packaging` need; each yields (path, message)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hapticlink.orchestrator.blocks import blocks
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.toml_lines import Path
 
@@ -12,6 +13,11 @@ Problem = tuple[Path, str]
 
 def check(scene: Scene) -> Iterator[Problem]:
     yield from _points(scene)
+    if scene.packaging == "native" and not blocks(scene):
+        message = (
+            "'native' compiles the scene's own blocks, and every FMU here is ready: take it out"
+        )
+        yield ("packaging",), message
     if not scene.local_model:
         return
     here: Path = ("local_model",)

@@ -2,27 +2,38 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from typing import Any
 
-from hapticlink.orchestrator.faults import InputFault
-from hapticlink.orchestrator.toml_lines import Path
+from hapticlink.orchestrator.faults import InputFault, unknown
+from hapticlink.orchestrator.scene_keys import whole
+from hapticlink.orchestrator.toml_lines import ASSIGNMENT, Path, parts
 
 
 def parse(option: str) -> tuple[tuple[str, ...], Any]:
     """The names of the dotted key, and the value as TOML or else as text.
 
-    Raises InputFault where there is no `=` or no key.
+    The key is one of TOML, names in quotes too: `holds."virtual_environment.P_c"=lead` is
+    `holds.virtual_environment.P_c=lead`. Raises InputFault where there is no `=` or no key.
     """
-    key, equals, text = option.partition("=")
-    names = tuple(name.strip() for name in key.split("."))
+    names, equals, text = _key(option)
     if not equals or not all(names):
         raise InputFault(f"--set {option}: write key=value, e.g. --set graphics.rate=10")
     try:
         return names, tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return names, text.strip()
+
+
+def _key(option: str) -> tuple[tuple[str, ...], str, str]:
+    """(names of the key, "=" or nothing, text of the value)."""
+    if match := ASSIGNMENT.match(option):
+        try:
+            return parts(match[1].strip()), "=", option[match.end() :]
+        except tomllib.TOMLDecodeError:
+            pass  # such as a vector's entry, `fmu.plant.start.x[1]`
+    key, equals, text = option.partition("=")
+    return tuple(name.strip() for name in key.split(".")), equals, text
 
 
 def apply(data: dict[str, Any], option: str) -> Path:
@@ -32,6 +43,7 @@ def apply(data: dict[str, Any], option: str) -> Path:
     `linkage.body.link1.mass=2`. Raises InputFault where there is no such entry.
     """
     names, value = parse(option)
+    names = whole(names)
     node: Any = data
     path: Path = ()
     new: Path | None = None
@@ -57,6 +69,4 @@ def _entry(entries: list[Any], name: str, option: str) -> int:
     known = [str(e.get("name", i)) for i, e in enumerate(entries) if isinstance(e, dict)]
     if name in known:
         return known.index(name)
-    near = difflib.get_close_matches(name, known, 1)
-    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-    raise InputFault(f"--set {option}: no entry {name!r}; {hint}")
+    raise InputFault(f"--set {option}: {unknown('entry', name, known)}")

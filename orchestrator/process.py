@@ -20,6 +20,14 @@ WATCH = 0.05
 """Seconds between two looks at the clock."""
 
 
+# Ctrl-C in the terminal goes to the caller alone, which ends the run and then this process.
+_APART: Any = (
+    {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
+    if sys.platform == "win32"
+    else {"start_new_session": True}
+)
+
+
 class Died(Exception):
     """The process ended without an answer; says how."""
 
@@ -30,7 +38,9 @@ class Process:
     def __init__(self, module: str) -> None:
         # -P: the worker's imports do not depend on the folder that the user stands in.
         command = [sys.executable, "-P", "-m", module]
-        self._popen = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self._popen = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **_APART
+        )
         assert self._popen.stdin is not None
         assert self._popen.stdout is not None
         self._requests, self._answers = self._popen.stdin, self._popen.stdout

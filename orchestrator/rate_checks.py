@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hapticlink.orchestrator.blocks import blocks
-from hapticlink.orchestrator.foreign_checks import unknown
+from hapticlink.orchestrator.faults import unknown
 from hapticlink.orchestrator.rates import AnyRate, Rate, Seconds, VariableRate
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.ticks import exact

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,62 +16,43 @@ from pydantic_core import to_json
 
 from hapticlink.orchestrator.faults import InputFault
 
-CHUNK = 256
-"""Rows kept before they are written: half a second of a 512 Hz run."""
-
 Vector = NDArray[np.float64]
 
 
 class Recorder:
     """Rows of one CSV: `time` and the values of a view, as the shortest text that reads back
-    to the same float. A context manager; rows left in memory are written at its end."""
+    to the same float. A context manager. Each row is on its way to the disk when `row` returns, so
+    that a crash loses none; chunks would save no time, which goes into the digits. `last` is the
+    time of the last whole row."""
 
     def __init__(self, path: Path, columns: Sequence[str], view: Vector) -> None:
-        self._rows = np.zeros((CHUNK, 1 + len(view)))
-        self._view, self._next, self.last, self._safe = view, 0, 0.0, 0.0
+        self._view, self.last = view, 0.0
         self._file = path.open("wb", buffering=0)
         self._write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
 
     def row(self, time: float) -> None:
-        row = self._rows[self._next]
-        row[0] = self.last = time
-        row[1:] = self._view
-        self._next += 1
-        if self._next == CHUNK:
-            self.flush()
-
-    def flush(self) -> None:
-        if self._next:
-            # pydantic's JSON writes floats ten times faster than repr, and round-trips too.
-            text = to_json(self._rows[: self._next].tolist(), inf_nan_mode="constants")
-            self._next = 0  # rows that a full disk refuses are not tried again
-            self._write(text[2:-2].replace(b"],[", b"\n") + b"\n")
-            self._safe = self.last
+        # pydantic's JSON writes floats ten times faster than repr, and round-trips too.
+        text = to_json([time, *self._view.tolist()], inf_nan_mode="constants")
+        self._write(text[1:-1] + b"\n")
+        self.last = time
 
     def _write(self, text: bytes) -> None:
-        """All of `text`; or, where the disk is full, the whole lines of it that fit, and `last`
-        is the last of them."""
+        """All of `text`; or nothing, where the disk is full."""
         whole = self._file.tell()
         try:
             left = memoryview(text)
             while left:
                 left = left[self._file.write(left) :]
         except OSError:
-            fit = text.rfind(b"\n", 0, self._file.tell() - whole) + 1
             with suppress(OSError):  # what is no file, as /dev/full, has no length
-                self._file.truncate(whole + fit)
-            rows = text.count(b"\n", 0, fit)
-            self.last = float(self._rows[rows - 1, 0]) if rows else self._safe
+                self._file.truncate(whole)
             raise
 
     def __enter__(self) -> Recorder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        try:
-            self.flush()
-        finally:
-            self._file.close()
+        self._file.close()
 
 
 def _quoted(name: str) -> str:
@@ -107,18 +88,22 @@ def _text(content: Mapping[str, Any]) -> bytes:
 class Table(Mapping[str, Vector]):
     """The columns of one rate. `table["device.x"]` stacks `device.x[1]`, `device.x[2]`, ...
 
-    into (rows, n), a matrix into (rows, n, m); a full name gives its column, (rows,).
+    into (rows, n), a matrix into (rows, n, m); a full name gives its column, (rows,). `others` are
+    the tables of the same run.
     """
 
     columns: tuple[str, ...]
     rows: Vector
+    others: Mapping[str, Table] = field(default_factory=dict, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Vector:
         if name in self.columns:
             return self.rows[:, self.columns.index(name)]
         entries = [(i, c) for i, c in enumerate(self.columns) if c.startswith(f"{name}[")]
         if not entries:
-            raise KeyError(f"no signal {name!r}; there are {', '.join(self.columns)}")
+            there = [other for other, table in self.others.items() if name in table]
+            found = f"; it is in tables[{there[0]!r}]" if there else ""
+            raise KeyError(f"no signal {name!r}{found}; there are {', '.join(self.columns)}")
         last = entries[-1][1]
         shape = tuple(int(n) for n in last[len(name) + 1 : -1].split(","))
         return self.rows[:, [i for i, _ in entries]].reshape(-1, *shape)
@@ -157,15 +142,18 @@ def load(folder: Path | str) -> Results:
         run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError) as error:
         raise InputFault(f"{folder}: not the folder of a run: {error}") from error
-    return Results(folder, run, {name: read_table(folder / f"{name}.csv") for name in run["rates"]})
+    tables: dict[str, Table] = {}
+    for name in run["rates"]:
+        tables[name] = read_table(folder / f"{name}.csv", tables)
+    return Results(folder, run, tables)
 
 
-def read_table(path: Path) -> Table:
-    """One CSV of a run."""
+def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
+    """One CSV of a run, whose other tables are `others`."""
     import csv
 
     with path.open(encoding="utf-8", newline="") as file:
         columns = tuple(next(csv.reader([file.readline()])))
         rows = file.readlines()
     values = np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.zeros((0, len(columns)))
-    return Table(columns, values)
+    return Table(columns, values, {} if others is None else others)

@@ -3,9 +3,8 @@ tables that need each other. Each check yields (path in the file, message with r
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from hapticlink.components.specs import Linkage
 from hapticlink.orchestrator import (
@@ -17,6 +16,7 @@ from hapticlink.orchestrator import (
     rate_checks,
 )
 from hapticlink.orchestrator.conditions import parse_condition
+from hapticlink.orchestrator.faults import unknown
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.latency import Latency
 from hapticlink.orchestrator.scene import Scene
@@ -37,13 +37,6 @@ def check(scene: Scene) -> list[Problem]:
     return found
 
 
-def _unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    known = list(known)
-    near = difflib.get_close_matches(name, known, 1)
-    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known) or 'none'}"
-    return f"no {kind} {name!r}; {hint}"
-
-
 def _numbers(scene: Scene) -> Iterator[Problem]:
     if scene.duration <= 0:
         yield ("duration",), f"{scene.duration} s: a run takes more than 0 s"
@@ -60,9 +53,9 @@ def _numbers(scene: Scene) -> Iterator[Problem]:
 
 def _holds(scene: Scene) -> Iterator[Problem]:
     if scene.hold not in HOLDS:
-        yield ("hold",), _unknown("hold", scene.hold, HOLDS)
+        yield ("hold",), unknown("hold", scene.hold, HOLDS)
     if scene.downsampling not in ("latest", "mean"):
-        message = _unknown("downsampling", scene.downsampling, ("latest", "mean"))
+        message = unknown("downsampling", scene.downsampling, ("latest", "mean"))
         yield ("downsampling",), message
     for name, steps in scene.substeps.items():
         if steps < 1:
@@ -71,7 +64,7 @@ def _holds(scene: Scene) -> Iterator[Problem]:
         yield from _latency(("delays", name), late)
     for connection, hold in scene.holds.items():
         if hold not in HOLDS:
-            yield ("holds", connection), _unknown("hold", hold, HOLDS)
+            yield ("holds", connection), unknown("hold", hold, HOLDS)
 
 
 def _latency(path: Path, late: float | Latency) -> Iterator[Problem]:
@@ -128,17 +121,17 @@ def _linkage(linkage: Linkage) -> Iterator[Problem]:
     for i, loop in enumerate(linkage.loop):
         for k, name in enumerate(loop.bodies):
             if name not in frames:
-                yield (*here, "loop", i, "bodies", k), _unknown("body", name, frames)
+                yield (*here, "loop", i, "bodies", k), unknown("body", name, frames)
         if loop.bodies[0] == loop.bodies[1]:
             yield (*here, "loop", i, "bodies"), "a loop joins two different bodies"
     if linkage.operational_point.body not in bodies:
-        message = _unknown("body", linkage.operational_point.body, bodies)
+        message = unknown("body", linkage.operational_point.body, bodies)
         yield (*here, "operational_point", "body"), message
     types = {j.name: j.type for j in linkage.joint}
     for table in ("start", "start_velocity"):
         for name, value in getattr(linkage, table).items():
             if name not in types:
-                yield (*here, table, name), _unknown("joint", name, types)
+                yield (*here, table, name), unknown("joint", name, types)
             elif isinstance(value, tuple) != (types[name] == "free"):
                 wanted = "three numbers" if types[name] == "free" else "one number"
                 yield (*here, table, name), f"{value!r}: a {types[name]} joint takes {wanted}"
@@ -157,7 +150,7 @@ def _tree(linkage: Linkage, frames: list[str]) -> Iterator[Problem]:
         names.add(joint.name)
         for end in ("parent", "child"):
             if getattr(joint, end) not in frames:
-                yield (*path, end), _unknown("body", getattr(joint, end), frames)
+                yield (*path, end), unknown("body", getattr(joint, end), frames)
         if joint.child == "ground":
             yield (*path, "child"), "ground cannot be a child: turn the joint around"
         elif joint.child in parents:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -11,24 +11,28 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator import families, overrides, scene_checks
-from hapticlink.orchestrator.faults import Finding, SceneFault
+from hapticlink.orchestrator.faults import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.frame_trace import frame_times
 from hapticlink.orchestrator.scene import Scene, adapter
+from hapticlink.orchestrator.scene_keys import flat, flatten
 from hapticlink.orchestrator.scene_names import find, folder_of
 from hapticlink.orchestrator.scene_problems import beyond, problems
-from hapticlink.orchestrator.scene_tables import document, flat, tables_of, traced, with_family
-from hapticlink.orchestrator.toml_lines import Path, key_lines, line_of
+from hapticlink.orchestrator.scene_tables import document, tables_of, traced, with_family
+from hapticlink.orchestrator.toml_lines import Path, Place, place_of
 
 
 def load(scene: str, options: Sequence[str] = ()) -> Scene:
     """Find, change by `options` (`key=value`) and check a scene: a file, a shipped one, an SSP."""
     if scene.endswith(".ssp"):
-        from hapticlink.orchestrator import ssp_read  # its XML parsers take a while to load
+        from hapticlink.orchestrator import ssp, ssp_read  # its XML parsers take a while to load
 
         data = ssp_read.tables(FilePath(scene))
         keys = {overrides.parse(o)[0] for o in options}
         needed = [("duration", "3")] * ("duration" not in data)
         needed += [("haptics.rate", "100")] * ("haptics" not in data)
+        if fixed := sorted(k for k in keys if ssp.is_fixed(k)):
+            say = "the FMUs of an SSP are made: change its scene and export that again"
+            raise SceneFault(scene, [Finding(".".join(k), say) for k in fixed])
         if missing := [n for n in needed if tuple(n[0].split(".")) not in keys]:
             say = "neither it nor its FMUs' DefaultExperiment say: give e.g. --set {}={}"
             raise SceneFault(scene, [Finding(key, say.format(key, v)) for key, v in missing])
@@ -42,22 +46,26 @@ def read(
 ) -> Scene:
     """The scene that `text` writes, its relative paths from `folder`. Raises SceneFault with every
     finding, InputFault for an option that cannot be applied."""
-    return from_tables(document(text, name, folder), options, name, key_lines(text))
+    data, places = document(text, name, folder)
+    return from_tables(data, options, name, places)
 
 
 def from_tables(
-    data: dict[str, Any], options: Sequence[str], name: str, lines: dict[Path, int]
+    data: dict[str, Any], options: Sequence[str], name: str, places: Mapping[Path, Place]
 ) -> Scene:
-    """The scene of the tables `data`, whose keys stand on `lines`; faults as of `read`."""
+    """The scene of the tables `data`, whose keys stand at `places`; faults as of `read`."""
     which = [o for o in options if families.is_argument(overrides.parse(o)[0])]
     set_by = {overrides.apply(data, option): option for option in which}
-    data = with_family(data, name, lines, set_by)
+    data = with_family(data, name, places, set_by)
     set_by |= {overrides.apply(data, o): o for o in options if o not in which}
-    for table in ("holds", "delays", "kinds"):
-        if isinstance(data.get(table), dict):
-            data[table] = dict(flat(data[table]))
-    for recorded in traced(data):
-        recorded["rate"] = frame_times(FilePath(recorded["rate"]["trace"]))
+    flatten(data)
+    wrong: list[tuple[Path, str]] = []
+    for path, recorded in traced(data):
+        try:
+            recorded["rate"] = frame_times(FilePath(recorded["rate"]["trace"]))
+        except InputFault as fault:
+            wrong.append(((*path, "rate"), str(fault)))
+            del recorded["rate"]
     for fmu in tables_of(data, "fmu"):
         if isinstance(fmu.get("start"), dict):
             fmu["start"] = dict(flat(fmu["start"]))
@@ -67,15 +75,17 @@ def from_tables(
         for length in range(len(path), 0, -1):
             if path[:length] in set_by:
                 return Finding(key, message, option=f"--set {set_by[path[:length]]}")
-        return Finding(key, message, line=line_of(path, lines))
+        file, line = place_of(path, places)
+        return Finding(key, message, line or None, file=file)
 
     try:
         # As JSON, because strict JSON takes arrays for tuples and still refuses "1" for 1.
         found = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
     except pydantic.ValidationError as error:
-        found_there = problems(error.errors(include_url=False), data)
-        found_there += beyond(found_there, data)
-        raise SceneFault(name, [place(*problem) for problem in found_there]) from None
+        wrong += problems(error.errors(include_url=False), data)
+    if wrong:
+        wrong += beyond(wrong, data)
+        raise SceneFault(name, [place(*problem) for problem in wrong])
     if findings := [place(path, message) for path, message in scene_checks.check(found)]:
         raise SceneFault(name, findings)
     if found.device and found.device.sensing != found.sensing:

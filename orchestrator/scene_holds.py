@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from hapticlink.orchestrator import power, springs
-from hapticlink.orchestrator.crossings import Refused, Rules, names
-from hapticlink.orchestrator.faults import Finding
+from hapticlink.orchestrator.crossings import Refused, Rules, names, turns
+from hapticlink.orchestrator.faults import Finding, near
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.latency import Latency
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.toml_lines import Path
@@ -44,14 +45,22 @@ def unfit(
     found = [c for c in connections if not c.initial]
     for table in ("holds", "delays", "kinds"):
         for key in getattr(scene, table):
-            if not any(key in names(c) for c in found):
-                known = ", ".join(c.name for c in found) or "none"
-                message = f"is no connection of this scene; there are {known}"
-                yield scene.place((table, key), message)
-    for r in refused:
-        if r.key:
-            path: Path = ("hold",) if r.key == "hold" else ("holds", r.key)
-            yield scene.place(path, f"{r.hold!r} does not fit {r.connection.name}: {r.reason}")
+            known = list(dict.fromkeys(name for c in found for name in names(c)))
+            if key not in known:
+                hint = near(key, known)
+                if hint.startswith("there are"):
+                    hint = f"there are {', '.join(c.name for c in found) or 'none'}"
+                yield scene.place((table, key), f"is no connection of this scene; {hint}")
+    for key, kind in scene.kinds.items():
+        for c in (c for c in found if kind == "angle" and key in names(c)):
+            if not turns(c, by_name):
+                units_of = ", ".join(dict.fromkeys(str(s.unit) for s in c.outputs))
+                message = (
+                    f"{c.source}.{c.source_port} is in {units_of}, which is no angle: give the "
+                    "unit a BaseUnit of rad alone, or leave the kind out"
+                )
+                yield scene.place(("kinds", key), message)
+    yield from _refused(scene, refused)
     for name in scene.substeps:
         if name not in by_name or by_name[name].sampled:
             plants = ", ".join(u.name for u in by_name.values() if not u.sampled)
@@ -64,6 +73,35 @@ def unfit(
     for i, p in enumerate(scene.power):
         yield from _power(scene, i, p, by_name)
     yield from springs.unfit(scene, by_name)
+
+
+NOWHERE = {
+    "spring": "no held connection sets a spring whose energy is known. One does in "
+    "closed-loop-direct, whose poses reach the mechanism's far end of F_drift; [[spring]] names "
+    "those of other FMUs (docs/holds.md, pspm)",
+    "power": "no connection across rates carries power that is known. One does in "
+    "closed-loop-direct; [[power]] names those of other FMUs (docs/holds.md, Energy)",
+}
+
+
+def _refused(scene: Scene, refused: Iterable[Refused]) -> Iterator[Finding]:
+    """Holds that do not fit, each where the scene asks for it. A default that fits nowhere is told
+    where it nearly does, or else once."""
+    wires = {f"{w.from_} -> {w.to}": i for i, w in enumerate(scene.connection) if w.hold}
+    sets = springs.springs_of(scene)
+    asked = [r for r in refused if r.key]
+    default = [r for r in asked if r.key == "hold" and HOLDS[r.hold].needs in NOWHERE]
+    nearly = [
+        r for r in default if HOLDS[r.hold].needs == "spring" and springs.spring(r.connection, sets)
+    ]
+    if default and not nearly:
+        hold, needs = default[0].hold, HOLDS[default[0].hold].needs
+        yield scene.place(("hold",), f"{hold!r} fits nowhere here: {NOWHERE[needs or '']}")
+    for r in asked:
+        if r in nearly or r not in default:
+            path: Path = ("hold",) if r.key == "hold" else ("holds", r.key or "")
+            path = ("connection", wires[r.key], "hold") if r.key in wires else path
+            yield scene.place(path, f"{r.hold!r} does not fit {r.connection.name}: {r.reason}")
 
 
 def _power(

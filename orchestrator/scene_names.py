@@ -17,9 +17,10 @@ def shipped() -> dict[str, Any]:
     return {entry.name.removesuffix(".toml"): entry for entry in sorted(names, key=str)}
 
 
-def find(scene: str) -> tuple[str, str]:
-    """(name, text) of a scene: a path, or the name of a shipped one."""
-    path, known = FilePath(scene), shipped()
+def find(scene: str, folder: FilePath | None = None) -> tuple[str, str]:
+    """(name, text) of a scene: a path from `folder`, or the name of a shipped one. Raises
+    InputFault."""
+    path, known = (folder or FilePath()) / scene, shipped()
     if path.is_file():
         try:
             return path.stem, path.read_text(encoding="utf-8")
@@ -32,6 +33,7 @@ def find(scene: str) -> tuple[str, str]:
     raise InputFault(f"{scene}: neither a file nor a shipped scene; {hint}")
 
 
-def folder_of(scene: str) -> FilePath | None:
-    """Where the file of a scene lies; None for a shipped one."""
-    return FilePath(scene).parent if FilePath(scene).is_file() else None
+def folder_of(scene: str, folder: FilePath | None = None) -> FilePath | None:
+    """Where the file of a scene lies, seen from `folder`; None for a shipped one."""
+    path = (folder or FilePath()) / scene
+    return path.parent if path.is_file() else None

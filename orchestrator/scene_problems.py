@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import copy
-import difflib
 import typing
 from collections.abc import Sequence
-from dataclasses import MISSING, fields, is_dataclass
 from typing import Any
 
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator import scene_checks
-from hapticlink.orchestrator.scene import Scene, adapter
+from hapticlink.orchestrator import scene_checks, scene_shapes
+from hapticlink.orchestrator.faults import near, unknown
+from hapticlink.orchestrator.scene import adapter
 from hapticlink.orchestrator.toml_lines import Path
 
 
@@ -21,48 +20,89 @@ def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
     """pydantic's errors as (path in the file, message), unions folded into one each."""
     by_path: dict[Path, list[Any]] = {}
     for error in errors:
-        path: Path = ()
-        node = data
-        for i, part in enumerate(error["loc"]):
-            inside = isinstance(node, dict) and part in node
-            inside |= isinstance(node, list) and isinstance(part, int) and part < len(node)
-            if inside:
-                node = node[part]
-                path = (*path, part)
-            elif error["type"] == "missing" and i == len(error["loc"]) - 1:
-                path = (*path, part)
-        by_path.setdefault(path, []).append(error)
+        path = _path(error, data)
+        if path is not None:
+            by_path.setdefault(path, []).append(error)
     found = []
     for at, group in by_path.items():
         deeper = any(len(other) > len(at) and other[: len(at)] == at for other in by_path)
-        if deeper and all(error["type"].endswith("_type") for error in group):
+        if deeper and all(e["type"].endswith(("_type", "literal_error")) for e in group):
             continue  # the other branches of a union whose right branch says more below
-        found.append((at, " or ".join(dict.fromkeys(_message(e, at) for e in group))))
+        unlimited = [e for e in group if e["type"] == "finite_number"]
+        told = (_message(e, at, data) for e in unlimited or group)
+        found.append((at, " or ".join(dict.fromkeys(told))))
     return found
 
 
+def _path(error: Any, data: Any) -> Path | None:
+    """Where in the file an error is; None for one of a branch that the table's `type` is not."""
+    path: Path = ()
+    node = data
+    for i, part in enumerate(error["loc"]):
+        inside = isinstance(node, dict) and part in node
+        inside |= isinstance(node, list) and isinstance(part, int) and part < len(node)
+        if inside:
+            node = node[part]
+            path = (*path, part)
+        elif error["type"] == "missing" and i == len(error["loc"]) - 1:
+            path = (*path, part)
+        else:
+            kinds = scene_shapes.at(path)
+            names = {k.__name__ for k in scene_shapes.chosen(kinds, node)}
+            if part in {k.__name__ for k in kinds} - names:
+                return None
+    return (*path, "type") if error["type"] == "union_tag_invalid" else path
+
+
 def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str]]:
-    """What the later checks find once every faulty value is taken out, or is 1 where one is
-    needed; nothing where that makes no scene."""
-    whole = copy.deepcopy(data)
-    for filled in (None, 1.0):
-        for path, _ in known:
-            node = _at(whole, path[:-1])
-            if isinstance(node, list):
-                place = typing.cast("int", path[-1])
-                node += [filled] * (place + 1 - len(node))  # too short a vector
-                node[place] = filled
-            elif isinstance(node, dict) and filled is None:
-                node.pop(path[-1], None)
-            elif isinstance(node, dict) and _is_needed(path):
-                node[path[-1]] = filled
+    """What the later checks find once every faulty value is taken out, or has a stand-in where
+    one is needed; nothing where that makes no scene, or where a name is missing by which other
+    tables speak of this one."""
+    whole, told = copy.deepcopy(data), {path for path, _ in known}
+    # A table that is of no known kind is wrong as a whole.
+    untyped = [path for path, _ in known if path[-1:] == ("type",) and _is_kind(path[:-1])]
+    wrong = [path[:-1] if path in untyped else path for path, _ in known if path]
+    for path in wrong:
+        node = _at(whole, path[:-1])
+        if isinstance(node, dict):
+            node.pop(path[-1], None)
+    for path in wrong:
+        node, filled = _at(whole, path[:-1]), _stand_in(path)
+        if isinstance(node, list):
+            place = typing.cast("int", path[-1])
+            node += [filled] * (place + 1 - len(node))  # too short a vector
+            node[place] = filled
+        elif isinstance(node, dict) and (
+            (*path, "type") in untyped or scene_shapes.is_needed(path)
+        ):
+            node[path[-1]] = filled
     try:
         document = to_json(whole, inf_nan_mode="constants")
         found = scene_checks.check(adapter().validate_json(document))
     except pydantic.ValidationError:
         return []
-    told = {path for path, _ in known}
     return [problem for problem in found if problem[0] not in told]
+
+
+def _is_kind(path: Path) -> bool:
+    """Whether the record at `path` is one of several, by its `type`."""
+    return sum(bool(scene_shapes.types(kind)) for kind in scene_shapes.at(path)) > 1
+
+
+def _stand_in(path: Path) -> Any:
+    """A value of the right kind that makes no fault elsewhere, None where there is none."""
+    kinds = scene_shapes.at(path)
+    if float in kinds or int in kinds:
+        return 1
+    if str in kinds:
+        return "" if path[-1] not in ("name", "child") else None
+    for kind in kinds:
+        if scene_shapes.types(kind):
+            needed = ((*path, key) for key in scene_shapes.keys([kind]))
+            return {p[-1]: _stand_in(p) for p in needed if scene_shapes.is_needed(p, kind)}
+        if typing.get_origin(kind) is tuple and Ellipsis not in typing.get_args(kind):
+            return [_stand_in((*path, 0)) for _ in typing.get_args(kind)]
+    return None
 
 
 def _at(data: Any, path: Path) -> Any:
@@ -75,54 +115,31 @@ def _at(data: Any, path: Path) -> Any:
     return data
 
 
-def _is_needed(path: Path) -> bool:
-    """Whether the key at `path` has no default."""
-    records = (kind for kind in _tables(path[:-1]) if is_dataclass(kind))
-    return any(
-        f.name.rstrip("_") == path[-1] and f.default is MISSING and f.default_factory is MISSING
-        for kind in records
-        for f in fields(kind)
-    )
-
-
-def _message(error: Any, path: Path) -> str:
+def _message(error: Any, path: Path, data: Any) -> str:
     kind, value = error["type"], error["input"]
     if kind == "missing":
         return "is missing"
     if kind == "unexpected_keyword_argument":
-        known = _keys(path[:-1])
-        near = difflib.get_close_matches(str(path[-1]), known, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(sorted(known))}"
-        return f"unknown key; {hint}"
+        return _unknown_key(path, error["loc"], data)
+    if kind == "union_tag_invalid":
+        known = [t for k in scene_shapes.at(path[:-1]) for t in scene_shapes.types(k)]
+        return unknown("type", error["ctx"]["tag"], known)
+    if kind == "finite_number":
+        return f"{value!r}: give a finite number"
+    if kind in ("tuple_type", "too_long") and (wanted := scene_shapes.vector(path)):
+        return f"{value!r} should be {wanted}"
     message = error["msg"].removeprefix("Input should be ").replace("an object", "a table")
     return f"{value!r} should be {message}" if message != error["msg"] else f"{value!r}: {message}"
 
 
-def _keys(path: Path) -> set[str]:
-    """The keys that the table at `path` may have, in any branch of a union."""
-    kinds = (kind for kind in _tables(path) if is_dataclass(kind))
-    return {f.name.rstrip("_") for kind in kinds for f in fields(kind)}  # `from_` is a keyword
-
-
-def _tables(path: Path) -> list[Any]:
-    """The types that the value at `path` may have."""
-    kinds: list[Any] = [Scene]
-    for part in path:
-        below: list[Any] = []
-        for kind in kinds:
-            if is_dataclass(kind) and isinstance(part, str):
-                hints = typing.get_type_hints(kind, include_extras=True)
-                below += _branches(hints[part]) if part in hints else []
-            elif isinstance(part, int):
-                below += _branches(typing.get_args(kind)[0]) if typing.get_args(kind) else []
-        kinds = below
-    return kinds
-
-
-def _branches(kind: Any) -> list[Any]:
-    """The members of a union, annotations taken off."""
-    if typing.get_origin(kind) is typing.Annotated:
-        return _branches(typing.get_args(kind)[0])
-    if is_dataclass(kind) or typing.get_origin(kind) is tuple:
-        return [kind]
-    return [branch for member in typing.get_args(kind) for branch in _branches(member)]
+def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
+    """That a table has no such key, or that only one of another type has."""
+    kinds, table, key = scene_shapes.at(path[:-1]), _at(data, path[:-1]), str(path[-1])
+    types = {name: k for k in kinds for name in scene_shapes.types(k)}
+    branch = loc[-2] if len(loc) > 1 else None  # where the table has no type: the default's
+    this = table.get("type", branch) if isinstance(table, dict) else branch
+    owners = [repr(name) for name, k in types.items() if key in scene_shapes.keys([k])]
+    if this in types and owners:
+        return f"`{key}` belongs to type {' or '.join(owners)}, not {this!r}"
+    known = scene_shapes.keys([types[this]] if this in types else kinds)
+    return f"unknown key; {near(key, sorted(known))}"

@@ -67,8 +67,8 @@ def misfit(
     found = spring(c, springs)
     if found is None:
         return (
-            f"{c.name} sets no spring: no [[spring]] has {_end(c)} as its set_position or "
-            "set_velocity, so the energy that a sample switches is not known"
+            f"it sets no spring whose energy is known: write a [[spring]] with {_end(c)} as its "
+            "set_position or set_velocity (docs/holds.md, pspm), or take another hold"
         )
     fmu, _, name = found.position.partition(".")
     near = next((k for k in connections if _end(k) == found.position and not k.initial), None)

@@ -21,7 +21,16 @@ NOT_IN_ANNOTATION = frozenset(
 )
 """Keys of a scene that its FMUs and the structure itself say; graphics keeps its rate."""
 
+
 SCALAR = {"Boolean": "Boolean", "String": "String", "Real": "Real"}
+
+
+def is_fixed(names: tuple[str, ...]) -> bool:
+    """Whether the key of these names made the FMUs, which an option comes too late to change."""
+    if names[0] == "graphics":
+        return len(names) > 1 and names[1] not in ("rate", "align", "phase")
+    made = NOT_IN_ANNOTATION - {"fmu", "connection"} | {"hands", "local_model"}
+    return names[0] in made
 
 
 def type_of(fmi_type: str) -> str:

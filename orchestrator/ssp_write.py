@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 
 import pydantic
 
+from hapticlink.orchestrator import folders
 from hapticlink.orchestrator.blocks import blocks
 from hapticlink.orchestrator.conversion import BASES
 from hapticlink.orchestrator.rates import AnyRate
@@ -41,7 +42,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 def write(scene: Scene, system: System, target: Path) -> Path:
     """Write `target`, whole or not at all; the same scene gives the same bytes."""
-    target.parent.mkdir(parents=True, exist_ok=True)
+    folders.made(target.parent)
     unfinished = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
     try:
         with zipfile.ZipFile(unfinished, "w") as archive:

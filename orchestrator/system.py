@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from hapticlink.orchestrator import haptic_loop, step_sizes
+from hapticlink.orchestrator import coupling_checks, haptic_loop, step_sizes
 from hapticlink.orchestrator.blocks import blocks
 from hapticlink.orchestrator.conditions import Condition, parse_condition
 from hapticlink.orchestrator.crossings import Refused, assign
@@ -129,6 +129,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     rules = rules_of(scene, {_between(e): e.hold for e in ends if e.hold})
     made, refused = assign(units, connected, timeline, rules)
     findings += [*unfit(scene, units, made, refused), *step_sizes.unfit(scene, units, timeline)]
+    findings += coupling_checks.unfit(scene, units, made)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(units, condition):
         message = f"{condition}: there is no such output"

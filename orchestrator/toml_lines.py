@@ -1,11 +1,14 @@
-"""On which line of a TOML file a key stands."""
+"""The keys of a TOML file: the names of a dotted one, and the line on which each stands."""
 
 from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 
 Path = tuple[str | int, ...]
+Place = tuple[str, int]
+"""File ("" for the scene itself) and line."""
 
 _TOKEN = re.compile(
     r'"""(?:\\.|[^\\])*?"""(?:"{0,2})'  # multi-line strings may hold anything
@@ -16,7 +19,7 @@ _TOKEN = re.compile(
     r"|[\[\]{}\n]",
     re.DOTALL,
 )
-_ASSIGNMENT = re.compile(r"""\s*((?:[\w-]+|"(?:\\.|[^"\\])*"|'[^']*'|\s*\.\s*)+)\s*=""")
+ASSIGNMENT = re.compile(r"""\s*((?:[\w-]|"(?:\\.|[^"\\])*"|'[^']*'|\s*\.\s*)+)\s*=""")
 
 
 def _statements(text: str) -> list[tuple[int, str]]:
@@ -33,8 +36,8 @@ def _statements(text: str) -> list[tuple[int, str]]:
     return found
 
 
-def _parts(dotted: str) -> tuple[str, ...]:
-    """The names of a dotted key, quoted ones too."""
+def parts(dotted: str) -> tuple[str, ...]:
+    """The names of a dotted key, quoted ones too. Raises tomllib.TOMLDecodeError."""
     node = tomllib.loads(f"{dotted} = 0")
     names = []
     while isinstance(node, dict):
@@ -63,27 +66,27 @@ def key_lines(text: str) -> dict[Path, int]:
     for number, statement in _statements(text):
         stripped = statement.split("\n")[0].strip()
         if stripped.startswith("[["):
-            names = _parts(stripped[2 : stripped.index("]]")])
+            names = parts(stripped[2 : stripped.index("]]")])
             array = (*resolve(names[:-1]), names[-1])
             counts[array] = counts.get(array, 0) + 1
             table = (*array, counts[array] - 1)
             lines.setdefault(array, number)
             lines[table] = number
         elif stripped.startswith("["):
-            table = resolve(_parts(stripped[1 : stripped.rindex("]")]))
+            table = resolve(parts(stripped[1 : stripped.rindex("]")]))
             lines.setdefault(table, number)
-        elif match := _ASSIGNMENT.match(statement):
+        elif match := ASSIGNMENT.match(statement):
             path = table
-            for name in _parts(match[1]):
+            for name in parts(match[1]):
                 path = (*path, name)
                 lines.setdefault(path, number)
     return lines
 
 
-def line_of(path: Path, lines: dict[Path, int]) -> int | None:
-    """The line of `path`, or of the nearest table that holds it."""
+def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
+    """Where `path` stands, or the nearest table that holds it; line 0 where none does."""
     while path:
-        if path in lines:
-            return lines[path]
+        if path in places:
+            return places[path]
         path = path[:-1]
-    return None
+    return "", 0

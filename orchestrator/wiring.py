@@ -10,9 +10,8 @@ from pathlib import Path as FilePath
 
 from hapticlink.orchestrator.conversion import SAME, Linear, conversion
 from hapticlink.orchestrator.description import Description, describe
-from hapticlink.orchestrator.faults import Finding, InputFault
+from hapticlink.orchestrator.faults import Finding, InputFault, unknown
 from hapticlink.orchestrator.foreign import ForeignFmu, Value, Wire
-from hapticlink.orchestrator.foreign_checks import unknown
 from hapticlink.orchestrator.scalars import Scalar
 from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.starts import fitting
@@ -86,7 +85,16 @@ class Wiring:
         if named and not scalars:
             what = named[0].causality
             what = what if named[0].variability != "constant" else f"constant {what}"
-            self._find(path, f"{name} cannot be set: its causality is {what}")
+            hint = ""
+            if start:
+                others = (
+                    ", ".join(dict.fromkeys(s.port for s in found.scalars if able(s))) or "none"
+                )
+                hint = (
+                    ", and the FMU gives it no start of its own (initial exact or approx); what "
+                    f"takes a start: {others}"
+                )
+            self._find(path, f"{name} cannot be set: its causality is {what}{hint}")
         elif not scalars:
             known = dict.fromkeys(s.port for s in filter(able, (*found.scalars, *found.strings)))
             self._find(path, unknown("input or parameter", name, known))

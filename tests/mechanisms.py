@@ -48,66 +48,93 @@ def open_arm(linkage):
 
 
 @st.composite
-def linkages(draw, max_bodies=6, max_loops=3, prismatic=True):
-    """(linkage, q, qd): a random tree of revolute and prismatic joints whose loops close at q."""
-    number = draw(st.integers(1, max_bodies))
+def linkages(draw, max_bodies=8, max_loops=3):
+    """(linkage, q, qd): a random tree of revolute and prismatic joints whose loops close at q.
+
+    Each loop has two bodies of its own, hung between two that are there already and closed where
+    their columns of W stand across each other. Columns of later loops have no entry in the rows of
+    earlier ones: W is block triangular and of full rank.
+    """
+    loops = min(draw(st.sampled_from([0, 1, 1, 2, 2, 3, 3])), max_loops, (max_bodies - 1) // 2)
+    singles = draw(st.integers(1, max_bodies - 2 * loops))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    tree = _Growing(rng)
+    tree.hang("ground")
+    for pair in rng.permutation([False] * (singles - 1) + [True] * loops):
+        if pair:
+            tree.close(*rng.choice(list(tree.frames), 2, replace=False))
+        else:
+            tree.hang(rng.choice(list(tree.frames)))
+    names = [body.name for body in tree.bodies]
+    linkage = Linkage(
+        body=tuple(tree.bodies),
+        joint=tuple(tree.joints),
+        loop=tuple(tree.loops),
+        operational_point=OperationalPoint(body=str(rng.choice(names)), at=tree.point()),
+        start={joint.name: value for joint, value in zip(tree.joints, tree.q, strict=True)},
+    )
+    return linkage, np.array(tree.q), rng.uniform(-2, 2, len(names))
 
-    def point():
-        return tuple(float(v) for v in rng.uniform(-0.5, 0.5, 2))
 
-    names = [f"b{i}" for i in range(number)]
-    bodies, joints, frames, q = [], [], {"ground": (np.zeros(2), 0.0)}, []
-    for i, name in enumerate(names):
-        parent = ["ground", *names][rng.integers(0, i + 1)]
-        kind = "prismatic" if prismatic and rng.random() < 0.25 else "revolute"
-        a, b, axis = point(), point(), float(rng.uniform(-3, 3))
+class _Growing:
+    """Bodies and joints added at random, with the frames (origin, angle) that they have at q."""
+
+    def __init__(self, rng):
+        self.rng, self.frames = rng, {"ground": (np.zeros(2), 0.0)}
+        self.bodies, self.joints, self.loops, self.q = [], [], [], []
+
+    def point(self):
+        return tuple(float(v) for v in self.rng.uniform(-0.5, 0.5, 2))
+
+    def hang(self, parent, slides=True):
+        """A body on `parent`: its name, and what moves a point x of it: dx/dq."""
+        rng, name = self.rng, f"b{len(self.q)}"
+        kind = "prismatic" if slides and rng.random() < 0.25 else "revolute"
+        a, b, axis = self.point(), self.point(), float(rng.uniform(-3, 3))
         value = float(rng.uniform(-0.3, 0.3) if kind == "prismatic" else rng.uniform(-3, 3))
-        bodies.append(
-            Body(
-                name=name,
-                mass=float(rng.uniform(0.2, 2)),
-                inertia=float(rng.uniform(0.01, 0.1)),
-                center=point(),
-            )
-        )
-        joints.append(
+        mass, inertia = float(rng.uniform(0.2, 2)), float(rng.uniform(0.01, 0.1))
+        self.bodies.append(Body(name=name, mass=mass, inertia=inertia, center=self.point()))
+        self.joints.append(
             Joint(
-                name=f"j{i}",
+                name=f"j{len(self.q)}",
                 type=kind,
-                parent=parent,
+                parent=str(parent),
                 child=name,
                 at_parent=a,
                 at_child=b,
                 axis=axis,
             )
         )
-        origin, angle = frames[parent]
+        self.q.append(value)
+        origin, angle = self.frames[parent]
         pivot = origin + _turn(angle) @ a
+        along = _turn(angle) @ (math.cos(axis), math.sin(axis))
         if kind == "prismatic":
-            pivot = pivot + value * _turn(angle) @ (math.cos(axis), math.sin(axis))
+            pivot = pivot + value * along
         else:
             angle += value
-        frames[name] = (pivot - _turn(angle) @ b, angle)
-        q.append(value)
-    loops = []
-    # Fewer closures than coordinates leaves something that moves.
-    for _ in range(draw(st.integers(0, min(max_loops, (number - 1) // 2)))):
-        first, second = rng.choice(["ground", *names], 2, replace=False)
-        a = point()
-        origin, angle = frames[str(first)]
-        world = origin + _turn(angle) @ a
-        origin, angle = frames[str(second)]
-        b = tuple(float(v) for v in _turn(angle).T @ (world - origin))
-        loops.append(Loop(bodies=(str(first), str(second)), at=(a, b)))
-    linkage = Linkage(
-        body=tuple(bodies),
-        joint=tuple(joints),
-        loop=tuple(loops),
-        operational_point=OperationalPoint(body=names[rng.integers(0, number)], at=point()),
-        start={f"j{i}": v for i, v in enumerate(q)},
-    )
-    return linkage, np.array(q), rng.uniform(-2, 2, number)
+        self.frames[name] = (pivot - _turn(angle) @ b, angle)
+        if kind == "prismatic":
+            return name, lambda x: along
+        return name, lambda x: _turn(math.pi / 2) @ (x - pivot)
+
+    def close(self, first, second):
+        """Two bodies between `first` and `second`: both in a row, or one on each."""
+        one, moved_by_one = self.hang(first)
+        in_a_row = self.rng.random() < 0.5
+        other, moved_by_other = self.hang(
+            one if in_a_row else second, slides=self.joints[-1].type == "revolute"
+        )
+        pair = (other, str(second)) if in_a_row else (one, other)
+        while True:
+            at = self.point()
+            x = self.frames[pair[0]][0] + _turn(self.frames[pair[0]][1]) @ at
+            W = np.column_stack([moved_by_one(x), moved_by_other(x)])
+            if np.linalg.cond(W) < 10:
+                break
+        origin, angle = self.frames[pair[1]]
+        there = tuple(float(v) for v in _turn(angle).T @ (x - origin))
+        self.loops.append(Loop(bodies=pair, at=(at, there)))
 
 
 def _turn(angle):

@@ -1,7 +1,7 @@
 """Springs and dampers between two points: force k (d - d_0) + b d' along their distance d.
 
 V = 1/2 k (d - d_0)^2. Without a free length, V = 1/2 k d^2 has no square root, and so no
-singularity where the points meet.
+singularity where the points meet. With one, the force has no direction there, and is none.
 """
 
 from __future__ import annotations
@@ -15,6 +15,9 @@ from hapticlink.components.specs import Linkage
 
 if TYPE_CHECKING:
     from hapticlink.components.linkage import LinkageModel
+
+
+MET = 1e-200  # m2, of d^2: the points are in one place
 
 
 def _name(linkage: Linkage, index: int) -> str:
@@ -55,7 +58,7 @@ def energy(model: LinkageModel) -> ca.SX | None:
         name, span = _name(model.linkage, i), _span(model, i)
         squared = ca.dot(span, span)
         if s.length is not None:
-            squared = (ca.sqrt(squared) - model.p[f"{name}.length"]) ** 2
+            squared = (ca.sqrt(ca.fmax(squared, MET)) - model.p[f"{name}.length"]) ** 2
         stored.append(0.5 * model.p[f"{name}.stiffness"] * squared)
     return sum(stored[1:], start=stored[0]) if stored else None
 
@@ -69,7 +72,7 @@ def efforts(model: LinkageModel) -> ca.SX | None:
         span = _span(model, i)
         rate = model.rate(span)
         if s.length is not None:  # along the distance only
-            rate = span * ca.dot(span, rate) / ca.dot(span, span)
+            rate = span * ca.dot(span, rate) / ca.fmax(ca.dot(span, span), MET)
         b = model.p[f"{_name(model.linkage, i)}.damping"]
         found.append(-ca.jacobian(span, model.q).T @ (b * rate))
     return sum(found[1:], start=found[0]) if found else None

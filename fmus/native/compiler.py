@@ -52,7 +52,7 @@ def compiler_version() -> str:
     except PackageNotFoundError:
         raise FmuError(
             "native FMUs are compiled with ziglang, which is not installed: "
-            "pip install 'hapticlink[native]', or take packaging = \"python\""
+            "pip install '.[native]' in the checkout, or take packaging = \"python\""
         ) from None
 
 

@@ -12,18 +12,25 @@ from cyclopts import Parameter
 from hapticlink.orchestrator.commands.options import Out
 from hapticlink.orchestrator.faults import InputFault
 
+BENCHES = {
+    "mechanism": "benchmarks.run:mechanism_bench",
+    "singular": "benchmarks.singular:bench",
+    "local-model": "benchmarks.local_model:bench",
+}
+
 
 def bench(
-    what: Literal["mechanism"],
+    what: Literal["mechanism", "singular", "local-model"],
     /,
     *,
     out: Out = None,
     quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
 ) -> int:
-    """Run time against error of the mechanism, with the multibody codes that are installed.
+    """Run time against error of the mechanism, with the multibody codes that are installed; its
+    error over many rates where it runs through singular poses; what the local model costs.
 
-    Writes a page, CSV tables and figures to OUT (default results/mechanism). Interrupted, it goes
-    on where it stopped.
+    Writes a page with tables and figures to OUT (default results/<what>). Interrupted, it goes on
+    where it stopped.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -31,7 +38,8 @@ def bench(
     root = checkout()
     sys.path.insert(0, str(root))
     # By name: the package's own checks never see what is not in it.
-    mechanism_bench = importlib.import_module("benchmarks.run").mechanism_bench
+    module, _, name = BENCHES[what].partition(":")
+    make = getattr(importlib.import_module(module), name)
     folder = out or root / "results" / what
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:
@@ -41,8 +49,8 @@ def bench(
             bar.update(task, description=text, completed=done, total=total)
 
         command = f"hapticlink bench {what}{' --quick' * quick}"
-        mechanism_bench(folder, quick, told, command)
-    print(f"{folder}/: README.md, table.csv, error-against-run-time.png, growth.png")
+        make(folder, quick, told, command)
+    print(folder / "README.md")
     return 0
 
 

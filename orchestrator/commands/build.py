@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -22,17 +20,18 @@ def build(
 ) -> int:
     """Build the FMUs of a scene into OUT (default fmus/<scene>), one file a block."""
     from hapticlink.fmus.native import PLATFORMS
-    from hapticlink.orchestrator import blocks, scene_file, timeline
+    from hapticlink.orchestrator import blocks, folders, rooms, scene_file, timeline
     from hapticlink.orchestrator.faults import InputFault
 
     read = scene_file.load(scene, set or ())
     if all_platforms and read.packaging != "native":
         raise InputFault("--all-platforms compiles: add --set packaging=native")
     platforms = PLATFORMS if all_platforms else ()
-    folder = out or default_folder("fmus", scene)
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
+    if not blocks.blocks(read):
+        raise InputFault(f"{scene}: nothing to build: its FMUs are given as files")
+    folder = folders.made(out or default_folder("fmus", scene))
+    with rooms.room() as room:
         time = timeline.timeline(read)
-        for name, path in blocks.fmu_files(read, time, Path(room), platforms).items():
+        for name, path in blocks.fmu_files(read, time, room, platforms).items():
             print(shutil.copy(path, folder / f"{name}.fmu"))
     return 0

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hapticlink.orchestrator.commands.options import Scene, Set
@@ -16,7 +14,16 @@ if TYPE_CHECKING:
 def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
     """Tell what a scene consists of: rates, FMUs, connections, holds; what it needs and leaves out,
     and what that saves. Without SCENE, list the shipped scenes."""
-    from hapticlink.orchestrator import blocks, scene_file, scene_names, stamps, system, timeline
+    from hapticlink.orchestrator import (
+        assembled,
+        blocks,
+        rooms,
+        scene_file,
+        scene_names,
+        stamps,
+        system,
+        timeline,
+    )
     from hapticlink.orchestrator.plan import Plan
 
     if scene is None:
@@ -25,10 +32,13 @@ def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
         return 0
     read = scene_file.load(scene, set or ())
     time = timeline.timeline(read)
-    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
-        made = system.from_scene(read, time, blocks.fmu_files(read, time, Path(room)))
+    with rooms.room() as room:
+        made = system.from_scene(read, time, blocks.fmu_files(read, time, room))
+        start = assembled.at_start(made) if read.linkage and read.linkage.loop else []
     print(f"{read.title}\n{read.description.strip()}".strip())
     print(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
+    for line in assembled.moved(asdict(read.linkage), start) if read.linkage and start else ():
+        print(f"  {line}")
     for unit in made.units:
         timing = unit.description.timing
         print(f"  {unit.name}: {timing}, at {unit.clock}, {len(unit.description.outputs)} outputs")

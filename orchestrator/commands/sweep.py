@@ -50,9 +50,11 @@ def sweep(
     """Run many variants of a scene in parallel; write table.csv and sweep.png to OUT (default
     sweeps/<scene>).
 
-    A run that fails is a row of the table. A sweep that is interrupted goes on where it was when
+    A run that fails is a row of the table; where every run is refused the exit status is 2, where
+    every run fails 1. A sweep that is interrupted goes on where it was when
     it is called again; runs made before are not made twice.
     """
+    from hapticlink.orchestrator import folders
     from hapticlink.orchestrator.commands.progress import counted
     from hapticlink.orchestrator.faults import InputFault
     from hapticlink.orchestrator.sweep import figure, grid, job, row
@@ -64,8 +66,9 @@ def sweep(
         raise InputFault(f"--jobs {jobs}: give 1 or more")
     points = grid.listed(runs) if runs else grid.grid([grid.parse(text) for text in vary or ()])
     made = job.jobs(scene, set or (), points)
-    folder = out or default_folder("sweeps", scene)
-    folder.mkdir(parents=True, exist_ok=True)
+    if metric:
+        figure.check(metric, [j.scene for j in made if j.scene])
+    folder = folders.made(out or default_folder("sweeps", scene))
     with counted(scene, len(made)) as tell:
         rows = make(made, folder, jobs or os.cpu_count() or 1, scheduler, tell)
     keys = list(dict.fromkeys(k for p in points for k in p))
@@ -73,7 +76,9 @@ def sweep(
     for each in failed[:10]:
         what = ", ".join(f"{k}={v}" for k, v in each.items() if k in keys)
         print(f"hapticlink: {what}: {each['end']}: {each['message']}", file=sys.stderr)
-    print(f"{scene}: {len(rows)} runs, {len(failed)} of them failed")
+    print(f"{default_folder('sweeps', scene).name}: {len(rows)} runs, {len(failed)} of them failed")
     drawn = figure.draw(rows, keys, folder, metric)
     print(f"  {folder}/: table.csv{', ' if drawn else ''}{drawn or ''}")
-    return 0
+    if len(failed) < len(rows):
+        return 0
+    return InputFault.exit_status if all(r["end"] == row.REFUSED for r in rows) else 1

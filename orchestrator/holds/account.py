@@ -5,11 +5,15 @@ By axis, each held force paired with the displacement that follows it:
 made(t) = sum F_held dx - sum (F_{k-1} + F_k)/2 (x(t_k) - x(t_{k-1})) - F_n (x(t) - x(t_n))
 
 The ideal source is straight in the displacement between samples, which is exact for a spring;
-what it does after the newest sample, t_n, is not known yet and taken as F_n's work.
+what it does after the newest sample, t_n, is not known yet and taken as F_n's work. A sample that
+comes late is booked where the target stood at its stamp, x being straight between the target's
+steps: what `energy` measures, up to t_n. The part of a sample that is lost or overtaken nobody
+knows here.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from typing import ClassVar
 
 import numpy as np
@@ -36,7 +40,8 @@ class Account:
 
     motion: the last displacement. straight, ahead: that of the step to come with the target's
     velocity as it is, and as it has changed over the last step. largest of the last two samples;
-    swing, the most by which the mean of the source between two bookings ever left the sample held.
+    swing, the most by which the mean of the source over samples that came together ever left one
+    that was the newest known while it acted.
     """
 
     needs: ClassVar[str | None] = "power"
@@ -51,6 +56,9 @@ class Account:
         self._stamp, self._tick = 0, -1
         self.sample = self._held = np.zeros(site.size)
         self._x = self._x_stamp = np.zeros(site.size)
+        self._path: deque[tuple[int, Vector]] = deque()  # from the newest stamp on
+        self._acted: deque[tuple[int, Vector]] = deque()  # until when a sample was the newest
+        self._late = False
         self._work, self._ideal = np.zeros(site.size), np.zeros(site.size)
         self.motion = self.straight = self.ahead = np.zeros(site.size)
         self._v = self._gain = np.zeros(site.size)
@@ -59,6 +67,7 @@ class Account:
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._new.append((stamp, sample.copy()))
+        self._late = arrival > stamp
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         if tick > self._tick or self._new:
@@ -75,37 +84,56 @@ class Account:
 
     @property
     def travelled(self) -> Vector:
-        """The displacement since the newest sample."""
-        return self._x - self._x_stamp
+        """Since the newest sample: the displacement, or where samples come late, so that several
+        may be under way, all of the path."""
+        if not self._late:
+            return np.abs(self._x - self._x_stamp)
+        corners = np.array([self._x_stamp, *(x for tick, x in self._path if tick > self._stamp)])
+        return np.abs(np.diff(corners, axis=0)).sum(axis=0)
 
     def correction(self, fresh: bool) -> Vector:
         """What is added to the newest sample until the next tick; `fresh` with a new one."""
         raise NotImplementedError
 
     def _book(self, tick: int) -> None:
-        """The motion since the last tick, split where samples were taken on the way."""
+        """The motion since the last tick, and of each new sample the ideal up to its stamp."""
         x = self._displacement().copy()
         if self._tick < 0:
             self._x = self._x_stamp = x
             self._stamp, self.sample = self._new[0]
             self._tick = tick
             self._v = self._velocity().copy() if self._velocity else self._v
-        self.motion, start, done = x - self._x, self._x, 0.0
+        self.motion = x - self._x
         self._steps, passed, mean = tick - self._tick, self._stamp, np.zeros_like(x)
-        first = self.sample
         self._work = self._work + self._held * self.motion
+        if not self._path or tick > self._path[-1][0]:
+            self._path.append((tick, x))
+        if self._new:
+            self._acted.append((tick, self.sample))
         for stamp, sample in self._new:
-            if tick > self._tick:
-                done = min(max((stamp - self._tick) / (tick - self._tick), 0.0), 1.0)
-            there = start + self.motion * done
+            there = self._at(stamp)
             self._ideal = self._ideal + (self.sample + sample) / 2 * (there - self._x_stamp)
             self.largest = np.maximum(np.abs(sample), np.abs(self.sample))
             mean += (self.sample + sample) / 2 * (stamp - self._stamp)
             self._stamp, self._x_stamp, self.sample = stamp, there, sample
         if self._stamp > passed:
-            self.swing = np.maximum(self.swing, np.abs(mean / (self._stamp - passed) - first))
+            mean /= self._stamp - passed
+            for _, known in self._acted:
+                self.swing = np.maximum(self.swing, np.abs(mean - known))
+            while self._acted and (self._acted[0][0] <= self._stamp or not self._late):
+                self._acted.popleft()
         self._new.clear()
         self._tick, self._x = tick, x
+
+    def _at(self, stamp: int) -> Vector:
+        """Where the target stood; stamps never fall, so what lies before this one is forgotten."""
+        path = self._path
+        while len(path) > 1 and path[1][0] <= stamp:
+            path.popleft()
+        (tick, x), (later, there) = path[0], path[min(1, len(path) - 1)]
+        if stamp <= tick or later == tick:
+            return x
+        return x + (there - x) * ((stamp - tick) / (later - tick))
 
     def _look(self, step: float) -> None:
         """Into the step to come, of `step` ticks and at least as long as the last."""

@@ -1,7 +1,8 @@
-"""Delayed interpolation: when sample n arrives, from y_{n-1} to y_n in H = t_n - t_{n-1}.
+"""Delayed interpolation: when sample n arrives, from where the hold stands to y_n in
+H = t_n - t_{n-1}.
 
-y_{n-1} + (y_n - y_{n-1}) min(1, s/H), with s the time since the arrival. Continuous, never beyond
-a sample, and late by H: order 1.
+w + (y_n - w) min(1, s/H), with w the value at the arrival and s the time since then; w = y_{n-1}
+where periods are the same. Continuous, never beyond the samples, and late by H: order 1.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ class Delayed:
     def __init__(self, site: Site) -> None:
         self._samples = History(2)
         self._arrival = 0
+        self._from = np.zeros(site.size)
 
     def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
+        self._from = self.value(arrival) if len(self._samples) else sample.copy()
         self._samples.push(stamp, sample)
         self._arrival = arrival
 
     def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
-        (before, first), (stamp, newest) = self._samples[0], self._samples[-1]
+        (before, _), (stamp, newest) = self._samples[0], self._samples[-1]
         share = (tick - self._arrival + ahead) / (stamp - before) if stamp > before else 1.0
-        return first + (newest - first) * min(1.0, share)
+        return newest if share >= 1.0 else self._from + (newest - self._from) * share

@@ -8,7 +8,8 @@ semidefinite: symmetric with no negative eigenvalue (Lambda^-1, an inertia). Ext
 its negative eigenvalues are set to 0, in coordinates scaled by the newest sample's diagonal, so
 that units do not matter.
 
-angle: entries in rad that an FMU wraps. Unwrapped by whole turns against the sample before.
+angle: entries in rad, deg or the like that an FMU wraps. Unwrapped by whole turns against the
+sample before.
 
 Holds that only ever give samples leave the matrices as they are.
 """
@@ -70,17 +71,20 @@ class Semidefinite:
 
 
 class Unwrapped:
-    """A hold of angles: `angles` are the places of the entries that wrap."""
+    """A hold of angles: `angles` are the places of the entries that wrap, `turn` what a turn is in
+    the unit of each."""
 
-    def __init__(self, make: Callable[[], Hold], angles: Sequence[int]) -> None:
-        self._hold, self._angles = make(), list(angles)
+    def __init__(
+        self, make: Callable[[], Hold], angles: Sequence[int], turn: Sequence[float]
+    ) -> None:
+        self._hold, self._angles, self._turn = make(), list(angles), np.array(turn)
         self._last: Vector | None = None
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         sample = sample.copy()
         if self._last is not None:
-            turns = np.round((self._last - sample[self._angles]) / (2 * np.pi))
-            sample[self._angles] += 2 * np.pi * turns
+            turns = np.round((self._last - sample[self._angles]) / self._turn)
+            sample[self._angles] += self._turn * turns
         self._last = sample[self._angles]
         self._hold.push(stamp, sample, arrival)
 

@@ -11,10 +11,17 @@ turn out to have been made, and the controller, in series as that of Hannaford &
 Robotics and Automation 18, 2002), keeps a reserve r D for the worst that the source may do over
 the next step. c is at most the larger of r and the last two samples.
 
-Theorem. Let the displacement dx of a step go the way foreseen, |dx| <= D, and let the mean of the
-source leave F_n by at most r (beta = 1). Then P' <= P + (r - c) |dx|, so that P <= 0 gives P' <= 0:
-nothing is ever made. Where P > 0, c >= r and P' <= P: what a larger swing than ever, R > r, makes
-is at most (R - r) |dx|, once, and all that is made at any time at most r |dx| of one step.
+Theorem. Let the displacement dx of each step go the way foreseen, |dx| <= D (so that beta = 1), and
+let the mean of the source leave F_n by at most r from t_n until the next sample is known. Then what
+is really made, m, is at most P, and a step adds at most (r - c) |dx|: where P <= 0,
+m' <= P + (r - c) |dx| <= 0; where P > 0, c >= r and m' <= m. Nothing is ever made. A larger swing
+than ever, R > r, makes at most (R - r) W until it is known, W the way from a stamp until then, so
+that m <= R W at any time. Each step outside the premises makes at most (R + C) |dx| on top, C the
+largest c.
+
+With a latency the premises reach over it: |x - x(t_n)| is then the whole way since t_n, as several
+samples may be under way, and W grows with it. What a sample that is lost or overtaken did nobody
+knows at the target: the theorem has none of those.
 
 No hold can do without such premises. made' - made = (F_held - mean) dx, and mean and dx come after
 F_held is chosen: whichever it is, even 0, one of mean = F_n +- r with one of dx = +-d makes r d or
@@ -33,16 +40,16 @@ from hapticlink.orchestrator.holds.site import Site
 class Passive(Account):
     def __init__(self, site: Site) -> None:
         super().__init__(site)
-        self._beta = np.ones(site.size)
+        self.beta = np.ones(site.size)
         self._foreseen = np.zeros(site.size)
 
     def correction(self, fresh: bool) -> Vector:
         turned = self.motion * self._foreseen < 0.0
-        self._beta = np.where(turned, self._beta / 2, np.minimum(1.1 * self._beta, 1.0))
+        self.beta = np.where(turned, self.beta / 2, np.minimum(1.1 * self.beta, 1.0))
         self._foreseen = self.ahead
-        most = self.made + self.swing * np.abs(self.travelled)
+        most = self.made + self.swing * self.travelled
         way = np.abs(self.ahead) + np.where(most > 0.0, 0.0, np.abs(self.straight))
         share = np.zeros_like(way)
         np.divide(most, way, out=share, where=way > 0.0)
         friction = np.clip(self.swing + share, 0.0, np.maximum(self.swing, self.largest))
-        return -np.sign(self.ahead) * self._beta * friction
+        return -np.sign(self.ahead) * self.beta * friction

@@ -58,8 +58,7 @@ class SetPoint:
         self._tick, self.available = -1, 0.0
 
     def __deepcopy__(self, memo: dict[int, Any]) -> SetPoint:
-        """Itself: it moves on with the fast side, which is never taken back. Where the source's
-        step is taken again, its sample comes again."""
+        """Itself, since holds share it: who takes steps back keeps its `vars` beside theirs."""
         return self
 
     def given(self, tick: int) -> Vector:

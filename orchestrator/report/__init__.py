@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from hapticlink.orchestrator import folders, rooms
 from hapticlink.orchestrator.report import chapter1, chapter3, chapter6, page, section_b6
 from hapticlink.orchestrator.report.entry import Entry, Runs
 
@@ -14,10 +14,10 @@ CHAPTERS = (chapter1, chapter3, chapter6, section_b6)
 
 def reproduce(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Path:
     """Write figures and README.md into `folder`; `tell` hears what is being made."""
-    folder.mkdir(parents=True, exist_ok=True)
+    folders.made(folder)
     entries: list[Entry] = []
-    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
-        runs = Runs(Path(room), tell)
+    with rooms.room() as room:
+        runs = Runs(room, tell)
         for chapter in CHAPTERS:
             for entry in chapter.entries(runs, folder):
                 tell(f"{entry.title}: {entry.figure}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from hapticlink.fmus.blocks import build_block
 from hapticlink.fmus.check import session
+from hapticlink.orchestrator import rooms
 from hapticlink.orchestrator.report import draw
 from hapticlink.orchestrator.report.entry import Entry, Runs, command
 
@@ -29,10 +29,8 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
 def images(rule: str, poles: np.ndarray) -> np.ndarray:
     """z of each pole s (with T = 1 s), by one step of the FMU from x = 1."""
     settings = {"rule": rule}
-    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
-        path = build_block(
-            "discrete_equivalent", settings, Path(room), stop_time=1.0, step_size=1.0
-        )
+    with rooms.room() as room:
+        path = build_block("discrete_equivalent", settings, room, stop_time=1.0, step_size=1.0)
         with session(path) as opened:
             reference = {v.name: v.valueReference for v in opened.description.modelVariables}
             gains = [reference["re"], reference["im"]]

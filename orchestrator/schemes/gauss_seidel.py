@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from hapticlink.orchestrator import graphs
 from hapticlink.orchestrator.faults import InputFault
-from hapticlink.orchestrator.schemes import phrases
+from hapticlink.orchestrator.schemes import order, phrases
 from hapticlink.orchestrator.schemes.operations import Event, Operation
 from hapticlink.orchestrator.system import System, Unit
 
@@ -33,18 +33,9 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
 
 def in_order(system: System, units: list[Unit]) -> list[Unit]:
     """`units` so that each comes after those that feed it."""
-    feeds = {u.name: {c.source for c in system.into(u.name)} for u in units}
-    direct = {
-        u.name: {
-            c.source
-            for c in system.into(u.name)
-            if any(u.description.follows(y, c.inputs) for y in u.description.outputs)
-        }
-        for u in units
-    }
     ordered: list[Unit] = []
-    for group in graphs.components(feeds):
-        inside = {name: direct[name] & set(group) for name in group}
+    for group in order.groups(system, units):
+        inside = order.direct(system, group)
         for part in graphs.components(inside):
             if len(part) > 1 or part[0] in inside[part[0]]:
                 raise InputFault(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from hapticlink.orchestrator import folders
 from hapticlink.orchestrator.study import errors, page
 from hapticlink.orchestrator.sweep import Tell, sweep, table
 from hapticlink.orchestrator.sweep.job import Job
@@ -15,6 +16,6 @@ def study(jobs: Sequence[Job], folder: Path, room: Path, processes: int, tell: T
     `folder`; `tell` hears how many are done."""
     rows = sweep(jobs, room, processes, tell=tell, measure=errors.measure)
     found = errors.compared(rows)
-    folder.mkdir(parents=True, exist_ok=True)
+    folders.made(folder)
     table.write(folder / "table.csv", [errors.rounded(row) for row in found])
     return page.write(folder, found)

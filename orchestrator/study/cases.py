@@ -60,8 +60,6 @@ def _closed_loop() -> Iterator[Job]:
     for model, sync, bias, hold, (rate, seed, option) in product(
         MODELS, SYNC, BIAS, holds, _rates()
     ):
-        if model == "held" and bias == "none":
-            continue
         options = [*holds[hold], option, f"graphics.sync={sync}", f"controller.bias={bias}"]
         point = {"gains": PRINTED, "model": model, "sync": sync, "bias": bias, "hold": hold}
         point = {"scene": "closed-loop", **point, "rate": rate, "seed": seed}

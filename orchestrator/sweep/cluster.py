@@ -20,7 +20,7 @@ def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
         from dask.distributed import Client, as_completed
     except ImportError:
         raise InputFault(
-            "--scheduler needs Dask; install it with pip install 'hapticlink[distributed]'"
+            "--scheduler needs Dask; pip install '.[distributed]' in the checkout"
         ) from None
     try:
         client = Client(address, timeout=10)

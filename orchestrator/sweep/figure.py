@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.blocks import blocks
+from hapticlink.orchestrator.faults import InputFault, unknown
+from hapticlink.orchestrator.scene import Scene
 from hapticlink.orchestrator.sweep.grid import number
 from hapticlink.orchestrator.sweep.row import METRIC, Row
 from hapticlink.orchestrator.sweep.table import columns
+from hapticlink.orchestrator.sweep.title import axis, title
 
 NAMES = {
     METRIC: "largest tracking error (mm)",
@@ -26,18 +29,27 @@ NAMES = {
     "run_time_s": "run time (s)",
 }
 FEW = 8
-"""Lines that can still be told apart."""
+"""Lines that colours can still tell apart; more differ by their dashes too."""
 GOOD = ("duration",)
+
+
+def check(metric: str, scenes: Sequence[Scene]) -> None:
+    """Raises InputFault, before anything runs, for a metric that no run of `scenes` can have. What
+    a hold made is known only then."""
+    fmus = {b.name for s in scenes for b in blocks(s)} | {f.name for s in scenes for f in s.fmu}
+    known = (*NAMES, "switches", *(f"steps {name}" for name in sorted(fmus)))
+    if metric not in known and not metric.startswith("made_J "):
+        raise InputFault(f"--metric {unknown('column of numbers', metric, known)}")
 
 
 def draw(rows: Sequence[Row], keys: Sequence[str], folder: Path, metric: str | None) -> str | None:
     """Write sweep.png and give its name; None where no row has a number to draw. Raises
     InputFault for a metric that is no column."""
     known = [c for c in columns(rows) if any(isinstance(r.get(c), int | float) for r in rows)]
-    if metric and metric not in known:
+    if known and metric and metric not in known:
         raise InputFault(f"--metric {metric}: no column of numbers; there are {', '.join(known)}")
     metric = metric or next((c for c in (*NAMES, *known) if c in known), None)
-    if metric is None:
+    if metric not in known:
         return None
     numeric = [k for k in keys if all(number(r.get(k, "")) is not None for r in rows)]
     others = [k for k in keys if k not in numeric[:1]]
@@ -51,8 +63,9 @@ def draw(rows: Sequence[Row], keys: Sequence[str], folder: Path, metric: str | N
         _bars(axes, rows, keys, metric)
     best = min((r for r in rows if _shown(r, metric)), key=lambda r: r[metric], default=None)
     if best:
-        what = ", ".join(f"{k} = {best.get(k, 'as in the scene')}" for k in keys)
-        axes.set_title(fill(f"Least {best[metric]:.3g} at {what}", 80), fontsize="medium")
+        lost = sum(not _shown(r, metric) for r in rows)
+        found = title(best, best[metric], NAMES.get(metric, metric), keys, lost, len(rows))
+        axes.set_title(fill(found, 80), fontsize="medium")
     figure.savefig(folder / "sweep.png", dpi=130, metadata={"Software": None})
     return "sweep.png"
 
@@ -83,14 +96,13 @@ def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(_label(row, others), []).append(row)
-    count = 10 if len(groups) <= 10 else 20
-    colours = colormaps[f"tab{count}"](range(count))
+    colours = colormaps["tab10"](range(FEW))
     drawn = []
     for i, (label, group) in enumerate(groups.items()):
         group.sort(key=lambda r: float(r[x]))
         at = np.array([float(r[x]) for r in group])
         value = np.array([r[metric] if _shown(r, metric) else np.nan for r in group])
-        colour, dash = colours[i % len(colours)], ("-", "--", ":")[i // len(colours) % 3]
+        colour, dash = colours[i % FEW], ("-", "--", ":", "-.")[i // FEW % 4]
         axes.plot(at, value, dash, color=colour, marker=".", label=label or None)
         drawn += [v for v in value if np.isfinite(v)]
         bad = [float(r[x]) for r in group if not _shown(r, metric)]
@@ -102,7 +114,7 @@ def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric
     if any(not _shown(r, metric) for r in rows):
         axes.plot([], [], "kx", label="ended early or failed")
     _scale(axes, drawn)
-    axes.set(xlabel=x, ylabel=NAMES.get(metric, metric))
+    axes.set(xlabel=axis(x), ylabel=NAMES.get(metric, metric))
     if len(groups) > 1 or any(not _shown(r, metric) for r in rows):
         title = ", ".join(others) if others else None
         axes.legend(
@@ -123,7 +135,7 @@ def _map(figure: Any, axes: Any, rows: Sequence[Row], x: str, y: str, metric: st
     wide = found.size and found.min() > 0 and found.max() > 30 * found.min()
     mesh = axes.pcolormesh(xs, ys, values, shading="nearest", norm="log" if wide else "linear")
     figure.colorbar(mesh, label=f"{NAMES.get(metric, metric)}; grey: ended early or failed")
-    axes.set(xlabel=x, ylabel=y)
+    axes.set(xlabel=axis(x), ylabel=axis(y))
 
 
 def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str) -> None:

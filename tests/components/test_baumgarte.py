@@ -62,6 +62,15 @@ def test_limit(method, beta, side):
     assert (not error < 1e-6) == (side > 1)
 
 
+def test_dormand_prince_8_has_its_limit_at_6_4():
+    left = [
+        closure_after(mechanism("dormand-prince-8", alpha=alpha_T * RATE, beta=1.0), 400)
+        for alpha_T in (6.2, 6.6)
+    ]
+    assert left[0] < 1e-9
+    assert not left[1] < 1e-6
+
+
 @pytest.mark.parametrize("alpha_T", [5.0, 50.0])
 def test_linearly_implicit_has_no_limit(alpha_T):
     component = mechanism("linearly-implicit", alpha=alpha_T * RATE, beta=1.0)

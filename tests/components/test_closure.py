@@ -73,6 +73,18 @@ def test_regularisation_leaves_no_trace_on_a_regular_problem():
     np.testing.assert_allclose(np.concatenate(solve(D, W, b, c)), expected, rtol=1e-12)
 
 
+def test_a_closure_that_says_nothing_changes_nothing():
+    """A second pin at a joint: W has no entry; with a closure that does, and alone."""
+    D, W, b, c = problem(4, 5, 2, 2)
+    nothing, zero = np.zeros((2, 5)), np.zeros(2)
+    a, multipliers = solve(D, np.vstack([W, nothing]), b, np.r_[c, zero])
+    np.testing.assert_allclose(a, solve(D, W, b, c)[0], rtol=1e-12)
+    np.testing.assert_allclose(multipliers, np.r_[solve(D, W, b, c)[1], zero], rtol=1e-9)
+    alone, multipliers = solve(D, nothing, b, zero)
+    np.testing.assert_allclose(alone, np.linalg.solve(D, b), rtol=1e-12)
+    assert not multipliers.any()
+
+
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 def test_units_do_not_matter(scale):
     """Lengths in other units scale W and D; the solution scales with them."""

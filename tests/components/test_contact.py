@@ -3,6 +3,7 @@
 import math
 
 import appendix_a
+import casadi as ca
 import numpy as np
 import pytest
 from blocks import Running
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from mechanisms import TABLE_6_1, five_bar
 from scipy.optimize import minimize_scalar
 
+from hapticlink.components.contact import equivalent_wrench
 from hapticlink.components.contact_specs import Contacts, Disc, Polygon
 from hapticlink.components.environment import virtual_environment
 from hapticlink.components.mechanism import virtual_mechanism
@@ -26,6 +28,7 @@ from hapticlink.components.specs import (
 )
 
 R, LENGTH = 0.05, 0.4
+NOISE = 1e-17 * np.array([[3.0, -1.0, 0.0], [-1.0, 2.0, 0.5], [0.0, 0.5, -1.0]])
 SQUARE = ((0.1, -0.3), (0.7, -0.1), (0.5, 0.5), (0.0, 0.3))
 
 
@@ -149,7 +152,7 @@ def test_a_damped_bounce_never_gains_energy_and_comes_to_rest_on_its_spring():
 BALL = block(loose(((0.0, 0.0),)), FLOOR)
 
 
-@given(st.floats(-0.049, 0.05), st.floats(-2, 2))
+@given(st.floats(-0.3, 0.05), st.floats(-2, 2))
 def test_contacts_push_and_never_pull(height, speed):
     BALL.put(q=(0.0, R + height, 0.0), qd=(0.0, speed, 0.0))
     height = (R + height) - R  # as rounded
@@ -249,3 +252,14 @@ def test_what_no_link_can_reach_is_left_out():
         ("link3", "disc2"),
     }
     assert len(near(linkage, contacts)) == 8 - 2
+
+
+def test_contacts_on_a_locked_hand_are_not_felt():
+    """Lambda^-1 = 0 but for rounding, of an open linkage of 1/kg: no wrench moves what is locked,
+    and none is the least."""
+    args = [ca.SX.sym(name, *shape) for name, shape in (("L", (3, 3)), ("a", (3, 1)))]
+    wrench = equivalent_wrench(args[0], ca.SX.eye(3), args[1], ca.SX(0.1))
+    f = ca.Function("wrench", args, [wrench])
+    assert not np.array(f(NOISE, (1e-16, -1e-16, 3e-16))).any()
+    moving = np.array(f(np.diag([0.5, 0, 0]) + NOISE, (1.0, 1e-16, 0.0))).ravel()
+    np.testing.assert_allclose(moving, [2.0, 0, 0], atol=1e-12)

@@ -116,6 +116,24 @@ def test_damper_between_points_takes_what_the_linkage_loses():
     assert block.y["qd"][0] == pytest.approx(2.0 * np.exp(-0.7 / (1 / 3)), rel=1e-10)
 
 
+def test_a_spring_whose_points_meet_pushes_nowhere():
+    """k l and no direction for it; a nudge later it pushes with all of it."""
+    spring = Spring(
+        bodies=("ground", "block"),
+        at=((0.1, 0.0), (0.0, 0.0)),
+        stiffness=50.0,
+        damping=3.0,
+        length=0.2,
+    )
+    block = running(Linkage(**{**vars(slider()), "spring": (spring,)}))
+    assert block.y["qdd"][0] == 0
+    assert block.y["energy"] == pytest.approx(0.5 * 50.0 * 0.2**2, rel=1e-15)
+    advance(block, 0.1)
+    assert block.y["q"][0] == 0.1
+    block.put(q=0.1 + 1e-9)
+    assert block.y["qdd"][0] == pytest.approx(50.0 * 0.2 / 2.0, rel=1e-6)
+
+
 def test_drives():
     constant = advance(running(slider(drive=ConstantDrive(effort=3.0))), 1.0)
     assert constant.y["q"][0] == pytest.approx(0.1 + 0.5 * 1.5, abs=1e-12)

@@ -3,10 +3,23 @@
 import casadi as ca
 import numpy as np
 import pytest
+from blocks import Running
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticlink.components import resisted
+from hapticlink.components.environment import virtual_environment
+from hapticlink.components.mechanism import virtual_mechanism
+from hapticlink.components.specs import (
+    Body,
+    Directions,
+    GraphicsCopy,
+    Joint,
+    Linkage,
+    Loop,
+    Mechanism,
+    OperationalPoint,
+)
 
 A = ca.SX.sym("A", 3, 3)
 EIGEN = ca.Function("eigen", [A], list(resisted.eigen(A)))
@@ -66,3 +79,25 @@ def test_count_has_hysteresis():
     assert COUNT(ratios(0.12), 2, 0.1, 1.5) == 2
     assert COUNT(ratios(0.16), 2, 0.1, 1.5) == 1
     assert COUNT([1.0, 0.0, 0.09], 1, 0.1, 1.5) == 2  # order of the entries does not matter
+
+
+@pytest.mark.parametrize("mass", [1e-4, 1.0, 1e4])
+def test_a_truss_resists_in_all_three_directions(mass):
+    """Two bars pinned to the ground and to each other: no freedom, Lambda^-1 is rounding."""
+    bars = tuple(Body(name=name, mass=mass, inertia=0.01 * mass) for name in "ab")
+    truss = Linkage(
+        body=bars,
+        joint=(Joint(name="ja", child="a"), Joint(name="jb", child="b", at_parent=(1.0, 0.0))),
+        loop=(Loop(bodies=("a", "b"), at=((0.7, 0.0), (0.7, 0.0))),),
+        operational_point=OperationalPoint(body="a", at=(0.7, 0.0)),
+        start={"ja": 0.775, "jb": 2.36},
+    )
+    blocks = (
+        virtual_mechanism(truss, Mechanism(), Directions(), step_s=1 / 512),
+        virtual_environment(truss, GraphicsCopy(), Directions()),
+    )
+    for block in map(Running, blocks):
+        for _ in range(3):
+            assert block.y["n_constraints"] == 3
+            np.testing.assert_allclose(block.y["P_c"], np.eye(3), atol=1e-14)
+            block.step(1 / 512)

@@ -16,7 +16,6 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.crossings import Rules, assign
 from hapticlink.orchestrator.description import Description, describe
 from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.power import PowerPort
 from hapticlink.orchestrator.results import Table, read_table
 from hapticlink.orchestrator.run import Outcome, run
 from hapticlink.orchestrator.system import System, Unit, connect
@@ -27,7 +26,7 @@ from . import oscillator
 ROWS = oscillator.ROWS
 HERMITE = [*ROWS, ("one.a", "two.a1")]
 """der(F) of `two` needs the acceleration of `one`."""
-POWER = (PowerPort(effort="one.F", displacement="one.x"),)
+POWER = oscillator.POWER
 
 
 def with_derivative() -> Component:

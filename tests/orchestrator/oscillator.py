@@ -21,8 +21,10 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.crossings import Rules, assign
 from hapticlink.orchestrator.description import Description, describe
 from hapticlink.orchestrator.plan import Plan
+from hapticlink.orchestrator.power import PowerPort
 from hapticlink.orchestrator.results import read_table
 from hapticlink.orchestrator.run import Outcome, run
+from hapticlink.orchestrator.springs import Spring
 from hapticlink.orchestrator.system import System, Unit, connect
 from hapticlink.orchestrator.ticks import Clock, Timeline
 
@@ -114,6 +116,17 @@ def two() -> Component:
 
 ROWS = [("two.F", "one.F"), ("one.x", "two.x1"), ("one.v", "two.v1")]
 
+POWER = (PowerPort(effort="one.F", displacement="one.x"),)
+SPRINGS = (
+    Spring(
+        set_position="two.x1",
+        position="two.x",
+        stiffness=(K_C,),
+        damping=(C_C,),
+        set_velocity="two.v1",
+    ),
+)
+
 
 def built(folder: Path) -> dict[str, Description]:
     return {c.name: describe(build(c, folder)) for c in (one(), two())}
@@ -132,7 +145,7 @@ def system(
     timeline = Timeline(step, steps, (Clock("haptics", range(0, steps + 3)),))
     units = tuple(Unit(name, fmu, "haptics") for name, fmu in fmus.items())
     one_for_all = {source: hold for source, _ in ROWS} if isinstance(hold, str) else hold
-    rules = Rules(holds=one_for_all)
+    rules = Rules(holds=one_for_all, power=POWER, springs=SPRINGS)
     connections, refused = assign(units, tuple(connect(units, ROWS, "zoh", {})), timeline, rules)
     assert not refused
     return System(
@@ -142,6 +155,8 @@ def system(
         coupling,
         substeps=dict.fromkeys(fmus, substeps),
         get_after_set=("two",) if get_after_set else (),
+        power=POWER,
+        springs=SPRINGS,
     )
 
 

@@ -79,7 +79,7 @@ def test_error_of_the_two_mass_oscillator(
 
 @pytest.mark.parametrize(
     ("between", "substeps", "order"),
-    [("zoh", 1, 1), ("foh", 1, 2), ("hermite", 4, 4)],
+    [("zoh", 1, 1), ("foh", 1, 2), ("second-order", 4, 3), ("hermite", 4, 4)],
 )
 def test_order_is_that_of_the_interpolation(
     fmus: Fmus, tmp_path: Path, between: str, substeps: int, order: int

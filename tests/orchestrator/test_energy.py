@@ -56,6 +56,7 @@ def test_a_spring_renewed_more_rarely_than_the_target_steps(
     steps = np.diff(path[: last + 1 : every], axis=0)
     made = (0.5 * stiffness * steps**2).sum()
     assert meter.energy(1.0).made == pytest.approx(made, rel=1e-10)
+    assert meter.energy(1.0).most == pytest.approx(made, rel=1e-10)  # it only grows
 
 
 @settings(max_examples=25)
@@ -113,8 +114,8 @@ def test_power_across_rates_is_told_and_kept_in_check(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("option", "why"),
     [
-        ("hold=passive", "carries no power"),
-        ("hold=nepce", "carries no power"),
+        ("hold=passive", "no connection across rates carries power"),
+        ("hold=nepce", "no connection across rates carries power"),
         ("holds.virtual_environment.P_c=passive", "carries no power"),
         ("holds.virtual_environment.P_c=foh-derivative", "does not put out the derivative of P_c"),
         ("holds.controller.nothing=foh", "is no connection of this scene"),

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hapticlink.orchestrator import results
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.faults import Fault
@@ -46,6 +47,29 @@ def test_a_run_keeps_what_explain_prints(
         told.append(capsys.readouterr().out)
     assert (tmp_path / "plan.txt").read_text() == told[0]
     assert "plan.txt" in told[1]
+
+
+@pytest.mark.parametrize(
+    "option", ["graphics.rate={min=20, max=60, seed=2}", "delays.hand.F={min=0.001, max=0.02}"]
+)
+def test_what_does_not_come_round_is_told_to_its_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    options = ["--set", "duration=1.5", "--set", "haptics.rate=500", "--set", option]
+    scene = "closed-loop-direct" if option.startswith("delays") else "closed-loop"
+    with pytest.raises(SystemExit, match="0"):
+        main(["run", scene, "--explain", *options])
+    told = capsys.readouterr().out.splitlines()
+    assert told[-1] == "cut after 600 events; a run writes them all to plan.txt"
+    with pytest.raises(SystemExit, match="0"):
+        main(["run", scene, "--out", str(tmp_path), *options])
+    kept = (tmp_path / "plan.txt").read_text().splitlines()
+    table = next(i for i, line in enumerate(told) if line.startswith("tick, "))
+    assert kept[kept.index(told[table]) :][: len(told) - table - 1] == told[table:-1]
+    ends = [line.split()[1] for line in kept[kept.index(told[table]) + 1 :]]
+    haptics = results.load(tmp_path).haptics["time"]
+    assert float(ends[-1]) == pytest.approx(haptics[-1], abs=1e-8)  # a last tick only reads
+    assert len(set(ends)) >= len(haptics) - 1
 
 
 def test_first_frame_ends_at_the_phase() -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator import results
+from hapticlink.orchestrator import results, rooms
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.faults import InputFault
 
@@ -69,7 +69,7 @@ def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path: Path) -> N
     never = SLAVE.format(name="Never", body="pass").replace("0.0, 0.0, 1.0", "0.0, float('nan'), 1")
     python_fmu_of(tmp_path, never, "never")
     experiment, _ = run(tmp_path, ONE.format("Never.fmu"), "faults.nan=hold")
-    assert "one: output y is nan at t = 0.0 s" in str(experiment.outcome.fault)
+    assert "one: output y is nan at t = 0 s" in str(experiment.outcome.fault)
 
 
 HALF = "\n        ".join(
@@ -82,7 +82,7 @@ def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path: Path, isol
     python_fmu(tmp_path, "Stiff", HALF, canGetAndSetFMUstate=True)
     one = ONE.format("Stiff.fmu") + isolate
     experiment, found = run(tmp_path, one)
-    assert "one: fmi2DoStep returned discard at t = 0.0 s" in str(experiment.outcome.fault)
+    assert "one: fmi2DoStep returned discard at t = 0 s" in str(experiment.outcome.fault)
     assert found.haptics["time"].tolist() == [0.0]
     experiment, found = run(tmp_path, one, "faults.discard=retry")
     assert experiment.outcome.fault is None
@@ -224,6 +224,39 @@ def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
     command = [*COMMAND, "run", str(path), "--out", str(tmp_path / "out")]
     subprocess.run(command, check=True, env=os.environ | {"FAULT_FMU_LOG": str(log)})
     assert log.read_text().splitlines() == ["terminate", "free", "unloaded after its interpreter"]
+
+
+@pytest.mark.parametrize("crash", ["__import__('os')._exit(139)", "__import__('os').abort()"])
+def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
+    tmp_path: Path, crash: str
+) -> None:
+    python_fmu(tmp_path, "Dies", f"self.y = time + size\n        if time >= 2.0: {crash}")
+    path, out = scene(tmp_path, ONE.format("Dies.fmu"), duration=5), tmp_path / "out"
+    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    # Its end is that of the process beside it, which holds the same stream.
+    ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
+    assert ended.returncode in (139, -signal.SIGABRT)
+    assert b"isolate = true" in ended.stderr
+    found = results.load(out)
+    np.testing.assert_array_equal(found.haptics["time"], np.arange(2 * 64 + 1) / 64)
+    np.testing.assert_array_equal(found.haptics["one.y"][1:], found.haptics["time"][1:])
+    assert found.run["end"] == {"reason": "fault", "time": 2.0}
+    assert found.run["fault"]["kind"] == "Crash"
+    assert not folders()
+
+
+def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path: Path) -> None:
+    made = "from hapticlink.orchestrator import rooms; print(rooms.new()); {}"
+    kill = "__import__('os').kill(__import__('os').getpid(), 9)"
+    script = [sys.executable, "-c", "import sys; " + made.format(f"sys.stdout.flush(); {kill}")]
+    dead = Path(subprocess.run(script, capture_output=True, text=True, check=False).stdout.strip())
+    others = [Path(rooms.new()), dead.with_name(f"hapticlink-elsewhere-{dead.name[20:]}")]
+    others[1].mkdir()
+    assert dead.is_dir()
+    subprocess.run([*COMMAND, "--version"], check=True, capture_output=True)
+    assert not dead.exists()
+    for other in others:
+        other.rmdir()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

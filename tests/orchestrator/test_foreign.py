@@ -337,6 +337,7 @@ def findings(folder: Path, text: str) -> dict[str, tuple[int | None, str]]:
         ("\n[[conn", "\nrate = 'graphics'\n[[conn", "fmu[1] (takes).rate", 11, "no graphics rate"),
         ("\n[[conn", "\nstart.gan = 1\n[[conn", "fmu[1] (takes).start.gan", 11, "mean 'gain'"),
         ("\n[[conn", "\nstart.y = 1\n[[conn", "fmu[1] (takes).start.y", 11, "causality is output"),
+        ("\n[[conn", "\nstart.y = 1\n[[conn", "fmu[1] (takes).start.y", 11, "start: u, on, gain"),
         ("\n[[conn", "\nstart.on = 1\n[[conn", "fmu[1] (takes).start.on", 11, "true or false"),
         ("\n[[conn", "\nstart.u = [1, 2]\n[[conn", "fmu[1] (takes).start.u", 11, "2 values"),
         ("\n[[conn", "\nsteps = 1\n[[conn", "fmu[1] (takes).steps", 11, "unknown key"),
@@ -382,3 +383,39 @@ def test_paths_are_relative_to_the_scene_file_and_options_reach_in(tmp_path: Pat
     read = scene_file.load(str(path), ["fmu.gives.rate=30"])
     assert Path(read.fmu[0].path).samefile(tmp_path / "Gives.fmu")
     assert read.fmu[0].rate == 30
+
+
+TURNING = """
+[[fmu]]
+name = "slow"
+path = "Slow.fmu"
+rate = 16
+[[fmu]]
+name = "fast"
+path = "Fast.fmu"
+[[connection]]
+from = "slow.y"
+to = "fast.u"
+[holds]
+"slow.y" = "foh"
+[kinds]
+"slow.y" = "angle"
+"""
+
+
+def test_an_angle_in_degrees_is_continued_over_its_seam(tmp_path: Path) -> None:
+    """A turn of 400 degrees a second, wrapped: first order gives the line back."""
+    body = "self.y = (400 * (time + size) + 180) % 360 - 180"
+    with_units(python_fmu(tmp_path, "Slow", body), y="deg")
+    with_units(python_fmu(tmp_path, "Fast", "self.y = self.u"), u="deg", y="deg")
+    _, found = run(tmp_path, TURNING, "duration=2.0")
+    time, seen = found.haptics["time"][12:], found.haptics["fast.y"][12:]
+    # The value for the middle of the step that ends here.
+    np.testing.assert_allclose(seen, 400 * (time - 0.5 / 64), rtol=0, atol=1e-8)
+
+
+def test_what_is_no_angle_is_not_unwrapped(tmp_path: Path) -> None:
+    with_units(python_fmu(tmp_path, "Slow"), y="m")
+    python_fmu(tmp_path, "Fast")
+    with pytest.raises(SceneFault, match="in m, which is no angle"):
+        run(tmp_path, TURNING)

@@ -63,22 +63,52 @@ def test_delayed_and_smooth_reach_each_sample_a_period_later(times: Vector) -> N
     for name in ("delayed", "smooth"):
         hold = fed(HOLDS[name](Site(2)), times, signal)
         np.testing.assert_allclose(hold.value(arrival + period), signal(arrival), atol=1e-9)
-    half = fed(HOLDS["delayed"](Site(2)), times, signal).value(arrival, period / 2)
-    np.testing.assert_allclose(half, (signal(times[-2]) + signal(arrival)) / 2, atol=1e-9)
 
 
-@given(stamps, st.integers(0, 2**32 - 1))
-def test_smooth_has_no_jump_and_no_kink_at_a_sample(times: Vector, seed: int) -> None:
-    samples = iter(np.random.default_rng(seed).normal(size=(len(times), 1)))
-    hold, eps = HOLDS["smooth"](Site(1)), 1e-6
+@given(st.integers(1, 40), st.floats(0, 1), st.integers(0, 2**32 - 1))
+def test_delayed_goes_from_sample_to_sample_at_a_fixed_period(
+    period: int, share: float, seed: int
+) -> None:
+    samples = np.random.default_rng(seed).normal(size=(6, 2))
+    hold = HOLDS["delayed"](Site(2))
+    for n, sample in enumerate(samples):
+        hold.push(n * period, sample, n * period)
+        expected = samples[max(n - 1, 0)] * (1 - share) + sample * share
+        np.testing.assert_allclose(hold.value(n * period, share * period), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["delayed", "smooth"])
+@given(
+    st.lists(st.tuples(st.integers(1, 40), st.integers(0, 60)), min_size=3, max_size=12),
+    st.integers(0, 2**32 - 1),
+)
+def test_delayed_and_smooth_have_no_jump_at_any_stamps_and_arrivals(
+    name: str, rows: list[tuple[int, int]], seed: int
+) -> None:
+    """Nor has `smooth` a kink. The arrivals are as irregular as the stamps, and never fall."""
+    samples = iter(np.random.default_rng(seed).normal(size=(len(rows) + 1, 1)))
+    hold, eps = HOLDS[name](Site(1)), 1e-6
     hold.push(0, next(samples), 0)
-    for t in times[:-1].tolist():
-        before = [hold.value(t, -s * eps).copy() for s in (2, 1, 0)]
-        hold.push(t, next(samples), t)
-        after = [hold.value(t, s * eps).copy() for s in (0, 1, 2)]
-        np.testing.assert_allclose(after[0], before[2], atol=1e-12)
-        slopes = [(b - a) / eps for a, b in ((before[1], before[2]), (after[0], after[1]))]
-        assert np.abs(slopes[1] - slopes[0]) < 1e-3
+    stamp = arrival = 0
+    for period, late in rows:
+        stamp += period
+        arrival = max(arrival + 1, stamp + late)
+        before = [hold.value(arrival, -s * eps).copy() for s in (1, 0)]
+        hold.push(stamp, next(samples), arrival)
+        after = [hold.value(arrival, s * eps).copy() for s in (0, 1)]
+        np.testing.assert_allclose(after[0], before[1], atol=1e-12)
+        if name == "smooth":
+            slopes = [(b - a) / eps for a, b in (before, after)]
+            size = max(1.0, float(np.abs(slopes[0]).max()), float(np.abs(after[0]).max()))
+            assert np.abs(slopes[1] - slopes[0]) < 1e-3 * size
+
+
+def test_delayed_where_periods_vary() -> None:
+    """Samples at 0, 20, 40, 50: at 50 it stands halfway between the two before."""
+    hold = HOLDS["delayed"](Site(1))
+    for stamp, sample in ((0, 0.0), (20, 1.0), (40, 2.0), (50, 3.0)):
+        hold.push(stamp, np.array([sample]), stamp)
+    assert [float(hold.value(50, s)[0]) for s in (0, 5, 10, 20)] == [1.5, 2.25, 3.0, 3.0]
 
 
 @given(stamps)
@@ -149,8 +179,22 @@ def test_a_mobility_stays_semidefinite_in_any_units(
 
 
 def test_a_wrapped_angle_is_continued_over_the_seam() -> None:
-    hold = Unwrapped(lambda: HOLDS["foh"](Site(2)), [1])
+    hold = Unwrapped(lambda: HOLDS["foh"](Site(2)), [1], [2 * np.pi])
     for k, angle in enumerate((3.0, 3.1, 3.2, 3.3)):
         wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
         hold.push(k, np.array([wrapped, wrapped]), k)
     assert hold.value(4)[1] == pytest.approx(3.4)
+
+
+@pytest.mark.parametrize("turn", [2 * np.pi, 360.0, 400.0])
+@given(st.integers(0, 2**32 - 1))
+def test_a_turn_is_one_in_the_unit_of_each_angle(turn: float, seed: int) -> None:
+    """A walk in steps below half a turn, wrapped, is the walk again."""
+    walk = np.cumsum(np.random.default_rng(seed).uniform(-0.49, 0.49, size=30)) * turn
+    walk -= walk[0]
+    hold = Unwrapped(lambda: HOLDS["zoh"](Site(2)), [0, 1], [turn, 2 * np.pi])
+    for k, angle in enumerate(walk.tolist()):
+        both = np.array([(angle + turn / 2) % turn - turn / 2, 0.0])
+        hold.push(k, both, k)
+        assert hold.value(k)[0] == pytest.approx(angle, abs=1e-9 * turn)
+        assert hold.value(k)[1] == 0.0

@@ -129,3 +129,15 @@ def test_a_scene_with_delays(tmp_path: Path) -> None:
     assert run["delays"]["haptic_device.x -> controller.x_D"]["most"] == 3 / 512
     assert run["seeds"]["controller.F_motor -> haptic_device.F_motor"] == 7
     assert run["links"]["controller.F_motor -> haptic_device.F_motor"]["sent"] == 103
+
+
+def test_a_late_derivative_goes_with_its_sample_and_is_counted(tmp_path: Path) -> None:
+    name = "virtual_mechanism.x -> controller.x_S"
+    options = [
+        "duration=0.2",
+        "holds.virtual_mechanism.x=foh-derivative",
+        "delays.virtual_mechanism.x={min=0.001, max=0.02, loss=0.3, seed=7}",
+    ]
+    found = simulate("closed-loop-direct", tmp_path, options).results.run
+    assert found["holds"][name] == "foh-derivative"
+    assert found["links"][name]["sent"] > found["links"][name]["lost"] > 0

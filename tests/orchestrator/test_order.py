@@ -60,6 +60,21 @@ def test_order_of_a_hold(fmus: Fmus, tmp_path: Path, hold: Hold, substeps: int, 
     assert observed == pytest.approx(order, abs=0.1)
 
 
+@pytest.mark.parametrize("name", ["passive", "nepce"])
+def test_holds_that_keep_account_are_of_order_one(fmus: Fmus, tmp_path: Path, name: str) -> None:
+    rates = [400, 800, 1600]
+    errors = [error(fmus, tmp_path, rate, {**OWN, "two.F": name}, 1) for rate in rates]
+    observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
+    assert observed == pytest.approx(1, abs=0.15)
+
+
+def test_a_set_position_that_is_not_paid_for_has_no_order(fmus: Fmus, tmp_path: Path) -> None:
+    """The motion that the other mass sends is refused in part, at any rate."""
+    hold = {"two.F": "lead", "one.x": "pspm", "one.v": "pspm"}
+    coarse, fine = (error(fmus, tmp_path, rate, hold, 1) for rate in (800, 1600))
+    assert fine > 0.7 * coarse
+
+
 @pytest.mark.parametrize("coupling", ["jacobi", "gauss-seidel-plants"])
 @pytest.mark.parametrize(("hold", "order"), [("zoh", 1), ("foh", 2)])
 def test_order_is_that_of_the_hold_for_either_coupling(

@@ -129,5 +129,5 @@ def test_without_ziglang_it_is_bad_input(
 
     monkeypatch.setattr(compiler, "version", missing)
     assert status("run", "five-bar", "--set", "packaging=native", "--out", tmp_path / "out") == 2
-    assert "hapticlink[native]" in capsys.readouterr().err
+    assert "pip install '.[native]'" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

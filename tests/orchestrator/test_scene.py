@@ -76,7 +76,7 @@ def test_all_faults_at_once_with_line_and_remedy() -> None:
         ("rate = 30", "rate = [0.5, 0.2]", "graphics.rate", "must rise"),
         ("[controller]", "[controller]\ntopology = 3", "controller.topology", "boolean"),
         ("[controller]", "[controller]\ntopology.stif = 3", "controller.topology.stif", "unknown"),
-        ("[hand]", "[hand]\ntype = 'arm'", "hand.wrench", "unknown key"),
+        ("[hand]", "[hand]\ntype = 'arm'", "hand.wrench", "belongs to type 'constant', not 'arm'"),
         ("[haptics]", "stop_when = 'x = 3'\n[haptics]", "stop_when", "write a signal"),
         ('name = "pivot"', 'name = "pivot"\nparent = "bar"', "linkage.body[0] (bar)", "circle"),
     ],

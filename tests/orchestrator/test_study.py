@@ -105,7 +105,7 @@ def test_the_page_names_the_hold_of_the_least_error(
     for rate in COLUMNS:
         assert f"| {rate} | `foh, mean` | 1 | 5" in text
     assert "| `second-order` | none | | | |" in text
-    assert "| those of the last frame (B.15) | the pose | 64 of 64 |  |  |   |" in text
+    assert "| those of the last frame (B.15) | the pose | left out | 64 of 64 |  |  |   |" in text
     for name in ("direct_tracking", "direct_energy", "printed_gains", "loop_coupling"):
         assert f"({name}.png)" in text
         assert (tmp_path / f"{name}.png").stat().st_size > 10000

@@ -142,7 +142,9 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
     within = SimpleNamespace(name="c -> d", hold=None)
     outcome = SimpleNamespace(
         reason="stop_when", end_time=1.0, fault=None, wall_time=0.5,
-        energies={"a -> b": Energy(0.25, 1.0, 0.75, 1.0), "c -> d": Energy(9.0, 9.0, 0.0, 1.0)},
+        energies={
+            "a -> b": Energy(0.25, 1.0, 0.75, 1.0, 0.5), "c -> d": Energy(9.0, 9.0, 0.0, 1.0, 9.0),
+        },
         calls={"m": {"step": 10, "get": 11}},
     )  # fmt: skip
     made = row.measure(
@@ -212,6 +214,25 @@ def test_what_no_run_can_use_is_bad_input(
     assert "did you mean 'haptics'?" in capsys.readouterr().err
     assert status("sweep", bar, *out) == 2
     assert status("sweep", bar, "--vary", "duration=0.1", "--jobs", 0, *out) == 2
+    assert status("sweep", bar, "--vary", "stop_when=hand.G < 0", *out) == 2  # refused in its run
+
+
+def test_a_sweep_of_which_nothing_is_left_fails(bar: Path, tmp_path: Path) -> None:
+    line = ("sweep", bar, "--vary", "duration=0.1,0.2", "--out", tmp_path / "out", "--jobs", 1)
+    set_ = ("--set", "linkage.start.slide=1.7e308", "--set", "linkage.start_velocity.slide=1e308")
+    assert status(*line, *set_) == 1
+    assert [r["end"] for r in read(tmp_path / "out")] == ["fault", "fault"]
+
+
+def test_a_misspelt_metric_is_told_before_anything_runs(
+    bar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    line = ("sweep", bar, "--vary", "duration=0.1", "--out", out, "--jobs", 1, "--metric")
+    assert status(*line, "steps virtual_mechansm") == 2
+    assert "did you mean 'steps virtual_mechanism'?" in capsys.readouterr().err
+    assert not out.exists()
+    assert status(*line, "steps virtual_mechanism") == 0
 
 
 SLAVE = """
@@ -352,7 +373,7 @@ def test_without_dask_the_scheduler_says_what_to_install(
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
     arguments = ("--vary", "duration=0.1", "--out", tmp_path / "out", "--scheduler", "tcp://a:1")
     assert status("sweep", bar, *arguments) == 2
-    assert "pip install 'hapticlink[distributed]'" in capsys.readouterr().err
+    assert "pip install '.[distributed]'" in capsys.readouterr().err
 
 
 def test_a_cluster_makes_the_same_table(bar: Path, tmp_path: Path) -> None:

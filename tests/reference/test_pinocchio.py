@@ -5,12 +5,13 @@ Pinocchio gives D, bias forces, closure Jacobians and their rates; NumPy solves
 """
 
 from dataclasses import replace
+from fractions import Fraction
 
 import casadi as ca
 import numpy as np
 import pytest
 from blocks import Running
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mechanisms import five_bar, linkages
 
@@ -50,8 +51,9 @@ def theirs(linkage, q, qd, F):
     return found[:n, 0], found[n:, 0], W.T @ found[n:, 0], J @ found[:n, 2:], bias
 
 
-def close(a, b, tolerance=1e-9, least=1e-3):
-    np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * np.abs(b).max(initial=least))
+def close(a, b, least=1e-3):
+    """Within 1e-9 of the quantity's own size, of `least` where it is smaller."""
+    np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(b).max(initial=least))
 
 
 def open_tree(linkage, q, qd, F):
@@ -64,23 +66,48 @@ def open_tree(linkage, q, qd, F):
     return [np.abs(size).max(initial=1e-3) for size in sizes]
 
 
-def regular(linkage, q, qd):
-    """Closures of full rank, told apart from nearly singular ones: cond(W D^-1 W') < 1e6."""
-    if not linkage.loop:
-        return True
-    at = pinocchio_peer.Terms(linkage).at(q, qd)
-    return np.linalg.cond(at["W"] @ np.linalg.solve(at["D"], at["W"].T)) < 1e6
-
-
-@settings(max_examples=60, deadline=None)
-@given(linkages(max_bodies=8), st.integers(0, 2**31))
+@settings(max_examples=40, deadline=None)
+@given(linkages(), st.integers(0, 2**31))
 def test_random_linkages_in_motion(drawn, seed):
     linkage, q, qd = drawn
-    assume(regular(linkage, q, qd))
     F = np.random.default_rng(seed).normal(size=3)
-    mine, reference = ours(linkage, q, qd, F), theirs(linkage, q, qd, F)
-    for a, b, scale in zip(mine, reference, open_tree(linkage, q, qd, F), strict=True):
-        close(a, b, least=scale)
+    for a, b in zip(ours(linkage, q, qd, F), theirs(linkage, q, qd, F), strict=True):
+        close(a, b)
+
+
+def exact(linkage, q, qd, F):
+    """(qdd, lambda, Lambda^-1) of Pinocchio's terms by elimination in rational numbers."""
+    at = pinocchio_peer.Terms(linkage).at(q, qd)
+    D, W, J, n, m = at["D"], at["W"], at["J_h"], len(q), len(at["w"])
+    right = np.zeros((n + m, 4))
+    right[:n, 0], right[n:, 0], right[:n, 1:] = J.T @ F - at["nle"], -at["w"], J.T
+    K = np.hstack([np.block([[D, -W.T], [W, np.zeros((m, m))]]), right])
+    A = np.array([[Fraction(float(v)) for v in row] for row in K])
+    for i in range(n + m):
+        pivot = i + int(np.argmax(np.abs(A[i:, i])))
+        A[[i, pivot]] = A[[pivot, i]]
+        A[i] = A[i] / A[i, i]
+        others = np.arange(n + m) != i
+        A[others] -= np.outer(A[others, i], A[i])
+    found = A[:, n + m :].astype(float)
+    return found[:n, 0], found[n:, 0], J @ found[:n, 1:]
+
+
+@settings(max_examples=30, deadline=None)
+@given(linkages(max_bodies=6), st.integers(0, 2**31))
+def test_masses_of_any_ratio(drawn, seed):
+    """Each body's between 1e-4 and 1e4 times what was drawn; sizes are those of the open tree."""
+    linkage, q, qd = drawn
+    rng = np.random.default_rng(seed)
+    factors = 10.0 ** rng.uniform(-4, 4, len(linkage.body))
+    bodies = zip(linkage.body, factors, strict=True)
+    body = tuple(replace(b, mass=b.mass * f, inertia=b.inertia * f) for b, f in bodies)
+    linkage, F = replace(linkage, body=body), rng.normal(size=3)
+    qdd, multipliers, _, mobility, _ = ours(linkage, q, qd, F)
+    free, efforts, _, open_mobility, _ = open_tree(linkage, q, qd, F)
+    mine, sizes = (qdd, multipliers, mobility), (free, efforts, open_mobility)
+    for a, b, size in zip(mine, exact(linkage, q, qd, F), sizes, strict=True):
+        close(a, b, least=size)
 
 
 @pytest.mark.parametrize("linkage", [five_bar(), chain(12)], ids=["five-bar", "chain of 12"])
@@ -150,6 +177,6 @@ def test_shipped_linkages_in_motion(name):
     if linkage.loop:
         qd = qd - np.linalg.pinv(at["W"], rcond=1e-9) @ (at["W"] @ qd)
     mine, reference = ours(linkage, q, qd, F), theirs(linkage, q, qd, F)
-    for k, scale in enumerate(open_tree(linkage, q, qd, F)):
+    for k in range(5):
         if k != 1 or rank == 2 * len(linkage.loop):
-            close(mine[k], reference[k], least=scale)
+            close(mine[k], reference[k])

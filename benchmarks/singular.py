@@ -1,0 +1,132 @@
+"""How far a singular pose throws the tip, over many rates: what a step hits there is luck.
+
+N-four-bar (IFToMM A02) of two windows, its ground line turned off the axes of the frame, under
+projection: the tip after 10 s against the closed form, at every seventh rate from 400 to 2400 Hz,
+with one mu for all right-hand sides and with each its own (`components/closure.py`).
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from benchmarks import mechanisms, state
+from benchmarks.ours import Ours
+from benchmarks.rows import Rows
+from hapticlink.components import closure, projection
+from hapticlink.components.specs import Linkage, Mechanism
+
+N, END, TURN = 2, 10.0, math.radians(30)
+RATES = range(400, 2401, 7)
+LOST = 0.1  # m
+OWN = "rk4, each its own"
+MUS: dict[str, tuple[str, float | None]] = {
+    "rk4, 1e-8 for all": ("rk4", 1e-8),
+    "rk4, 1e-13 for all": ("rk4", 1e-13),
+    OWN: ("rk4", None),
+    "dormand-prince-8, each its own": ("dormand-prince-8", None),
+}
+COLUMNS = ("mu", "rate", "error_m")
+COLOURS = dict(zip(MUS, ("#8a8a8a", "#d1495b", "#1b6ca8", "#2a9d5c"), strict=True))
+
+
+def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+    """Write README.md, rates.csv and tip-error.png to `out`."""
+    state.begin(out, ("rates.csv",))
+    rows = Rows(out / "rates.csv", COLUMNS, keys=2)
+    rates = RATES[::10] if quick else RATES
+    exact = turned(mechanisms.n_four_bar_tip(N, END))
+    for k, (name, (integrator, mu)) in enumerate(MUS.items()):
+        advance = None
+        for i, rate in enumerate(rates):
+            told(f"singular poses: {name}", k * len(rates) + i, len(MUS) * len(rates))
+            if (name, rate) in rows:
+                continue
+            if advance is None:
+                with one_mu(mu):
+                    ours = Ours(
+                        linkage(), (0.0, 0.0, 0.0), Mechanism(integrator=integrator), 1 / rate
+                    )
+                    advance = ours.advance(out / ".compiled")
+            x = advance(ours.start.copy(), round(END * rate), 1 / rate)
+            rows.add(name, rate, float(np.hypot(*(ours.outputs(x)["x"][:2] - exact))))
+    wanted = {str(r) for r in rates}
+    errors = {n: np.array([float(r["error_m"]) for r in rows.rows.values() if r["mu"] == n
+                           and r["rate"] in wanted]) for n in MUS}  # fmt: skip
+    figure(out / "tip-error.png", errors)
+    (out / "README.md").write_text(page(errors, command), encoding="utf-8")
+    shutil.rmtree(out / ".compiled", ignore_errors=True)
+
+
+def linkage() -> Linkage:
+    """The benchmark's, turned as a whole, gravity too."""
+    straight = mechanisms.n_four_bar(N)
+    joints = tuple(
+        replace(j, at_parent=turned(j.at_parent or (0.0, 0.0))) if j.parent == "ground" else j
+        for j in straight.joint
+    )
+    start = {
+        name: angle + TURN * name.startswith("pivot") for name, angle in straight.start.items()
+    }
+    gravity = turned(straight.gravity or (0.0, 0.0))
+    return replace(straight, joint=joints, start=start, gravity=gravity)
+
+
+def turned(at: tuple[float, float]) -> tuple[float, float]:
+    c, s = math.cos(TURN), math.sin(TURN)
+    return c * at[0] - s * at[1], s * at[0] + c * at[1]
+
+
+@contextmanager
+def one_mu(mu: float | None) -> Iterator[None]:
+    """Within, every right-hand side of a step is solved with `mu`; None leaves each its own."""
+    with ExitStack() as stack:
+        if mu is not None:
+            stack.enter_context(patch.object(closure, "MU_FOLLOWING", mu))
+            stack.enter_context(patch.object(projection, "MU", mu))
+            stack.enter_context(
+                patch.object(closure.ClosedLoopSolver.__init__, "__defaults__", (mu,))
+            )
+        yield
+
+
+def page(errors: dict[str, np.ndarray], command: str) -> str:
+    head = (
+        f"# Singular poses at many rates\n\nMade by `{command}`; every run is in "
+        "[rates.csv](rates.csv). N-four-bar of two windows, ground line turned by 30 degrees, "
+        f"projection:\ntip error after {END:g} s at {len(errors[OWN])} rates from "
+        f"{RATES[0]} to {RATES[-1]} Hz, m. It passes a singular pose ten times;\nhow close a stage "
+        "comes to one depends on the rate.\n\n"
+        "| integrator, mu | median | 97 % below | worst | branch lost |\n|---|--:|--:|--:|--:|\n"
+    )
+    lines = [
+        f"| {name} | {np.median(e):.1e} | {np.quantile(e, 0.97):.1e} | {e.max():.1e} | "
+        f"{int((e > LOST).sum())} of {len(e)} |"
+        for name, e in errors.items()
+    ]
+    return head + "\n".join(lines) + "\n\n![Tip error over rates](tip-error.png)\n"
+
+
+def figure(path: Path, errors: dict[str, np.ndarray]) -> None:
+    drawn, axes = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
+    for name, e in errors.items():
+        share = 100 * np.arange(1, len(e) + 1) / len(e)
+        axes.step(np.sort(e), share, where="post", color=COLOURS[name], label=name)
+    axes.set(xscale="log", xlabel="tip error after 10 s (m)", ylabel="rates with less (%)")
+    axes.set_title(
+        f"rk4, each right-hand side its own mu: at most {errors[OWN].max():.1g} m at any of "
+        f"{len(errors[OWN])} rates",
+        fontsize="medium",
+    )
+    axes.grid(alpha=0.3)
+    axes.legend(loc="lower right")
+    drawn.savefig(path, dpi=130)
+    plt.close(drawn)

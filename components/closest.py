@@ -1,0 +1,67 @@
+"""Closest points and separating axes of points, segments and convex polygons, by bounded work.
+
+Ericson, Real-Time Collision Detection (2005), sections 5.1.2, 5.1.9 and 5.2.1. Corners are
+counterclockwise, k x 2 (m).
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+TINY = 1e-300
+
+
+def edges(corners: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
+    """(start, end, normal to the right) of each edge."""
+    number = corners.shape[0]
+    found = []
+    for k in range(number):
+        a, b = corners[k, :].T, corners[(k + 1) % number, :].T
+        span = b - a
+        found.append((a, b, ca.vertcat(span[1], -span[0]) / ca.norm_2(span)))
+    return found
+
+
+def select(condition: ca.SX, one: list[ca.SX], other: list[ca.SX]) -> list[ca.SX]:
+    return [ca.if_else(condition, a, b) for a, b in zip(one, other, strict=True)]
+
+
+def along(ends: list[ca.SX], world: list[ca.SX], target: ca.SX) -> ca.SX:
+    """Share of the way from the first end to the second that is nearest to `target`, unclamped."""
+    if len(ends) == 1:
+        return ca.SX(0)
+    span = world[1] - world[0]
+    return ca.dot(target - world[0], span) / ca.dot(span, span)
+
+
+def between(ends: list[ca.SX], s: ca.SX) -> ca.SX:
+    return ends[0] if len(ends) == 1 else ends[0] + s * (ends[1] - ends[0])
+
+
+def nearest_on_boundary(walls: list[tuple[ca.SX, ca.SX, ca.SX]], at: ca.SX) -> list[ca.SX]:
+    """[point, normal] of the boundary nearest to a point: the edge's normal, or off a corner."""
+    best: list[ca.SX] = []
+    for a, b, outward in walls:
+        s = ca.dot(at - a, b - a) / ca.dot(b - a, b - a)
+        point = a + ca.fmin(ca.fmax(s, 0), 1) * (b - a)
+        away = at - point
+        distance = ca.norm_2(away)
+        on_edge = ca.logic_and(s >= 0, s <= 1)
+        normal = ca.if_else(on_edge, outward, away / (distance + TINY))
+        this = [distance, point, normal]
+        best = select(distance < best[0], this, best) if best else this
+    return best[1:]
+
+
+def way_out(
+    world: list[ca.SX], corners: ca.SX, side: ca.SX, heights: list[ca.SX]
+) -> tuple[ca.SX, ca.SX]:
+    """(distance, direction) of the axis along which a segment is farthest from a convex polygon,
+    negative where they overlap: separating axes, Ericson section 5.2.1."""
+    best = [-ca.mmax(ca.vertcat(*heights)), -side]
+    over = ca.mmin(ca.vertcat(*heights))
+    best = select(over > best[0], [over, side], best)
+    for a, _, outward in edges(corners):
+        least = ca.fmin(*(ca.dot(at - a, outward) for at in world))
+        best = select(least > best[0], [least, outward], best)
+    return best[0], best[1]

@@ -1,0 +1,200 @@
+"""What a hold knows of the energy that it makes where samples are late, and what `passive` makes of
+it: against the meter, which knows all, on forces and motions without FMUs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.energy import Meter
+from hapticlink.orchestrator.holds import HOLDS, Site
+from hapticlink.orchestrator.holds.account import Account
+from hapticlink.orchestrator.holds.passive import Passive
+from hapticlink.orchestrator.latency import Late, Latency, Link
+
+Vector = NDArray[np.float64]
+LARGEST = 5.0
+SWING = 2 * LARGEST
+"""The most by which a mean of forces within +-LARGEST can leave one of them."""
+
+
+@dataclass
+class Told:
+    """A hold, and a meter that is told no more than the hold."""
+
+    hold: Account
+    sample: Vector = field(default_factory=lambda: np.zeros(1))
+    meter: Meter | None = None
+
+    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
+        self.sample[:] = sample
+        if self.meter:
+            self.meter.sample(stamp)
+        self.hold.push(stamp, sample, arrival)
+
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
+        return self.hold.value(tick, ahead)
+
+
+@dataclass
+class Line:
+    """A force sampled every so many ticks, held behind a link by a target that steps every so many
+    ticks and is straight between: `truth` is told every sample, `told` those that arrived."""
+
+    name: str
+    latency: Latency
+    every: int
+    step: int
+
+    def __post_init__(self) -> None:
+        self.x, self.v, self.force, self.held = (np.zeros(1) for _ in range(4))
+        hold = HOLDS[self.name](Site(1, displacement=lambda: self.x, velocity=lambda: self.v))
+        assert isinstance(hold, Account)
+        self.hold = hold
+        arrived = Told(hold)
+        self.late = Late(arrived, Link(self.latency, Fraction(1)))
+        self.truth, self.told = (
+            Meter(source.copy, self.held.copy, self.x.copy)
+            for source in (self.force, arrived.sample)
+        )
+        arrived.meter = self.told
+
+    def run(
+        self, ticks: int, force: Callable[[], float], go: Callable[[int], float], begin: int = 0
+    ) -> None:
+        """`go` sets v, and gives the displacement of the step to come when the force is held."""
+        moved = 0.0
+        for tick in range(begin, begin + ticks):
+            stands = (tick - begin) % self.step == 0
+            if stands:
+                self.x += moved
+                self.truth.move(tick)
+                self.told.move(tick)
+            if (tick - begin) % self.every == 0:
+                self.force[:] = force()
+                self.truth.sample(tick)
+                self.late.push(tick, self.force, tick)
+            if stands:
+                moved = go(tick)
+                self.truth.hold(1.0)
+                self.told.hold(1.0)
+
+
+@pytest.mark.parametrize("name", ["passive", "nepce"])
+@settings(max_examples=30)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.integers(1, 9),
+    st.integers(1, 9),
+    st.floats(0, 40),
+    st.floats(0, 40),
+    st.floats(0, 0.5),
+)
+def test_its_account_is_the_meters(
+    name: str, seed: int, every: int, step: int, least: float, spread: float, loss: float
+) -> None:
+    """Any latencies and losses, random forces and motions, then a rest until all has arrived: the
+    hold has booked what a meter of the samples that it got does; and where none is lost and none
+    overtaken, that is all."""
+    generator = np.random.default_rng(seed)
+    latency = Latency(min=least, max=least + spread, loss=loss, seed=seed % 1000)
+    line = Line(name, latency, every, step)
+
+    def go(tick: int) -> float:
+        moves = tick < 200
+        line.v[:] = generator.normal() * moves
+        line.held[:] = line.late.value(tick, step / 2)
+        return float(generator.normal()) * step * moves
+
+    line.run(500, lambda: generator.uniform(-LARGEST, LARGEST), go)
+    made, scale = float(line.hold.made.sum()), 5.0 * 200
+    assert made == pytest.approx(line.told.energy(1.0).made, abs=1e-12 * scale)
+    link = line.late.link
+    if not link.lost and not link.overtaken:
+        assert made == pytest.approx(line.truth.energy(1.0).made, abs=1e-12 * scale)
+
+
+def path_over(xs: list[float], steps: int) -> float:
+    """The longest way in so many steps."""
+    ways = np.concatenate([[0.0], np.abs(np.diff(xs)).cumsum()])
+    ahead = ways[np.minimum(np.arange(len(ways)) + steps, len(ways) - 1)]
+    return float((ahead - ways).max())
+
+
+rates = st.sampled_from([(1, 1), (5, 1), (1, 5), (3, 2), (2, 7)])
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1), rates, st.integers(0, 30), st.booleans())
+def test_passive_makes_nothing_of_late_samples_where_the_way_is_foreseen(
+    seed: int, rates: tuple[int, int], least: int, known: bool
+) -> None:
+    """The theorem, its premise reaching over the latency: random forces and speeds, latencies that
+    vary without overtaking. Where no swing as large was seen before, what is made stays below the
+    swing's on the way from a stamp to the step in which it is known."""
+    generator = np.random.default_rng(seed)
+    every, step = rates
+    line = Line("passive", Latency(min=least, max=least + every - 1, seed=seed % 1000), every, step)
+    begin = 100
+    if known:
+        line.hold.push(0, np.array([-SWING]), 0)
+        line.hold.value(0)
+        line.hold.push(begin // 2, np.array([SWING]), begin // 2)
+        line.hold.value(begin // 2)
+    xs = []
+
+    def go(tick: int) -> float:
+        xs.append(float(line.x[0]))
+        before = float(line.v[0])
+        line.v[:] = generator.normal()
+        line.held[:] = line.late.value(tick, step / 2)
+        gained = float(line.v[0]) - before if known or tick > begin else 0.0
+        share = generator.choice([1.0, generator.uniform(0.0, 1.0)])
+        return float(share * (line.v[0] + gained / 2) * step)
+
+    def force() -> float:
+        return float(generator.choice([-LARGEST, LARGEST, generator.uniform(-LARGEST, LARGEST)]))
+
+    line.run(250, force, go, begin)
+    window = -(-(least + 2 * every) // step) + 2
+    limit = 0.0 if known else SWING * path_over(xs, window)
+    assert line.truth.energy(1.0).most <= limit + 1e-9
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1), rates, st.integers(0, 30), st.booleans())
+def test_what_passive_makes_of_white_noise_is_bounded(
+    seed: int, rates: tuple[int, int], least: int, known: bool
+) -> None:
+    """White forces on white motions, foreseen or not: beside the swing's first time, only steps
+    that go against what was foreseen, further, or while it is not trusted again make anything, each
+    at most (R + C) |dx|: R the largest swing, C the largest friction."""
+    generator = np.random.default_rng(seed)
+    every, step = rates
+    line = Line("passive", Latency(min=least, max=least + every - 1, seed=seed % 1000), every, step)
+    hold, xs, unforeseen = line.hold, [], 0.0
+    assert isinstance(hold, Passive)
+
+    def go(tick: int) -> float:
+        nonlocal unforeseen
+        xs.append(float(line.x[0]))
+        line.v[:] = generator.normal()
+        line.held[:] = line.late.value(tick, step / 2)
+        way = (float(line.v[0]) if known else 0.0) + generator.normal() * generator.choice([0.1, 1])
+        moved, ahead = way * step, float(hold.ahead[0])
+        foreseen = moved * ahead > 0 and abs(moved) <= abs(ahead) + abs(float(hold.straight[0]))
+        if not foreseen or hold.beta[0] < 1.0:
+            unforeseen += abs(moved)
+        return moved
+
+    line.run(250, lambda: generator.uniform(-LARGEST, LARGEST), go)
+    window = -(-(least + 2 * every) // step) + 2
+    limit = SWING * path_over(xs, window) + 2 * SWING * unforeseen
+    assert line.truth.energy(1.0).most <= limit
