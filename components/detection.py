@@ -120,7 +120,11 @@ def _on_disc(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) -> 
     world = [model.frames[pair.body].point(end) for end in ends]
     s = ca.fmin(ca.fmax(along(ends, world, center), 0), 1)
     away = between(world, s) - center
-    normal = away / (ca.norm_2(away) + TINY)
+    distance = ca.norm_2(away)
+    # A link's axis through the very centre has no way out of its own: across is the shortest.
+    span = world[-1] - world[0] if len(world) == 2 else ca.SX([1.0, 0.0])
+    across = ca.vertcat(-span[1], span[0]) / ca.norm_2(span)
+    normal = ca.if_else(distance > 0, away / (distance + TINY), across)
     return Touch(pair.body, ca.SX(1), between(ends, s), center + radius * normal, normal)
 
 

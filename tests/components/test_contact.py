@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from blocks import Running
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from mechanisms import TABLE_6_1, five_bar
 from scipy.optimize import minimize_scalar
@@ -85,6 +85,7 @@ def nearest(distance):
 
 
 @given(poses)
+@example((0.25, 0.2, 0.0))  # through the centre
 def test_gap_of_disc_and_capsule(pose):
     DISC.put(q=pose)
     at = points(pose)
