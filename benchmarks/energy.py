@@ -17,7 +17,7 @@ from benchmarks import mechanisms
 from benchmarks.mechanism import ALL, setting
 from benchmarks.ours import Ours
 from benchmarks.rows import Rows
-from hapticlink.components.specs import Mechanism
+from hapticlink.components.specs.linkage import Mechanism
 
 COLUMNS = ("integrator", "stabilization", "closure_m", "energy_drift")
 ENERGY, END, RATE, NONE = 12.6e-3, 200, 512, (0.0, 0.0, 0.0)

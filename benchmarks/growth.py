@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmarks import mechanisms
 from benchmarks.ours import Ours
 from benchmarks.rows import Rows
-from hapticlink.components.specs import Mechanism
+from hapticlink.components.specs.linkage import Mechanism
 
 COLUMNS = ("mechanism", "bodies", "build_s", "instructions", "vm_us", "c_us")
 STEPS = 500

@@ -13,10 +13,10 @@ from time import perf_counter
 
 import numpy as np
 
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Mechanism
-from hapticlink.orchestrator import scene_file
+from hapticlink.components.specs.linkage import Mechanism
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
 
 STEP = 1 / 512
@@ -42,7 +42,7 @@ def microseconds(block: Component) -> float:
 
 
 def costs() -> Iterator[str]:
-    linkage = scene_file.load("five-bar").linkage
+    linkage = open_scene.load("five-bar").linkage
     assert linkage is not None
     yield "| matrices | integrator | stabilisation | instructions | us a step |"
     yield "|---|---|---|---|---|"

@@ -22,7 +22,7 @@ from benchmarks import mechanisms, reference
 from benchmarks.ours import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.specs import Linkage, Mechanism
+from hapticlink.components.specs.linkage import Linkage, Mechanism
 
 PEERS = ("mujoco_peer", "pinocchio_peer", "exudyn_peer")
 EVALUATIONS = {

@@ -7,7 +7,7 @@ import math
 from scipy.optimize import brentq
 from scipy.special import ellipkinc
 
-from hapticlink.components.specs import Body, Joint, Linkage, Loop, OperationalPoint
+from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop, OperationalPoint
 
 GRAVITY = 9.81
 

@@ -14,9 +14,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Linkage, Mechanism
+from hapticlink.components.specs.linkage import Linkage, Mechanism
 from hapticlink.fmus.native import compile_library
 from hapticlink.fmus.native.source import functions
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.ours import Ours
-from hapticlink.components.specs import Linkage
+from hapticlink.components.specs.linkage import Linkage
 
 TOLERANCE = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
 

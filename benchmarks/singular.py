@@ -2,7 +2,7 @@
 
 N-four-bar (IFToMM A02) of two windows, its ground line turned off the axes of the frame, under
 projection: the tip after 10 s against the closed form, at every seventh rate from 400 to 2400 Hz,
-with one mu for all right-hand sides and with each its own (`components/closure.py`).
+with one mu for all right-hand sides and with each its own (`components/dynamics/closed_loop_solver.py`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ import numpy as np
 from benchmarks import mechanisms, state
 from benchmarks.ours import Ours
 from benchmarks.rows import Rows
-from hapticlink.components import closure, projection
-from hapticlink.components.specs import Linkage, Mechanism
+from hapticlink.components.dynamics import closed_loop_solver, projection
+from hapticlink.components.specs.linkage import Linkage, Mechanism
 
 N, END, TURN = 2, 10.0, math.radians(30)
 RATES = range(400, 2401, 7)
@@ -90,10 +90,10 @@ def one_mu(mu: float | None) -> Iterator[None]:
     """Within, every right-hand side of a step is solved with `mu`; None leaves each its own."""
     with ExitStack() as stack:
         if mu is not None:
-            stack.enter_context(patch.object(closure, "MU_FOLLOWING", mu))
+            stack.enter_context(patch.object(closed_loop_solver, "MU_FOLLOWING", mu))
             stack.enter_context(patch.object(projection, "MU", mu))
             stack.enter_context(
-                patch.object(closure.ClosedLoopSolver.__init__, "__defaults__", (mu,))
+                patch.object(closed_loop_solver.ClosedLoopSolver.__init__, "__defaults__", (mu,))
             )
         yield
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,39 +20,46 @@ Settings = Mapping[str, Any]
 Packaging = Literal["python", "native"]
 
 
-def _components(module: str) -> Any:
-    return import_module(f"hapticlink.components.{module}")
-
-
 def _virtual_mechanism(s: Settings, step_s: float) -> Component:
-    factory = _components("mechanism").virtual_mechanism
+    from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+
     parts = {k: s[k] for k in ("directions", "contacts", "length_scale", "frame_s") if k in s}
-    return factory(s["linkage"], s["mechanism"], **parts, step_s=step_s)
+    return virtual_mechanism(s["linkage"], s["mechanism"], **parts, step_s=step_s)
 
 
 def _virtual_environment(s: Settings, step_s: float) -> Component:
-    factory = _components("environment").virtual_environment
+    from hapticlink.components.blocks.virtual_environment import virtual_environment
+
     parts = {k: s[k] for k in ("contacts", "mobility", "local_model") if k in s}
-    return factory(s["linkage"], s["graphics"], s["directions"], **parts)
+    return virtual_environment(s["linkage"], s["graphics"], s["directions"], **parts)
 
 
 def _haptic_device(s: Settings, step_s: float) -> Component:
-    return _components("device").haptic_device(s["device"])
+    from hapticlink.components.blocks.haptic_device import haptic_device
+
+    return haptic_device(s["device"])
 
 
 def _controller(s: Settings, step_s: float) -> Component:
+    from hapticlink.components.blocks.controller import controller
+    from hapticlink.components.linkage.parameters import mean_link_length
+
     length_scale = s["directions"].length_scale
     if length_scale is None:
-        length_scale = _components("linkage").mean_link_length(s["linkage"])
-    return _components("controller").controller(s["controller"], length_scale)
+        length_scale = mean_link_length(s["linkage"])
+    return controller(s["controller"], length_scale)
 
 
 def _hand(s: Settings, step_s: float) -> Component:
-    return _components("hand").hand(s["hand"])
+    from hapticlink.components.blocks.hand import hand
+
+    return hand(s["hand"])
 
 
 def _discrete_equivalent(s: Settings, step_s: float) -> Component:
-    return _components("discrete_equivalent").discrete_equivalent(s["rule"])
+    from hapticlink.components.blocks.discrete_equivalent import discrete_equivalent
+
+    return discrete_equivalent(s["rule"])
 
 
 BLOCKS: dict[str, Callable[[Settings, float], Component]] = {

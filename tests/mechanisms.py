@@ -5,7 +5,7 @@ import math
 import numpy as np
 from hypothesis import strategies as st
 
-from hapticlink.components.specs import Body, Joint, Linkage, Loop, OperationalPoint
+from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop, OperationalPoint
 
 TABLE_6_1 = {
     "l": (0.042, 0.042, 0.0184, 0.0564),

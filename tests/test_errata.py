@@ -10,8 +10,8 @@ import pytest
 from blocks import Running
 from mechanisms import TABLE_6_1, WRENCH, five_bar
 
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Directions, Mechanism
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.linkage import Directions, Mechanism
 
 M, L, J = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"]
 F_CM = (0.3, 0.6, 0.45, 0.7)  # not 1/2: f and 1 - f must differ

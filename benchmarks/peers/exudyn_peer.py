@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hapticlink.components.specs import Linkage
+from hapticlink.components.specs.linkage import Linkage
 
 sys.exudynFast = True  # the build without range checks, as its documentation advises
 import exudyn as exu  # noqa: E402

@@ -15,7 +15,7 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 import numpy as np
 
-from hapticlink.components.specs import Linkage, Point
+from hapticlink.components.specs.linkage import Linkage, Point
 
 NAME = "MuJoCo"
 METHODS = ("Euler", "implicitfast", "RK4")

@@ -14,20 +14,21 @@ import casadi as ca
 
 from hapticlink.components.component import Variable
 from hapticlink.components.forces import drives, gravity, joints, springs
-from hapticlink.components.specs import Linkage
+from hapticlink.components.specs.linkage import Linkage
 
 if TYPE_CHECKING:
-    from hapticlink.components.linkage import LinkageModel
+    from hapticlink.components.linkage.model import LinkageModel
 
 KINDS = (gravity, springs, joints, drives)
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
+    """Those of the forces alone."""
     return [v for kind in KINDS for v in kind.parameters(linkage)]
 
 
 def efforts(model: LinkageModel) -> ca.SX:
-    """Sum of all generalised forces, n x 1."""
+    """Sum of all generalised forces, n x 1: gravity (-g of (2.3)), springs, friction, drives."""
     found = [Q for kind in KINDS if (Q := kind.efforts(model)) is not None]
     return sum(found, start=ca.SX(model.q.numel(), 1))
 

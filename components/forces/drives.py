@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs import ConstantDrive, Joint, Linkage, PDDrive
-from hapticlink.components.tables import interpolate, slope
+from hapticlink.components.specs.linkage import ConstantDrive, Joint, Linkage, PDDrive
+from hapticlink.components.time_tables import interpolate, slope
 
 if TYPE_CHECKING:
-    from hapticlink.components.linkage import LinkageModel
+    from hapticlink.components.linkage.model import LinkageModel
 
 
 def parameters(linkage: Linkage) -> list[Variable]:

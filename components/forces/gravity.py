@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs import Linkage
+from hapticlink.components.specs.linkage import Linkage
 
 if TYPE_CHECKING:
-    from hapticlink.components.linkage import LinkageModel
+    from hapticlink.components.linkage.model import LinkageModel
 
 
 def parameters(linkage: Linkage) -> list[Variable]:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs import Linkage
+from hapticlink.components.specs.linkage import Linkage
 
 if TYPE_CHECKING:
-    from hapticlink.components.linkage import LinkageModel
+    from hapticlink.components.linkage.model import LinkageModel
 
 _UNITS = {
     "revolute": ("N.m/rad", "rad", "N.m.s/rad", "N.m", "rad/s"),

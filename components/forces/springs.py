@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs import Linkage
+from hapticlink.components.specs.linkage import Linkage
 
 if TYPE_CHECKING:
-    from hapticlink.components.linkage import LinkageModel
+    from hapticlink.components.linkage.model import LinkageModel
 
 
 MET = 1e-200  # m2, of d^2: the points are in one place

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError
 
-from hapticlink.orchestrator import interrupt, rooms
-from hapticlink.orchestrator.faults import Fault
+from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.faults import Fault
 
 app = App(
     name="hapticlink",
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # SIGTERM as Ctrl-C, so that what is open is closed and temporary folders are removed.
         if on_main and handler != signal.SIG_IGN:
             signal.signal(number, interrupt.remember)
-    rooms.clear()
+    temporary_folders.clear()
     try:
         status = app(arguments, result_action="return_value", exit_on_error=False)
         sys.stdout.flush()
@@ -65,5 +65,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if on_main:
                 signal.signal(number, handler)
         interrupt.came.raised = False
-        rooms.clear()  # of processes of its own that have crashed
+        temporary_folders.clear()  # of processes of its own that have crashed
     sys.exit(status or 0)

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.commands.options import Out
-from hapticlink.orchestrator.faults import InputFault
 
 BENCHES = {
     "mechanism": "benchmarks.run:mechanism_bench",

@@ -5,45 +5,46 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hapticlink.orchestrator.commands.options import Scene, Set
+from hapticlink.orchestrator.results.summary import MECHANISM
+from hapticlink.orchestrator.run.open_fmus import KINDS
+from hapticlink.orchestrator.system.system import System
 
 if TYPE_CHECKING:
-    from hapticlink.orchestrator.ticks import Timeline
+    from hapticlink.orchestrator.base.ticks import Timeline
 
 
 def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
     """Tell what a scene consists of: rates, FMUs, connections, holds; what it needs and leaves out,
     and what that saves. Without SCENE, list the shipped scenes."""
-    from hapticlink.orchestrator import (
-        assembled,
-        blocks,
-        rooms,
-        scene_file,
-        scene_names,
-        stamps,
-        system,
-        timeline,
-    )
-    from hapticlink.orchestrator.plan import Plan
+    from hapticlink.orchestrator import open_scene
+    from hapticlink.orchestrator.base import temporary_folders
+    from hapticlink.orchestrator.plan import sample_ages
+    from hapticlink.orchestrator.plan.plan import Plan
+    from hapticlink.orchestrator.results import summary
+    from hapticlink.orchestrator.scene import find
+    from hapticlink.orchestrator.system import assemble, fmu_files, timeline
 
     if scene is None:
-        for name in scene_names.shipped():
-            print(f"{name}: {scene_file.load(name).title}")
+        for name in find.shipped():
+            print(f"{name}: {open_scene.load(name).title}")
         return 0
-    read = scene_file.load(scene, set or ())
+    read = open_scene.load(scene, set or ())
     time = timeline.timeline(read)
-    with rooms.room() as room:
-        made = system.from_scene(read, time, blocks.fmu_files(read, time, room))
-        start = assembled.at_start(made) if read.linkage and read.linkage.loop else []
+    with temporary_folders.room() as room:
+        made = assemble.from_scene(read, time, fmu_files.fmu_files(read, time, room))
+        start = at_start(made) if read.linkage and read.linkage.loop else []
     print(f"{read.title}\n{read.description.strip()}".strip())
     print(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
-    for line in assembled.moved(asdict(read.linkage), start) if read.linkage and start else ():
+    for line in summary.moved(asdict(read.linkage), start) if read.linkage and start else ():
         print(f"  {line}")
     for unit in made.units:
         timing = unit.description.timing
         print(f"  {unit.name}: {timing}, at {unit.clock}, {len(unit.description.outputs)} outputs")
     print("\nconnections (age of the newest sample when it is used, ms)")
-    ages = {name: asdict(age) for name, age in stamps.delays(Plan(made)).items()}
+    ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(made)).items()}
     for connection in made.connections:
         if connection.initial:
             note = "once, at the start"
@@ -56,9 +57,10 @@ def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
 
 
 def _needs(scene: Any, time: Timeline) -> None:
-    from hapticlink.orchestrator import costs, needs
+    from hapticlink.orchestrator.scene import requirements
+    from hapticlink.orchestrator.system import costs
 
-    found = list(needs.needs(scene))
+    found = list(requirements.needs(scene))
     for title, needed in (("needed", True), ("left out", False)):
         print(f"\n{title}")
         for need in found:
@@ -80,3 +82,21 @@ def _needs(scene: Any, time: Timeline) -> None:
 
 
 _PER_TICK = ("operations", "signals")
+
+
+def at_start(system: System) -> list[float]:
+    """q of the mechanism alone, as its FMU assembles it in initialisation; none without one."""
+    unit = system.unit.get(MECHANISM)
+    if unit is None:
+        return []
+    outputs = np.zeros(len(unit.description.outputs))
+    made = KINDS[unit.description.fmi](MECHANISM, unit.description, outputs, unit.starts)
+    with made as instance:
+        instance.enter_initialization(1.0)
+        instance.read()
+    return coordinates(dict(zip((s.name for s in unit.description.outputs), outputs, strict=True)))
+
+
+def coordinates(values: dict[str, float]) -> list[float]:
+    """q[1], q[2], ... of named values."""
+    return [float(value) for name, value in values.items() if name.startswith("q[")]

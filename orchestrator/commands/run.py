@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from hapticlink.orchestrator.base.faults import Interrupted
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
-from hapticlink.orchestrator.faults import Interrupted
 
 if TYPE_CHECKING:
     from hapticlink.orchestrator.experiment import Experiment
@@ -29,16 +29,16 @@ def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain =
         experiment = _simulate(scene, folder, set or ())
     except KeyboardInterrupt:  # a run takes those that come while it goes on
         raise Interrupted from None
-    from hapticlink.orchestrator import explain as explained
-    from hapticlink.orchestrator import folders, summary
-    from hapticlink.orchestrator.plan import Plan
+    from hapticlink.orchestrator.plan import explain as explained
+    from hapticlink.orchestrator.plan.plan import Plan
+    from hapticlink.orchestrator.results import folders, summary
 
     outcome = experiment.outcome
     if outcome.fault:
         print(f"hapticlink: {outcome.fault}", file=sys.stderr)
     others = []
     if outcome.end_time > 0:
-        from hapticlink.orchestrator.figures import draw
+        from hapticlink.orchestrator.results.figures import draw
 
         with (experiment.folder / "plan.txt").open("w", encoding="utf-8") as file:
             file.writelines(f"{line}\n" for line in explained.explain(Plan(experiment.system)))
@@ -57,25 +57,27 @@ def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain =
 
 
 def _simulate(scene: str, folder: Path, options: Sequence[str]) -> Experiment:
-    from hapticlink.orchestrator import scene_file
+    from hapticlink.orchestrator import open_scene
     from hapticlink.orchestrator.commands.progress import progress
     from hapticlink.orchestrator.experiment import simulate
 
-    read = scene_file.load(scene, options)
+    read = open_scene.load(scene, options)
     with progress(read.title, read.duration) as told:
         return simulate(read, folder, options, told)
 
 
 def _explain(scene: str, options: Sequence[str]) -> int:
     """Print the plan of a run, and run nothing."""
-    from hapticlink.orchestrator import explain, rooms, scene_file
-    from hapticlink.orchestrator.blocks import fmu_files
-    from hapticlink.orchestrator.plan import Plan
-    from hapticlink.orchestrator.system import from_scene
-    from hapticlink.orchestrator.timeline import timeline
+    from hapticlink.orchestrator import open_scene
+    from hapticlink.orchestrator.base import temporary_folders
+    from hapticlink.orchestrator.plan import explain
+    from hapticlink.orchestrator.plan.plan import Plan
+    from hapticlink.orchestrator.system.assemble import from_scene
+    from hapticlink.orchestrator.system.fmu_files import fmu_files
+    from hapticlink.orchestrator.system.timeline import timeline
 
-    read = scene_file.load(scene, options)
-    with rooms.room() as room:
+    read = open_scene.load(scene, options)
+    with temporary_folders.room() as room:
         time = timeline(read)
         system = from_scene(read, time, fmu_files(read, time, room))
         for line in explain.explain(Plan(system), explain.PRINTED):

@@ -54,9 +54,9 @@ def sweep(
     every run fails 1. A sweep that is interrupted goes on where it was when
     it is called again; runs made before are not made twice.
     """
-    from hapticlink.orchestrator import folders
+    from hapticlink.orchestrator.base.faults import InputFault
     from hapticlink.orchestrator.commands.progress import counted
-    from hapticlink.orchestrator.faults import InputFault
+    from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.sweep import figure, grid, job, row
     from hapticlink.orchestrator.sweep import sweep as make
 

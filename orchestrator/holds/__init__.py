@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from hapticlink.orchestrator.holds.context import Site
 from hapticlink.orchestrator.holds.delayed import Delayed
 from hapticlink.orchestrator.holds.first_order import FirstOrder
 from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDerivative
@@ -18,9 +19,8 @@ from hapticlink.orchestrator.holds.lead import Lead
 from hapticlink.orchestrator.holds.mean import Mean
 from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
 from hapticlink.orchestrator.holds.passive import Passive
+from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.holds.second_order import SecondOrder
-from hapticlink.orchestrator.holds.set_position import PassiveSetPosition
-from hapticlink.orchestrator.holds.site import Site
 from hapticlink.orchestrator.holds.smooth import Smooth
 from hapticlink.orchestrator.holds.zero_order import ZeroOrder
 

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.site import Site
+from hapticlink.orchestrator.holds.context import Site
 
 
 class FirstOrderDerivative:

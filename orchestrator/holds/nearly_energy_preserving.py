@@ -9,8 +9,8 @@ Hofer (5th Int. Conf. on Computational Methods for Coupled Problems, 2013).
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.holds.account import Account, Vector, repayment
-from hapticlink.orchestrator.holds.site import Site
+from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.energy_account import Account, Vector, repayment
 
 
 class NearlyEnergyPreserving(Account):

@@ -33,8 +33,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.orchestrator.holds.account import Account, Vector
-from hapticlink.orchestrator.holds.site import Site
+from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.energy_account import Account, Vector
 
 
 class Passive(Account):

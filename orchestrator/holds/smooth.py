@@ -16,8 +16,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.holds.context import Site
 from hapticlink.orchestrator.holds.history import History
-from hapticlink.orchestrator.holds.site import Site
 
 Vector = NDArray[np.float64]
 

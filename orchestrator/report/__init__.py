@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from hapticlink.orchestrator import folders, rooms
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.report import chapter1, chapter3, chapter6, page, section_b6
 from hapticlink.orchestrator.report.entry import Entry, Runs
+from hapticlink.orchestrator.results import folders
 
 CHAPTERS = (chapter1, chapter3, chapter6, section_b6)
 
@@ -16,7 +17,7 @@ def reproduce(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Pat
     """Write figures and README.md into `folder`; `tell` hears what is being made."""
     folders.made(folder)
     entries: list[Entry] = []
-    with rooms.room() as room:
+    with temporary_folders.room() as room:
         runs = Runs(room, tell)
         for chapter in CHAPTERS:
             for entry in chapter.entries(runs, folder):

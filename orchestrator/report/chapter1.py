@@ -9,7 +9,7 @@ import numpy as np
 
 from hapticlink.fmus.blocks import build_block
 from hapticlink.fmus.check import session
-from hapticlink.orchestrator import rooms
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.report import draw
 from hapticlink.orchestrator.report.entry import Entry, Runs, command
 
@@ -29,7 +29,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
 def images(rule: str, poles: np.ndarray) -> np.ndarray:
     """z of each pole s (with T = 1 s), by one step of the FMU from x = 1."""
     settings = {"rule": rule}
-    with rooms.room() as room:
+    with temporary_folders.room() as room:
         path = build_block("discrete_equivalent", settings, room, stop_time=1.0, step_size=1.0)
         with session(path) as opened:
             reference = {v.name: v.valueReference for v in opened.description.modelVariables}

@@ -10,8 +10,8 @@ import numpy as np
 
 from hapticlink.orchestrator.report import draw, measures
 from hapticlink.orchestrator.report.entry import Entry, Runs, command
-from hapticlink.orchestrator.results import Results
-from hapticlink.orchestrator.tracking import tracking
+from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.tracking import tracking
 
 DIRECTIONS = "mechanism.directions=true"
 ON = ("controller.topology=true", DIRECTIONS)

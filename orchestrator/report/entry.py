@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import Results
+from hapticlink.orchestrator.results.tables import Results
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ HEAD = """# The report's figures, from runs of the FMUs
 
 Made by `hapticlink reproduce`. The report is the traineeship report *Haptic manipulation of
 virtual linkages with closed loops* (University of Victoria), whose device has
-no printed dimensions: those used here are assumed (`components/specs.py`), so trajectories are
+no printed dimensions: those used here are assumed (`components/specs/`), so trajectories are
 compared by what they show, not point by point. Graphics at 30 Hz, haptics at 512 Hz, zero-order
 holds, Gauss-Seidel order (no added delay) where nothing else is said.
 """

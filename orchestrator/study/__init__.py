@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from hapticlink.orchestrator import folders
+from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.study import errors, page
 from hapticlink.orchestrator.sweep import Tell, sweep, table
 from hapticlink.orchestrator.sweep.job import Job

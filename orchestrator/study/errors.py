@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hapticlink.orchestrator.experiment import Experiment
-from hapticlink.orchestrator.results import Vector
+from hapticlink.orchestrator.results.tables import Vector
 from hapticlink.orchestrator.study.cases import FLOOR, REFERENCE
 from hapticlink.orchestrator.sweep import row as sweep_row
 from hapticlink.orchestrator.sweep.row import Row

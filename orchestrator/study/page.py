@@ -70,7 +70,7 @@ def _how(rows: Sequence[Row]) -> str:
         f"first second and {whole:.1g} mm in 3 s: less is not told from none. Modelling: the "
         "handle with velocity terms left out against sent. Energy: the sum over the connections "
         "that carry power across rates, made positive. Device dimensions are assumed "
-        "(`components/specs.py`)."
+        "(`components/specs/`)."
     )
     return f"## How it was measured\n\n{fill(text, 108)}"
 

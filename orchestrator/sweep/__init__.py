@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.faults import Fault
 from hapticlink.orchestrator.sweep import cluster, job, pool, table
 from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.row import DIED, REFUSED, Row, failed, measure

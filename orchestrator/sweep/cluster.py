@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.pool import Done, Work
 from hapticlink.orchestrator.sweep.row import DIED, failed

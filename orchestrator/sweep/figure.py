@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.blocks import blocks
-from hapticlink.orchestrator.faults import InputFault, unknown
-from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.sweep.grid import number
 from hapticlink.orchestrator.sweep.row import METRIC, Row
 from hapticlink.orchestrator.sweep.table import columns

@@ -16,7 +16,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.base.faults import InputFault
 
 Point = dict[str, str]
 

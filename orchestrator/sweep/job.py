@@ -16,10 +16,10 @@ from pydantic_core import to_json
 import hapticlink.components
 import hapticlink.fmus
 import hapticlink.orchestrator
-from hapticlink.orchestrator import scene_file
-from hapticlink.orchestrator.experiment import PACKAGES
-from hapticlink.orchestrator.faults import Fault, InputFault
-from hapticlink.orchestrator.scene import Scene
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.run_json import PACKAGES
+from hapticlink.orchestrator.scene.scene import Scene
 
 APART = frozenset({"commands", "report", "study"})
 """Folders of the orchestrator that no run depends on."""
@@ -50,7 +50,7 @@ def job(scene: str, options: Sequence[str], point: Mapping[str, str]) -> Job:
     """The job of `scene` with `options`, told in the table as `point`."""
     try:
         # A copy leaves behind the way back to the file's lines, which no other process takes.
-        found = replace(scene_file.load(scene, options))
+        found = replace(open_scene.load(scene, options))
         return Job(point, found, key(found))
     except Fault as fault:
         return Job(point, None, refusal=str(fault))

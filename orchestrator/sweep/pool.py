@@ -18,7 +18,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 
-from hapticlink.orchestrator import interrupt
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.row import DIED, Row, failed
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.experiment import Experiment
-from hapticlink.orchestrator.results import Results, Vector
-from hapticlink.orchestrator.tracking import has_tracking, pose_error
+from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.tracking import has_tracking, pose_error
 
 Row = dict[str, Any]
 

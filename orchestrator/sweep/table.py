@@ -9,7 +9,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from hapticlink.orchestrator.results import write_json
+from hapticlink.orchestrator.results.files import write_json
 from hapticlink.orchestrator.sweep.row import Row
 
 LAST = "run_time_s"

@@ -13,9 +13,9 @@ from blocks import Running
 from mechanisms import WRENCH, five_bar
 from scipy.optimize import brentq
 
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Mechanism
+from hapticlink.components.specs.linkage import Mechanism
 
 RATE = 512
 TAYLOR = {"heun": (1, 1, 1 / 2), "rk4": (1, 1, 1 / 2, 1 / 6, 1 / 24)}

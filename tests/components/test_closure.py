@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.closure import ClosedLoopSolver
+from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 
 
 class DenseInertia:

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from mechanisms import TABLE_6_1, five_bar
 from scipy.optimize import minimize_scalar
 
-from hapticlink.components.contact import equivalent_wrench
-from hapticlink.components.contact_specs import Contacts, Disc, Polygon
-from hapticlink.components.environment import virtual_environment
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.reach import near, out_of_reach, reach
-from hapticlink.components.specs import (
+from hapticlink.components.blocks.virtual_environment import virtual_environment
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.contact.broad_phase import near, out_of_reach, reach
+from hapticlink.components.contact.contact_forces import equivalent_wrench
+from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
+from hapticlink.components.specs.linkage import (
     Body,
     Directions,
     GraphicsCopy,

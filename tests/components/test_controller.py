@@ -7,9 +7,10 @@ from blocks import Running
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components import specs, topology
-from hapticlink.components.controller import controller
-from hapticlink.components.device import haptic_device
+from hapticlink.components import specs
+from hapticlink.components.blocks.controller import controller
+from hapticlink.components.blocks.haptic_device import haptic_device
+from hapticlink.components.control import topology
 
 L = 0.042
 # Lambda^-1 of the report's five-bar at rest, Table 6.1, and a wrench of the hand

@@ -8,10 +8,10 @@ from blocks import Running
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.components.contact_specs import Contacts, Disc, Polygon
-from hapticlink.components.environment import virtual_environment
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import (
+from hapticlink.components.blocks.virtual_environment import virtual_environment
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
+from hapticlink.components.specs.linkage import (
     Body,
     Directions,
     GraphicsCopy,

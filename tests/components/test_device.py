@@ -6,8 +6,9 @@ import pytest
 from blocks import Running
 from scipy.integrate import solve_ivp
 
-from hapticlink.components import pantograph, specs
-from hapticlink.components.device import haptic_device
+from hapticlink.components import specs
+from hapticlink.components.blocks.haptic_device import haptic_device
+from hapticlink.components.device import pantograph
 
 T = 1 / 512
 START = (-0.02, 0.01, 3.6)

@@ -6,9 +6,9 @@ import pytest
 from blocks import Running
 from mechanisms import TABLE_6_1, WRENCH, five_bar
 
-from hapticlink.components.environment import virtual_environment
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Directions, GraphicsCopy, Mechanism
+from hapticlink.components.blocks.virtual_environment import virtual_environment
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Mechanism
 
 L = np.mean(TABLE_6_1["l"])
 

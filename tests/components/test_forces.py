@@ -8,8 +8,8 @@ from mechanisms import TABLE_6_1, five_bar
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import (
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.linkage import (
     Body,
     ConstantDrive,
     Joint,

@@ -10,13 +10,13 @@ from blocks import Running
 from mechanisms import TABLE_6_1, WRENCH, five_bar
 from scipy.integrate import solve_ivp
 
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Signals
-from hapticlink.components.dyad_search import find_dyads
-from hapticlink.components.independent import start_pose
-from hapticlink.components.linkage import LinkageModel, parameters
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.mechanism_variables import start_parameters
-from hapticlink.components.specs import (
+from hapticlink.components.dynamics.variables import parameters, start_parameters
+from hapticlink.components.formulations.dyad_search import find_dyads
+from hapticlink.components.formulations.independent_coordinates import start_pose
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.linkage import (
     Body,
     Joint,
     Linkage,

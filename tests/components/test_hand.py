@@ -6,7 +6,7 @@ from blocks import Running
 from scipy.integrate import solve_ivp
 
 from hapticlink.components import specs
-from hapticlink.components.hand import hand
+from hapticlink.components.blocks.hand import hand
 
 TABLE = ((0.5, 0.0, 1.0, 0.0), (1.0, 2.0, 1.0, 0.01), (1.5, 0.0, -1.0, 0.01))
 

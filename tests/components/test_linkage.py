@@ -11,9 +11,11 @@ from hypothesis import given, settings
 from mechanisms import TABLE_6_1, five_bar, linkages
 
 from hapticlink.components.component import Signals
-from hapticlink.components.linkage import LinkageModel, mean_link_length, parameters
-from hapticlink.components.specs import Body, Joint, Linkage, OperationalPoint
-from hapticlink.components.tree import TreeInertia
+from hapticlink.components.dynamics.articulated_body import TreeInertia
+from hapticlink.components.dynamics.variables import parameters
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.specs.linkage import Body, Joint, Linkage, OperationalPoint
 
 F_CM = (0.3, 0.6, 0.45, 0.7)
 

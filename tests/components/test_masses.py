@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mechanisms import five_bar
 
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Mechanism
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.linkage import Mechanism
 
 RATE = 512
 GRAVITY = (0.0, -9.81)

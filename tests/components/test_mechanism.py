@@ -8,10 +8,10 @@ from mechanisms import Q0, TABLE_6_1, WRENCH, five_bar, open_arm
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-from hapticlink.components.assembly import AssemblyError
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.dynamics.assembly import AssemblyError
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Directions, Mechanism
+from hapticlink.components.specs.linkage import Directions, Mechanism
 
 M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
 

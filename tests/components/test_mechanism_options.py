@@ -12,14 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mechanisms import TABLE_6_1, WRENCH, five_bar, linkages
 
-from hapticlink.components import diagnostics
+from hapticlink.components.blocks.virtual_environment import virtual_environment
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Signals
-from hapticlink.components.environment import virtual_environment
-from hapticlink.components.linkage import LinkageModel, parameters
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.operational_space import OperationalSpace
-from hapticlink.components.specs import Directions, FurtherPoint, GraphicsCopy, Mechanism
-from hapticlink.orchestrator import scene_file
+from hapticlink.components.dynamics import closure_diagnostics
+from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.variables import parameters
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.linkage import Directions, FurtherPoint, GraphicsCopy, Mechanism
+from hapticlink.orchestrator import open_scene
 
 M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
 
@@ -84,7 +85,7 @@ def appendix_a_velocity(q):
 )
 def test_rank_of_shipped_linkages(name, rank):
     """Coordinates minus degrees of freedom: 2, 1, 1, 2 and 1 of them."""
-    linkage = scene_file.load(name).linkage
+    linkage = open_scene.load(name).linkage
     block = Running(mechanism(linkage, diagnostics=True))
     values = eigenvalues(*closures(linkage, block.state["q"])[2:])
     assert block.y["rank"] == rank
@@ -92,7 +93,7 @@ def test_rank_of_shipped_linkages(name, rank):
 
 
 def test_rank_drops_where_the_rods_line_up():
-    linkage = scene_file.load("n-four-bar", ["linkage.n=1"]).linkage
+    linkage = open_scene.load("n-four-bar", ["linkage.n=1"]).linkage
     block = Running(mechanism(linkage, diagnostics=True))
     assert block.y["rank"] == 2
     block.put(q=(0.0, 0.0, 0.0))
@@ -117,7 +118,7 @@ def test_rank_and_condition_against_singular_values(drawn, times):
 
 def test_condition_near_a_singular_pose():
     """40 windows at .05 rad, 80 closures: 6.1e5."""
-    linkage = scene_file.load("n-four-bar", ["linkage.n=40"]).linkage
+    linkage = open_scene.load("n-four-bar", ["linkage.n=40"]).linkage
     rank, condition, W, D = closures(linkage, [0.05] * 41 + [-0.05] * 40)
     values = eigenvalues(W, D)
     assert rank == 80
@@ -135,7 +136,7 @@ def closures(linkage, q):
     p, n = Signals("p", variables), len(q)
     symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
     model = LinkageModel(linkage, p, *symbols)
-    told = diagnostics.values(OperationalSpace(model).solver)
+    told = closure_diagnostics.values(OperationalSpace(model).solver)
     found = [told["rank"], told["condition"], model.W, model.D]
     f = ca.Function("f", [*symbols, p.vector], found)
     return [np.array(v) for v in f(q, np.zeros(n), [s for v in variables for s in v.starts])]

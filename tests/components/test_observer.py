@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from hapticlink.components import observer, rules
+from hapticlink.components.device import discretisation, observer
 
 MASS, OMEGA_N, K_D = 0.3, 50.0, 100.0
 
@@ -97,7 +97,9 @@ def test_bandwidth_and_damping():
     s = 2 / T * (z - 1) / (z + 1)
     np.testing.assert_allclose(np.abs(s), omega_n, rtol=1e-9)
     np.testing.assert_allclose(-s.real / np.abs(s), k_D / (2 * omega_n), rtol=1e-9)
-    np.testing.assert_allclose(np.sort(z.imag), np.sort(rules.pole("trapezoidal", s * T).imag))
+    np.testing.assert_allclose(
+        np.sort(z.imag), np.sort(discretisation.pole("trapezoidal", s * T).imag)
+    )
 
 
 @pytest.mark.parametrize("omega_n", [50.0, 200.0, 600.0])

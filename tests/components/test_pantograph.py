@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from hapticlink.components import pantograph, specs
+from hapticlink.components import specs
+from hapticlink.components.device import pantograph
 
 DEVICE = specs.Device()
 P = {k: v for k, v in asdict(DEVICE).items() if isinstance(v, float | int)}

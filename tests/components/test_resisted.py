@@ -7,10 +7,10 @@ from blocks import Running
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components import resisted
-from hapticlink.components.environment import virtual_environment
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import (
+from hapticlink.components.blocks.virtual_environment import virtual_environment
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.dynamics import constrained_directions
+from hapticlink.components.specs.linkage import (
     Body,
     Directions,
     GraphicsCopy,
@@ -22,16 +22,18 @@ from hapticlink.components.specs import (
 )
 
 A = ca.SX.sym("A", 3, 3)
-EIGEN = ca.Function("eigen", [A], list(resisted.eigen(A)))
+EIGEN = ca.Function("eigen", [A], list(constrained_directions.eigen(A)))
 VALUES, N, TOLERANCE, HYSTERESIS = (
     ca.SX.sym(s, k) for s, k in zip("vnth", (3, 1, 1, 1), strict=True)
 )
 COUNT = ca.Function(
     "count",
     [VALUES, N, TOLERANCE, HYSTERESIS],
-    [resisted.count(VALUES, N, TOLERANCE, HYSTERESIS)],
+    [constrained_directions.count(VALUES, N, TOLERANCE, HYSTERESIS)],
 )
-PROJECTOR = ca.Function("P", [A, N], [resisted.projector(*resisted.eigen(A), N)])
+PROJECTOR = ca.Function(
+    "P", [A, N], [constrained_directions.projector(*constrained_directions.eigen(A), N)]
+)
 
 # Below 1e-150 squares underflow; no mobility is that small.
 entry = st.floats(-1e3, 1e3).map(lambda v: v if abs(v) > 1e-100 else 0.0)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from hapticlink.components import rules
+from hapticlink.components.device import discretisation
 
 RULES = ("forward", "backward", "trapezoidal")
 A = np.array([[-3.0, 2.0], [-40.0, -1.0]])
@@ -16,7 +16,7 @@ B = np.array([[1.0, 0.0], [0.5, 2.0]])
 
 def step(rule, A, B, x, u, u_next, period):
     return np.array(
-        ca.DM(rules.step(rule, *(ca.SX(ca.DM(a)) for a in (A, B, x, u, u_next, period))))
+        ca.DM(discretisation.step(rule, *(ca.SX(ca.DM(a)) for a in (A, B, x, u, u_next, period))))
     )
 
 
@@ -50,13 +50,13 @@ def test_printed_trapezoid_does_not_integrate_a_constant():
 @given(re=st.floats(-50, 50), im=st.floats(-50, 50), period=st.floats(1e-3, 0.5))
 def test_poles_go_where_the_map_says(rule, re, im, period):
     A = np.array([[re, im], [-im, re]])
-    if abs(1 - rules.weight(rule) * complex(re, im) * period) < 1e-3:
+    if abs(1 - discretisation.weight(rule) * complex(re, im) * period) < 1e-3:
         return
     columns = [
         step(rule, A, np.zeros((2, 1)), e[:, None], [0], [0], period)[:, 0] for e in np.eye(2)
     ]
     z = np.linalg.eigvals(np.array(columns).T)
-    expected = rules.pole(rule, complex(re, im) * period)
+    expected = discretisation.pole(rule, complex(re, im) * period)
     scale = max(1.0, abs(expected))
     assert np.min(np.abs(z - expected)) < 1e-9 * scale
 
@@ -65,13 +65,13 @@ def test_image_of_the_left_half_plane():
     """Figure 1.4: forward, the half plane left of 1; backward, the disc about 1/2 of radius
     1/2; trapezoidal, the unit disc."""
     s = -np.logspace(-3, 3, 40)[:, None] + 1j * np.linspace(-500, 500, 81)
-    assert (rules.pole("forward", s).real < 1).all()
-    assert (np.abs(rules.pole("forward", s)) > 1).any()
-    assert (np.abs(rules.pole("backward", s) - 0.5) < 0.5).all()
-    assert (np.abs(rules.pole("trapezoidal", s)) < 1).all()
+    assert (discretisation.pole("forward", s).real < 1).all()
+    assert (np.abs(discretisation.pole("forward", s)) > 1).any()
+    assert (np.abs(discretisation.pole("backward", s) - 0.5) < 0.5).all()
+    assert (np.abs(discretisation.pole("trapezoidal", s)) < 1).all()
     edge = 1j * np.linspace(-500, 500, 81)
-    np.testing.assert_allclose(np.abs(rules.pole("backward", edge) - 0.5), 0.5, rtol=1e-12)
-    np.testing.assert_allclose(np.abs(rules.pole("trapezoidal", edge)), 1, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(discretisation.pole("backward", edge) - 0.5), 0.5, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(discretisation.pole("trapezoidal", edge)), 1, rtol=1e-12)
 
 
 @pytest.mark.parametrize(("rule", "order"), [("forward", 1), ("backward", 1), ("trapezoidal", 2)])
@@ -89,4 +89,4 @@ def test_order(rule, order):
 
 def test_unknown_rule_names_the_choices():
     with pytest.raises(ValueError, match=r"'tustin'.*forward, backward, trapezoidal"):
-        rules.weight("tustin")
+        discretisation.weight("tustin")

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from mechanisms import linkages
 
 from hapticlink.components.component import Signals
-from hapticlink.components.linkage import LinkageModel, parameters
-from hapticlink.components.operational_space import OperationalSpace
+from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.variables import parameters
+from hapticlink.components.linkage.model import LinkageModel
 
 
 def scaled(linkage, s):

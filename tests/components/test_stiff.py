@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from blocks import Running
 
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Body, Joint, Linkage, Mechanism, OperationalPoint
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.linkage import Body, Joint, Linkage, Mechanism, OperationalPoint
 
 
 def after(integrator, steps, stiffness, damping):

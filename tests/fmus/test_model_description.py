@@ -12,11 +12,7 @@ from hypothesis import strategies as st
 
 from hapticlink.components.component import INERTIA, MOBILITY, WRENCH
 from hapticlink.fmus.errors import InvalidUnit
-from hapticlink.fmus.model_description import (
-    feed_through,
-    initial_dependencies,
-    model_description,
-)
+from hapticlink.fmus.model_description import feed_through, initial_dependencies, model_description
 from hapticlink.fmus.units import BASES, base_unit
 
 N = {"kg": 1, "m": 1, "s": -2}

@@ -28,8 +28,10 @@ from hapticlink.fmus.build import build
 from hapticlink.fmus.check import session
 from hapticlink.fmus.native import compile_library, compiler
 from hapticlink.fmus.native.source import component_header
-from hapticlink.orchestrator import blocks, scene_file
-from hapticlink.orchestrator.timeline import timeline
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.scene import blocks
+from hapticlink.orchestrator.system import fmu_files
+from hapticlink.orchestrator.system.timeline import timeline
 
 OPTIONS = ("sensing=encoders", "controller.bias=full", "mechanism.directions=true")
 NAMES = ("hand", "controller", "haptic_device", "virtual_mechanism", "virtual_environment")
@@ -39,10 +41,10 @@ H = 1 / 512
 @pytest.fixture(scope="module")
 def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
     """Each block of the report's experiment as a Python and as a native FMU."""
-    scene = scene_file.load("closed-loop", OPTIONS)
+    scene = open_scene.load("closed-loop", OPTIONS)
     time, folder = timeline(scene), tmp_path_factory.mktemp("both")
     made = {
-        b.name: component(b.made_by, blocks.settled(scene, b, time), H)
+        b.name: component(b.made_by, fmu_files.settled(scene, b, time), H)
         for b in blocks.blocks(scene)
     }
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"}, H)

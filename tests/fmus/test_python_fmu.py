@@ -16,9 +16,9 @@ from fmpy.fmi1 import FMICallException
 from mechanisms import five_bar
 from named_fmu import Named
 
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Block, Variable
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.specs import Mechanism
+from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.fmus import build, check_fmu
 from hapticlink.fmus.check import session
 

@@ -6,17 +6,18 @@ import fmpy
 import pytest
 
 from hapticlink.fmus import check_fmu
-from hapticlink.orchestrator import blocks, scene_file
-from hapticlink.orchestrator.timeline import timeline
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.system import fmu_files
+from hapticlink.orchestrator.system.timeline import timeline
 
 OPTIONS = ("sensing=encoders", "controller.bias=full", "mechanism.directions=true")
 NAMES = ("hand", "controller", "haptic_device", "virtual_mechanism", "virtual_environment")
 
 
 def built(folder):
-    scene = scene_file.load("closed-loop", OPTIONS)
+    scene = open_scene.load("closed-loop", OPTIONS)
     folder.mkdir()
-    return blocks.fmu_files(scene, timeline(scene), folder)
+    return fmu_files.fmu_files(scene, timeline(scene), folder)
 
 
 @pytest.fixture(scope="module")

@@ -12,10 +12,11 @@ from pythonfmu.builder import FmuBuilder
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
+from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.commands import main
-from hapticlink.orchestrator.description import describe
-from hapticlink.orchestrator.system import System, Unit, connect
-from hapticlink.orchestrator.ticks import Timeline
+from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.system.assemble import connect
+from hapticlink.orchestrator.system.system import System, Unit
 
 
 @pytest.fixture(autouse=True)

@@ -13,13 +13,14 @@ from scipy.linalg import expm
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
-from hapticlink.orchestrator.crossings import Rules, assign
-from hapticlink.orchestrator.description import Description, describe
-from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.results import Table, read_table
-from hapticlink.orchestrator.run import Outcome, run
-from hapticlink.orchestrator.system import System, Unit, connect
-from hapticlink.orchestrator.ticks import Clock, Timeline
+from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.tables import Table, read_table
+from hapticlink.orchestrator.run.event_loop import Outcome, run
+from hapticlink.orchestrator.system.assemble import connect
+from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.system import System, Unit
 
 from . import oscillator
 

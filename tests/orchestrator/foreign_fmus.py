@@ -10,8 +10,8 @@ from pathlib import Path
 from fmpy import platform, platform_tuple
 from pythonfmu.builder import FmuBuilder
 
-from hapticlink.orchestrator import results
 from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.results import tables
 
 from .compiled import compiled
 
@@ -171,6 +171,6 @@ def scene(folder: Path, text: str, rate: int = 64, duration: float = 0.5) -> Pat
     return path
 
 
-def run(folder: Path, text: str, *options: str) -> tuple[Experiment, results.Results]:
+def run(folder: Path, text: str, *options: str) -> tuple[Experiment, tables.Results]:
     experiment = simulate(str(scene(folder, text)), folder / "out", options)
     return experiment, experiment.results

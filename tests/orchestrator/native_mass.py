@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fmpy import platform, sharedLibraryExtension
 
-from hapticlink.orchestrator.description import Description, describe
+from hapticlink.orchestrator.fmi.description import Description, describe
 
 from . import oscillator
 from .compiled import compiled

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.orchestrator import ssp_read
-from hapticlink.orchestrator.archives import opened, read_xml
-from hapticlink.orchestrator.description import describe
-from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.ssp import read
 
 from .foreign_fmus import DESCRIPTION
 
@@ -80,7 +80,7 @@ def test_a_damaged_entry_is_found(tmp_path: Path) -> None:
 
 
 def test_xml_of_any_size_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hapticlink.orchestrator.archives.MOST_XML", 100)
+    monkeypatch.setattr("hapticlink.orchestrator.fmi.archive.MOST_XML", 100)
     path = fmu(tmp_path / "model.fmu")
     with (
         opened(path, "FMU") as found,
@@ -122,5 +122,5 @@ SSD = """<?xml version="1.0" encoding="UTF-8"?>
 def test_malformed_ssps(tmp_path: Path, make: Callable[[Path], Path], message: str) -> None:
     path = make(tmp_path / "system.ssp")
     with pytest.raises(InputFault, match=message):
-        ssp_read.tables(path)
+        read.tables(path)
     assert {p.name for p in tmp_path.iterdir()} <= {"system.ssp"}

@@ -14,21 +14,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from hapticlink.orchestrator import scene_file
-from hapticlink.orchestrator.clocks import clocks
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.ticks import Timeline, exact
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import InputFault, SceneFault
-from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.rates import VariableRate
-from hapticlink.orchestrator.results import read_table
-from hapticlink.orchestrator.run import run
-from hapticlink.orchestrator.scene import Scene
-from hapticlink.orchestrator.schemes import CAUSAL
-from hapticlink.orchestrator.stamps import uses
-from hapticlink.orchestrator.system import System
-from hapticlink.orchestrator.ticks import Timeline, exact
-from hapticlink.orchestrator.timeline import timeline
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import uses
+from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.scene.records import VariableRate
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import clocks, timeline
 
 from .foreign_fmus import PAIR, edited, python_fmu, scene
 from .timelines import LOOP, scene_of, scenes
@@ -160,7 +159,7 @@ def test_rates_of_an_fmu_that_make_no_sense_are_told(tmp_path: Path, rate: str, 
     python_fmu(tmp_path, "Gives")
     text = f'[[fmu]]\nname = "gives"\npath = "Gives.fmu"\nrate = {rate}\n'
     with pytest.raises(InputFault, match=why):
-        scene_file.load(str(scene(tmp_path, text)))
+        open_scene.load(str(scene(tmp_path, text)))
 
 
 def test_rates_without_a_whole_tick_are_told_where_they_stand(tmp_path: Path) -> None:

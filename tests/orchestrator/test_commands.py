@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator import results
+from hapticlink.orchestrator.results import tables
 
 from .conftest import status
 
@@ -17,7 +17,7 @@ def test_a_mechanism_alone_runs_at_the_haptic_rate(
     bar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert status("run", str(bar), "--out", str(tmp_path / "out")) == 0
-    found = results.load(tmp_path / "out")
+    found = tables.load(tmp_path / "out")
     time = np.arange(129) / 512
     np.testing.assert_array_equal(found.haptics["time"], time)
     x = found.haptics["virtual_mechanism.x"][:, 0]

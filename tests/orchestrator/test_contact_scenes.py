@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import SceneFault
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ from hapticlink.orchestrator.faults import SceneFault
 )
 def test_what_is_refused(scene: str, option: str, message: str) -> None:
     with pytest.raises(SceneFault, match=message):
-        scene_file.load(scene, [option])
+        open_scene.load(scene, [option])
 
 
 def test_the_hand_feels_the_wall_and_the_link_stays_out_of_it(tmp_path: Path) -> None:

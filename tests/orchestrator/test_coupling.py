@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator import experiment
-from hapticlink.orchestrator.description import Description
-from hapticlink.orchestrator.faults import FmuFault, InputFault, SceneFault
-from hapticlink.orchestrator.iteration import Iteration
-from hapticlink.orchestrator.loops import Unconverged
-from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.scene import Scene
-from hapticlink.orchestrator.scene_file import read
-from hapticlink.orchestrator.stamps import delays, uses
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault, SceneFault
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import delays, uses
+from hapticlink.orchestrator.run.fixed_point import Unconverged
+from hapticlink.orchestrator.scene.load import read
+from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.scene.scene import Scene
 
 from . import oscillator
 from .coupled import (

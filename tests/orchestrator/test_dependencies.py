@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.explain import explain
-from hapticlink.orchestrator.plan import Plan
+from hapticlink.orchestrator.plan.explain import explain
+from hapticlink.orchestrator.plan.plan import Plan
 
 from .foreign_fmus import edited, python_fmu, scene
 

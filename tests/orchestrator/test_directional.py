@@ -11,13 +11,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.description import Description
-from hapticlink.orchestrator.directional import derivatives
-from hapticlink.orchestrator.iteration import Iteration
-from hapticlink.orchestrator.results import Table
-from hapticlink.orchestrator.run import Outcome
-from hapticlink.orchestrator.scalars import Scalar
-from hapticlink.orchestrator.system import System
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.results.tables import Table
+from hapticlink.orchestrator.run.event_loop import Outcome
+from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.system.system import System
 
 from .compiled import compiled
 from .coupled import ROWS, simulate, system

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.energy import ROWS, Meter
+from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import SceneFault
+from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 
 FORCE = "hand.F -> virtual_mechanism.F_hand"
 

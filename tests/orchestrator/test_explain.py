@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator import results
+from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base.ticks import aligned, periodic
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import Fault
-from hapticlink.orchestrator.ticks import aligned, periodic
+from hapticlink.orchestrator.results import tables
 
 
 def test_explain_tells_blocks_and_the_samples_behind_inputs(
@@ -67,7 +67,7 @@ def test_what_does_not_come_round_is_told_to_its_end(
     table = next(i for i, line in enumerate(told) if line.startswith("tick, "))
     assert kept[kept.index(told[table]) :][: len(told) - table - 1] == told[table:-1]
     ends = [line.split()[1] for line in kept[kept.index(told[table]) + 1 :]]
-    haptics = results.load(tmp_path).haptics["time"]
+    haptics = tables.load(tmp_path).haptics["time"]
     assert float(ends[-1]) == pytest.approx(haptics[-1], abs=1e-8)  # a last tick only reads
     assert len(set(ends)) >= len(haptics) - 1
 

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.orchestrator.description import Description
-from hapticlink.orchestrator.iteration import Iteration
-from hapticlink.orchestrator.run import Outcome
-from hapticlink.orchestrator.step_control import StepControl
-from hapticlink.orchestrator.system import System
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.run.event_loop import Outcome
+from hapticlink.orchestrator.scene.records import Iteration, StepControl
+from hapticlink.orchestrator.system.system import System
 
 from .coupled import ROWS, error, simulate, system
 from .native_mass import native

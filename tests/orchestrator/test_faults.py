@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator import results, rooms
+from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator.results import tables
 
 from .foreign_fmus import SLAVE, c_fmu, python_fmu, python_fmu_of, run, scene
 
@@ -237,7 +238,7 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
     ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
     assert ended.returncode in (139, -signal.SIGABRT)
     assert b"isolate = true" in ended.stderr
-    found = results.load(out)
+    found = tables.load(out)
     np.testing.assert_array_equal(found.haptics["time"], np.arange(2 * 64 + 1) / 64)
     np.testing.assert_array_equal(found.haptics["one.y"][1:], found.haptics["time"][1:])
     assert found.run["end"] == {"reason": "fault", "time": 2.0}
@@ -246,11 +247,15 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
 
 
 def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path: Path) -> None:
-    made = "from hapticlink.orchestrator import rooms; print(rooms.new()); {}"
+    name = "hapticlink.orchestrator.base.temporary_folders"
+    made = f"import {name} as folders; print(folders.new()); {{}}"
     kill = "__import__('os').kill(__import__('os').getpid(), 9)"
     script = [sys.executable, "-c", "import sys; " + made.format(f"sys.stdout.flush(); {kill}")]
     dead = Path(subprocess.run(script, capture_output=True, text=True, check=False).stdout.strip())
-    others = [Path(rooms.new()), dead.with_name(f"hapticlink-elsewhere-{dead.name[20:]}")]
+    others = [
+        Path(temporary_folders.new()),
+        dead.with_name(f"hapticlink-elsewhere-{dead.name[20:]}"),
+    ]
     others[1].mkdir()
     assert dead.is_dir()
     subprocess.run([*COMMAND, "--version"], check=True, capture_output=True)
@@ -283,7 +288,7 @@ def test_a_signal_keeps_results_and_exits_with_1(
     assert b"interrupted at t = " in said
     with pytest.raises(ProcessLookupError):  # the FMU's, when it has one of its own
         os.kill(int(started.read_text()), 0)
-    found = results.load(out)
+    found = tables.load(out)
     assert found.run["end"]["reason"] == "interrupted"
     assert found.haptics["time"][-1] == found.run["end"]["time"] >= 0.3
 
@@ -299,7 +304,7 @@ def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path: Path) -> None:
     assert ended.returncode == 1
     assert b"File too large" in ended.stderr
     assert b"Traceback" not in ended.stderr
-    found = results.load(out)
+    found = tables.load(out)
     assert found.run["end"]["time"] == found.haptics["time"][-1]
     rows = found.haptics["time"]
     np.testing.assert_array_equal(rows, np.arange(len(rows)) / 64)
@@ -336,7 +341,7 @@ def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path: Path, step:
     )
     assert ended.stdout.splitlines()[-1] == b"1", ended.stderr
     assert told.encode() in ended.stderr
-    found = results.load(tmp_path / "out")
+    found = tables.load(tmp_path / "out")
     assert found.run["end"]["reason"] == "fault"
     assert told in found.run["fault"]["message"]
     assert found.run["end"]["time"] == found.haptics["time"][-1]

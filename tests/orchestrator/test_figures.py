@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from hapticlink.orchestrator import figures, results
+from hapticlink.orchestrator.results import figures, tables
 from hapticlink.orchestrator.sweep import title
 
 from .conftest import status
@@ -26,7 +26,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     found: dict[str, Any] = {}
     save = figures._save
 
-    def keep(figure: Any, of: results.Results, name: str) -> str:
+    def keep(figure: Any, of: tables.Results, name: str) -> str:
         found[name] = figure.axes[0]
         return save(figure, of, name)
 
@@ -34,10 +34,10 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return found
 
 
-def run(scene: str, out: Path, *options: str) -> results.Results:
+def run(scene: str, out: Path, *options: str) -> tables.Results:
     settings = [part for option in options for part in ("--set", option)]
     assert status("run", scene, "--out", out, *settings) == 0
-    return results.load(out)
+    return tables.load(out)
 
 
 def test_an_early_end_stands_in_every_title(tmp_path: Path, drawn: dict[str, Any]) -> None:

@@ -10,11 +10,11 @@ import pytest
 import pythonfmu
 from pythonfmu.builder import FmuBuilder
 
-from hapticlink.orchestrator import scene_file
-from hapticlink.orchestrator.conversion import SAME, Linear, Unit, conversion
-from hapticlink.orchestrator.description import describe
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import SceneFault
+from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
 
 from .foreign_fmus import PAIR, SLAVE, edited, python_fmu, python_fmu_of, run, scene, with_units
 
@@ -380,7 +380,7 @@ def test_paths_are_relative_to_the_scene_file_and_options_reach_in(tmp_path: Pat
     text = PAIR.split("[[connection]]")[0].replace("Gives.fmu", "../Gives.fmu")
     text = text.split('[[fmu]]\nname = "takes"')[0]
     path = scene(tmp_path / "below", text)
-    read = scene_file.load(str(path), ["fmu.gives.rate=30"])
+    read = open_scene.load(str(path), ["fmu.gives.rate=30"])
     assert Path(read.fmu[0].path).samefile(tmp_path / "Gives.fmu")
     assert read.fmu[0].rate == 30
 

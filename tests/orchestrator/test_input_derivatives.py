@@ -16,13 +16,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator import input_derivatives
 from hapticlink.orchestrator.commands import main
-from hapticlink.orchestrator.description import Description
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.site import Site
-from hapticlink.orchestrator.iteration import Iteration
+from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.system import held_polynomials
 
 from . import coupled, oscillator
 from .native_mass import FLAGS, native
@@ -42,7 +42,7 @@ def test_derivatives_and_mean_of_a_polynomial(parts: list[float], width: float) 
     """Of p(t) = sum_j parts_j t^j / width^j, whose derivatives at 0 and mean are known."""
     order = len(parts) - 1
     values = np.polynomial.Polynomial(parts)(np.linspace(0, 1, order + 1))
-    derivatives, mean = input_derivatives.split(values[:, None], width)
+    derivatives, mean = held_polynomials.split(values[:, None], width)
     expected = np.polynomial.Polynomial(parts)
     np.testing.assert_allclose(mean, expected.integ()(1), rtol=0, atol=1e-12)
     for j in range(1, order + 1):
@@ -66,7 +66,7 @@ def test_what_an_fmu_is_told_is_the_hold(name: str, data: st.DataObject) -> None
     tick = stamp + data.draw(st.integers(0, period - width))  # no bend of the hold in the step
     instants = np.linspace(0, width, hold.degree + 1)
     values = np.stack([made.value(tick, s) for s in instants])
-    derivatives, mean = input_derivatives.split(values, 0.01 * width)
+    derivatives, mean = held_polynomials.split(values, 0.01 * width)
     inside = np.linspace(0, width, 7)
     found = [
         values[0]
@@ -148,7 +148,7 @@ def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus: Fmus, tmp_path: P
     assert error(constant, tmp_path, 100, "foh", 1) == pytest.approx(7.08e-3, rel=0.02)
     mixed = {"one": fmus["one"], "two": constant["two"]}
     made = oscillator.system(mixed, Fraction(1, 100), 10, "foh")
-    assert {c.name: input_derivatives.order(made, c) for c in made.connections} == {
+    assert {c.name: held_polynomials.order(made, c) for c in made.connections} == {
         "two.F -> one.F": 1,
         "one.x -> two.x1": 0,
         "one.v -> two.v1": 0,

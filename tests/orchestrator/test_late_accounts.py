@@ -13,11 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.energy import Meter
 from hapticlink.orchestrator.holds import HOLDS, Site
-from hapticlink.orchestrator.holds.account import Account
+from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.passive import Passive
-from hapticlink.orchestrator.latency import Late, Latency, Link
+from hapticlink.orchestrator.run.energy.meter import Meter
+from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.system.latency import Late, Link
 
 Vector = NDArray[np.float64]
 LARGEST = 5.0

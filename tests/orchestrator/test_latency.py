@@ -12,16 +12,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.crossings import Rules, assign
+from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.latency import Latency, Link
-from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.results import read_table
-from hapticlink.orchestrator.run import run
-from hapticlink.orchestrator.schemes import CAUSAL
-from hapticlink.orchestrator.stamps import uses
-from hapticlink.orchestrator.system import System
-from hapticlink.orchestrator.ticks import Timeline
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import uses
+from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.latency import Link
+from hapticlink.orchestrator.system.system import System
 
 from .test_plan import timelines
 

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
-from hapticlink.orchestrator.description import Description, describe
-from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.results import read_table
-from hapticlink.orchestrator.run import run
-from hapticlink.orchestrator.system import System, Unit, connect
-from hapticlink.orchestrator.ticks import Clock, Timeline
+from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.system.assemble import connect
+from hapticlink.orchestrator.system.system import System, Unit
 
 from .oscillator import driven
 from .timelines import fixed

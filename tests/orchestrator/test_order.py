@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.description import Description
+from hapticlink.orchestrator.fmi.description import Description
 
 from .oscillator import WARM, built, exact, simulate, system
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.fmus.native import compiler, host_platform
-from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
 
 from .conftest import status
@@ -92,7 +92,7 @@ def test_two_hands_are_two_fmus(
     option = f"packaging={packaging}"
     assert status("build", "two-hands", "--set", option, "--out", tmp_path) == 0
     built = sorted(p.name for p in tmp_path.iterdir())
-    hands = sorted(scene_file.load("two-hands").hands)
+    hands = sorted(open_scene.load("two-hands").hands)
     assert built == ["hand.fmu", *(f"hand_{n}.fmu" for n in hands), "virtual_mechanism.fmu"]
     assert len({(tmp_path / name).read_bytes() for name in built}) == len(built)
 
@@ -100,8 +100,8 @@ def test_two_hands_are_two_fmus(
 def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from hapticlink.orchestrator.blocks import fmu_files
-    from hapticlink.orchestrator.timeline import timeline
+    from hapticlink.orchestrator.system.fmu_files import fmu_files
+    from hapticlink.orchestrator.system.timeline import timeline
 
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
 
@@ -110,7 +110,7 @@ def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(
         return library
 
     monkeypatch.setattr("hapticlink.fmus.native.archive.compile_library", compiled)
-    scene = scene_file.load("five-bar", ("packaging=native",))
+    scene = open_scene.load("five-bar", ("packaging=native",))
 
     def built(*platforms: str) -> Path:
         return fmu_files(scene, timeline(scene), tmp_path, platforms)["virtual_mechanism"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds import HOLDS, Site
-from hapticlink.orchestrator.holds.account import repayment
+from hapticlink.orchestrator.holds.energy_account import repayment
 
 Vector = NDArray[np.float64]
 

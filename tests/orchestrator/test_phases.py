@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import SceneFault
 from hapticlink.orchestrator.sweep.job import jobs
-from hapticlink.orchestrator.timeline import timeline
+from hapticlink.orchestrator.system.timeline import timeline
 
 
 @given(st.sampled_from([(1, 4), (1, 2), (3, 4), (1, 1)]), st.sampled_from(["haptics", "graphics"]))
@@ -24,7 +24,7 @@ def test_a_phase_of_our_block_moves_it_alone(share: tuple[int, int], rate: str) 
     part = Fraction(*share)
     phase = part / (512 if rate == "haptics" else 30)
     options = [f'phases.virtual_mechanism="{phase}"', f"mechanism_at={rate}"]
-    time = timeline(scene_file.load("closed-loop", options))
+    time = timeline(open_scene.load("closed-loop", options))
     moved = time.of["virtual_mechanism"]
     others = {name for fmu, name in time.of.items() if fmu != "virtual_mechanism"}
     assert others == {"haptics", "graphics"}
@@ -136,7 +136,7 @@ def test_a_sweep_varies_phases() -> None:
 )
 def test_phases_that_make_no_sense_are_told(options: list[str], key: str, why: str) -> None:
     with pytest.raises(SceneFault) as refused:
-        scene_file.load("closed-loop", options)
+        open_scene.load("closed-loop", options)
     (finding,) = refused.value.findings
     assert finding.key == key
     assert why in finding.message

@@ -8,14 +8,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.faults import InputFault
-from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.schemes import CAUSAL, SCHEMES
-from hapticlink.orchestrator.schemes.operations import Get, Record, Set, Step
-from hapticlink.orchestrator.stamps import delays, uses
-from hapticlink.orchestrator.system import System, connect
-from hapticlink.orchestrator.ticks import Timeline
-from hapticlink.orchestrator.timeline import timeline as timeline_of
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.plan.operations import Get, Record, Set, Step
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import delays, uses
+from hapticlink.orchestrator.plan.schemes import CAUSAL, SCHEMES
+from hapticlink.orchestrator.system.assemble import connect
+from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import timeline as timeline_of
 
 from .timelines import fixed, scenes, single, varying
 

@@ -9,14 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.faults import InputFault
-from hapticlink.orchestrator.results import (
-    Recorder,
-    load,
-    read_table,
-    write_json,
-    write_over,
-)
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
+from hapticlink.orchestrator.results.tables import load, read_table
 
 
 @given(st.lists(st.floats(allow_nan=False), min_size=3, max_size=3))

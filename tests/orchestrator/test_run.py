@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.conditions import parse_condition
-from hapticlink.orchestrator.faults import FmuFault, Interrupted
-from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.results import Table, read_table
-from hapticlink.orchestrator.run import run
-from hapticlink.orchestrator.system import System, Unit
-from hapticlink.orchestrator.ticks import Timeline
+from hapticlink.orchestrator.base.faults import FmuFault, Interrupted
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.tables import Table, read_table
+from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.scene.conditions import parse_condition
+from hapticlink.orchestrator.system.system import System, Unit
 
 from .timelines import fixed, single, varying
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.orchestrator import results, summary
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import summary, tables
 
 from .conftest import status
 from .foreign_fmus import python_fmu, run, scene
@@ -27,7 +27,7 @@ def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path: Path
     out = tmp_path / "out"
     assert status("run", "closed-loop", "--out", out, *SHORT) == 0
     first = {p.name for p in out.iterdir()}
-    assert set(results.load(out).run["files"]) == first
+    assert set(tables.load(out).run["files"]) == first
     assert {"graphics.csv", "constraints.png"} <= first
     (out / "notes.txt").write_text("mine")
     outside = tmp_path / "outside.txt"
@@ -37,7 +37,7 @@ def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path: Path
     (out / "run.json").write_text(json.dumps(run))
     assert status("run", "four-bar", "--out", out, *SHORT) == 0
     found = {p.name for p in out.iterdir()}
-    assert found == {*results.load(out).run["files"], "notes.txt"}
+    assert found == {*tables.load(out).run["files"], "notes.txt"}
     assert "graphics.csv" not in found
     assert outside.read_text() == "mine"
 
@@ -107,7 +107,7 @@ def test_a_scene_of_given_fmus_has_nothing_to_build(
 def test_a_signal_of_another_rate_is_told_where_it_is(tmp_path: Path) -> None:
     phase = ("--set", "phases.virtual_mechanism=0.0005")
     assert status("run", "closed-loop", "--out", tmp_path, *SHORT, *phase) == 0
-    found = results.load(tmp_path)
+    found = tables.load(tmp_path)
     (table,) = (n for n, t in found.tables.items() if "virtual_mechanism.x" in t)
     assert table != "haptics"
     with pytest.raises(KeyError, match=rf"it is in tables\['{table}'\]"):
@@ -133,7 +133,7 @@ def workers(pid: int) -> list[bytes]:
     for task in Path(f"/proc/{pid}/task").iterdir():
         for child in (task / "children").read_text().split():
             found.append(Path(f"/proc/{child}/cmdline").read_bytes())
-    return [line for line in found if b"orchestrator.worker" in line]
+    return [line for line in found if b"orchestrator.fmi.worker" in line]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="finds the processes of a process in /proc")
@@ -154,7 +154,7 @@ def test_ctrl_c_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path: Path) -
     assert running.returncode == 1
     assert said.startswith(b"hapticlink: interrupted at t = 0")
     assert said.count(b"\n") == 1
-    assert results.load(out).run["end"]["reason"] == "interrupted"
+    assert tables.load(out).run["end"]["reason"] == "interrupted"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")

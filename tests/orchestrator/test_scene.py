@@ -2,10 +2,11 @@
 
 import pytest
 
-from hapticlink.orchestrator import scene_file, scene_names
-from hapticlink.orchestrator.faults import InputFault, SceneFault
-from hapticlink.orchestrator.rates import VariableRate
-from hapticlink.orchestrator.toml_lines import key_lines
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.scene import find, load
+from hapticlink.orchestrator.scene.records import VariableRate
+from hapticlink.orchestrator.scene.toml_keys import key_lines
 
 GOOD = """title = "A bar"
 duration = 1.0
@@ -39,13 +40,13 @@ wrench = [
 
 def findings(text: str, *options: str) -> dict[str, tuple[int | None, str]]:
     with pytest.raises(SceneFault) as refused:
-        scene_file.read(text, options)
+        load.read(text, options)
     assert refused.value.exit_status == 2
     return {f.key: (f.line, f.message) for f in refused.value.findings}
 
 
 def test_a_good_scene_is_read() -> None:
-    scene = scene_file.read(GOOD)
+    scene = load.read(GOOD)
     assert scene.hand is not None
     assert scene.hand.type == "constant"
     assert scene.ends_when == "haptic_device.workspace_margin < 0"
@@ -94,7 +95,7 @@ def test_options_change_the_scene_and_are_named_in_faults() -> None:
         "linkage.body.bar.mass=2.5",
         "title=two words",
     ]
-    scene = scene_file.read(GOOD, options)
+    scene = load.read(GOOD, options)
     assert scene.controller is not None
     assert scene.controller.topology is False
     assert scene.graphics is not None
@@ -103,37 +104,37 @@ def test_options_change_the_scene_and_are_named_in_faults() -> None:
     assert scene.linkage.body[0].mass == 2.5
     assert scene.title == "two words"
     with pytest.raises(SceneFault) as refused:
-        scene_file.read(GOOD, ["linkage.body.0.mass=-1", "sensing=encoder"])
+        load.read(GOOD, ["linkage.body.0.mass=-1", "sensing=encoder"])
     told = str(refused.value)
     assert "--set linkage.body.0.mass=-1: linkage.body[0] (bar).mass" in told
     with pytest.raises(SceneFault, match=r"--set duration.x=1: duration: \{'x': 1\} should be"):
-        scene_file.read(GOOD, ["duration.x=1"])
+        load.read(GOOD, ["duration.x=1"])
     assert "--set sensing=encoder: sensing: 'encoder' should be 'ideal' or 'encoders'" in told
 
 
 @pytest.mark.parametrize("option", ["novalue", "=3", "linkage.body.bax.mass=1"])
 def test_options_that_cannot_be_applied(option: str) -> None:
     with pytest.raises(InputFault, match=f"--set {option}"):
-        scene_file.read(GOOD, [option])
+        load.read(GOOD, [option])
 
 
 def test_sensing_reaches_the_device() -> None:
-    device = scene_file.read(GOOD, ["sensing=encoders"]).device
+    device = load.read(GOOD, ["sensing=encoders"]).device
     assert device is not None
     assert device.sensing == "encoders"
 
 
 def test_every_shipped_scene_is_good_and_found_by_name() -> None:
-    assert "closed-loop" in scene_names.shipped()
-    for name in scene_names.shipped():
-        assert scene_file.load(name).title
+    assert "closed-loop" in find.shipped()
+    for name in find.shipped():
+        assert open_scene.load(name).title
     with pytest.raises(InputFault, match="did you mean closed-loop"):
-        scene_file.load("closed-lop")
+        open_scene.load("closed-lop")
 
 
 def test_not_toml() -> None:
     with pytest.raises(SceneFault, match="line 1, column"):
-        scene_file.read("title = =")
+        load.read("title = =")
 
 
 def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:
@@ -148,12 +149,12 @@ def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:
 
 def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
     base, top = tmp_path / "base.toml", tmp_path / "top.toml"
-    base.write_text(scene_names.find("closed-loop")[1])
+    base.write_text(find.find("closed-loop")[1])
     top.write_text(f'extends = "{base}"\nduration = 1.0\n[hand]\nwrench = [1.0, 0.0, 0.0]\n')
-    scene = scene_file.load(str(top))
+    scene = open_scene.load(str(top))
     assert scene.duration == 1.0
     assert scene.hand.wrench == (1.0, 0.0, 0.0)
-    assert scene.linkage == scene_file.load("closed-loop").linkage
+    assert scene.linkage == open_scene.load("closed-loop").linkage
 
 
 def test_scenes_that_extend_each_other_are_refused(tmp_path):
@@ -161,7 +162,7 @@ def test_scenes_that_extend_each_other_are_refused(tmp_path):
     one.write_text(f'extends = "{two}"\n')
     two.write_text(f'extends = "{one}"\n')
     with pytest.raises(InputFault, match="circle"):
-        scene_file.load(str(one))
+        open_scene.load(str(one))
 
 
 def test_too_short_a_vector_and_a_misspelt_key_are_both_told() -> None:

@@ -6,9 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator import overrides, scene_file, ssp
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import InputFault, SceneFault
+from hapticlink.orchestrator.scene import load, overrides
+from hapticlink.orchestrator.ssp import names
 
 from .conftest import status
 from .foreign_fmus import python_fmu
@@ -20,7 +22,7 @@ CLOSED = 'title = "t"\nextends = "closed-loop"\n'
 
 def told(text: str, *options: str, folder: Path | None = None) -> str:
     with pytest.raises(SceneFault) as refused:
-        scene_file.read(text, options, "scene", folder)
+        load.read(text, options, "scene", folder)
     return str(refused.value)
 
 
@@ -33,13 +35,13 @@ def told(text: str, *options: str, folder: Path | None = None) -> str:
 )
 def test_a_name_with_dots_is_one_name_in_every_spelling(key: str, text: str) -> None:
     whole = text + GOOD if text.startswith("holds") else GOOD + text
-    scene = scene_file.read(whole, [f"holds.{key}=lead"])
+    scene = load.read(whole, [f"holds.{key}=lead"])
     assert scene.holds == {"e.P_c": "lead"}
 
 
 @pytest.mark.parametrize("option", ['delays."e.P_c".loss=0.5', "delays.e.P_c.loss=0.5"])
 def test_a_part_of_a_delay_is_set_beside_its_others(option: str) -> None:
-    late = scene_file.read(GOOD + '[delays]\n"e.P_c" = { min = 0.1, seed = 3 }\n', [option])
+    late = load.read(GOOD + '[delays]\n"e.P_c" = { min = 0.1, seed = 3 }\n', [option])
     found = late.delays["e.P_c"]
     assert (found.min, found.loss, found.seed) == (0.1, 0.5, 3)  # type: ignore[union-attr]
 
@@ -156,19 +158,19 @@ def test_extends_is_looked_up_from_the_file_that_says_it(
     _file(tmp_path, GOOD, "a/base/crank.toml")
     _file(tmp_path, 'extends = "base/crank.toml"\nhold = "foh"\n', "a/middle.toml")
     top = _file(tmp_path, 'extends = "../a/middle.toml"\ntitle = "top"\n', "b/top.toml")
-    scene = scene_file.load(str(top))
+    scene = open_scene.load(str(top))
     assert (scene.title, scene.hold, scene.duration) == ("top", "foh", 1.0)
     monkeypatch.chdir(tmp_path / "a")  # where base/ is, but not for the file
     lost = _file(tmp_path, 'title = "x"\nextends = "base/crank.toml"\n', "b/lost.toml")
     with pytest.raises(InputFault, match=r"lost: 1 fault\n  line 2: extends: base/crank.toml: "):
-        scene_file.load(str(lost))
+        open_scene.load(str(lost))
 
 
 def test_what_a_base_extends_in_vain_names_the_base(tmp_path: Path) -> None:
     base = _file(tmp_path, 'title = "x"\nextends = "closed-lop"\n', "base.toml")
     top = _file(tmp_path, 'extends = "base.toml"\n')
     with pytest.raises(InputFault) as refused:
-        scene_file.load(str(top))
+        open_scene.load(str(top))
     assert f"{base}, line 2: extends: closed-lop: neither a file" in str(refused.value)
     assert "did you mean closed-loop?" in str(refused.value)
 
@@ -177,7 +179,7 @@ def test_scenes_in_two_folders_that_extend_each_other_are_a_circle(tmp_path: Pat
     _file(tmp_path, 'extends = "../b/two.toml"\n', "a/one.toml")
     two = _file(tmp_path, 'extends = "../a/one.toml"\n', "b/two.toml")
     with pytest.raises(InputFault, match="circle"):
-        scene_file.load(str(two))
+        open_scene.load(str(two))
 
 
 def test_an_inherited_fault_names_the_base_and_its_line(tmp_path: Path) -> None:
@@ -244,10 +246,10 @@ def test_an_ssp_whose_structure_is_to_change(tmp_path: Path) -> None:
     path = str(tmp_path / "pendulum.ssp")
     for key in ("controller.topology=false", "linkage.gravity=[0, 0]", "packaging=native"):
         with pytest.raises(SceneFault, match="FMUs of an SSP are made: change its scene"):
-            scene_file.load(path, [key])
-    assert scene_file.load(path, ["haptics.rate=64", "duration=0.5"]).duration == 0.5
-    assert ssp.is_fixed(("graphics", "sync"))
-    assert not ssp.is_fixed(("graphics", "rate"))
+            open_scene.load(path, [key])
+    assert open_scene.load(path, ["haptics.rate=64", "duration=0.5"]).duration == 0.5
+    assert names.is_fixed(("graphics", "sync"))
+    assert not names.is_fixed(("graphics", "rate"))
 
 
 def test_iterated_where_no_plants_of_a_rate_are_connected(tmp_path: Path) -> None:

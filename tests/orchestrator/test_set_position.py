@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import SceneFault
 from hapticlink.orchestrator.holds import HOLDS, Site
+from hapticlink.orchestrator.holds.energy_tank import SetPoint
 from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.holds.set_position import SetPoint
 
 from .foreign_fmus import python_fmu_of, run
 

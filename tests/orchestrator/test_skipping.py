@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator import needs, scene_file
-from hapticlink.orchestrator.blocks import blocks
-from hapticlink.orchestrator.costs import costs
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import Table
-from hapticlink.orchestrator.timeline import timeline
+from hapticlink.orchestrator.results.tables import Table
+from hapticlink.orchestrator.scene import blocks as scene_blocks
+from hapticlink.orchestrator.scene import requirements
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.system.costs import costs
+from hapticlink.orchestrator.system.timeline import timeline
 
 SHORT = "duration=0.15"
 
@@ -35,8 +37,8 @@ def test_a_graphics_block_that_nothing_depends_on_changes_no_bit(
 ) -> None:
     options = ("controller.topology=false", "controller.impedance=false")
     without = haptics("closed-loop", tmp_path / "without", *options)
-    assert "graphics" not in {b.rate for b in blocks(scene_file.load("closed-loop", options))}
-    monkeypatch.setattr(needs, "graphics_block", lambda scene: ["to look at"])
+    assert "graphics" not in {b.rate for b in blocks(open_scene.load("closed-loop", options))}
+    monkeypatch.setattr(scene_blocks, "graphics_block", lambda scene: ["to look at"])
     shown = simulate("closed-loop", tmp_path / "with", [SHORT, *options])
     assert "virtual_environment.x[1]" in shown.results.graphics.columns
     same(without, shown.results.haptics)
@@ -64,19 +66,19 @@ def test_terms_that_are_zero_change_nothing(tmp_path: Path) -> None:
 
 
 def test_what_is_left_out_is_told_with_its_reason() -> None:
-    told = {n.part: (n.needed, n.why) for n in needs.needs(scene_file.load("obstacles"))}
+    told = {n.part: (n.needed, n.why) for n in requirements.needs(open_scene.load("obstacles"))}
     assert told["loop closures"] == (False, "no loop: no multiplier, no projection")
     assert told["link2 on post"] == (False, "out of reach: no narrow phase")
     assert told["contacts"] == (True, "2 pairs, 4 places, detected by graphics")
     assert told["virtual_environment"] == (True, "for Lambda_inv, P_c, contact geometry")
-    alone = {n.part: n.needed for n in needs.needs(scene_file.load("five-bar"))}
+    alone = {n.part: n.needed for n in requirements.needs(open_scene.load("five-bar"))}
     assert not alone["virtual_environment"]
     assert alone["loop closures"]
 
 
 @pytest.mark.parametrize("name", ["five-bar", "obstacles"])
 def test_skipping_saves_operations_and_signals(name: str) -> None:
-    scene = scene_file.load(name)
+    scene = open_scene.load(name)
     time = timeline(scene)
     kept, every = (costs(scene, time, skip=skip) for skip in (True, False))
     assert sum(c.operations for c in kept) < 0.9 * sum(c.operations for c in every)

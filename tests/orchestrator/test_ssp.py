@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd
 
-from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import InputFault, SceneFault
 
 from .foreign_fmus import PAIR, python_fmu, scene, with_units
 from .test_archives import SSD
@@ -119,7 +119,7 @@ def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path: Path) -> Non
 
 def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path: Path) -> None:
     with pytest.raises(SceneFault) as refused:
-        scene_file.load(foreign(tmp_path))
+        open_scene.load(foreign(tmp_path))
     keys = {f.key for f in refused.value.findings}
     assert keys == {"duration", "haptics.rate"}
     assert "--set haptics.rate=100" in str(refused.value)
@@ -137,7 +137,7 @@ def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path: Path
 )  # fmt: skip
 def test_what_cannot_be_read_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
     with pytest.raises(InputFault, match=message):
-        scene_file.load(foreign(tmp_path, FOREIGN.replace(old, new)))
+        open_scene.load(foreign(tmp_path, FOREIGN.replace(old, new)))
 
 
 def test_with_the_cache_off_no_folder_stays(tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
 
-from hapticlink.orchestrator import scene_file
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.faults import InputFault
 
 from .foreign_fmus import edited, python_fmu
 from .ssps import ON, TABLE, TAIL, component, connectors, line, linear, ssp, system
@@ -70,7 +70,7 @@ def test_units_between_systems(tmp_path: Path, between: str, how: str, expected:
 def test_units_of_two_kinds_across_a_border_are_refused(tmp_path: Path) -> None:
     root = CHAIN.replace(connectors(u="input"), connectors(u="input N"))
     with pytest.raises(InputFault, match=r"units of left\.out and right\.u do not fit: m is not"):
-        scene_file.load(ssp(tmp_path, root), ["haptics.rate=50"])
+        open_scene.load(ssp(tmp_path, root), ["haptics.rate=50"])
 
 
 def test_a_loop_through_borders_runs_as_in_fmpy(tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ def test_a_vector_through_borders_stays_one(tmp_path: Path) -> None:
     root = system("top", "", box + component("s", "Spring"), across)
     fmus(tmp_path, "mm")
     made = {f"{n}_fmu": (tmp_path / f"{n}.fmu").read_bytes() for n in ("Moves", "Spring")}
-    (only,) = scene_file.load(ssp(tmp_path, root, **made), ["haptics.rate=50"]).connection
+    (only,) = open_scene.load(ssp(tmp_path, root, **made), ["haptics.rate=50"]).connection
     assert (only.from_, only.to) == ("box_m.x", "s.d")
     assert (only.factor, only.offset, only.convert) == (pytest.approx(0.003, rel=1e-15), 0.0, False)
 
@@ -114,7 +114,7 @@ def test_names_stay_apart(tmp_path: Path) -> None:
         component("a_b", "Plain") + inner + component("a b", "Gives"),
         line("a b.y", "a.u") + line("a b.y", "a_b.u"),
     )
-    read = scene_file.load(ssp(tmp_path, root), ["haptics.rate=50", "fmu.a_b_2.rate=25"])
+    read = open_scene.load(ssp(tmp_path, root), ["haptics.rate=50", "fmu.a_b_2.rate=25"])
     assert [f.name for f in read.fmu] == ["a_b", "a_b_2", "a_b_3"]
     assert {(c.from_, c.to) for c in read.connection} == {
         ("a_b_3.y", "a_b_2.u"),
@@ -143,7 +143,7 @@ def test_what_cannot_be_wired_is_refused(tmp_path: Path, old: str, new: str, mes
     assert old in CHAIN + TAIL
     path = ssp(tmp_path, CHAIN.replace(old, new), TAIL.replace(old, new))
     with pytest.raises(InputFault, match=message):
-        scene_file.load(path, ["haptics.rate=50"])
+        open_scene.load(path, ["haptics.rate=50"])
 
 
 def test_text_is_not_connected(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_text_is_not_connected(tmp_path: Path) -> None:
     root = system("top", "", component("p", "Plain") + component("t", "Text"), line("p.y", "t.on"))
     made = {"Text_fmu": (tmp_path / "Text.fmu").read_bytes()}
     with pytest.raises(InputFault, match=r"names t\.on, which is text"):
-        scene_file.load(ssp(tmp_path, root, **made), ["haptics.rate=50"])
+        open_scene.load(ssp(tmp_path, root, **made), ["haptics.rate=50"])
 
 
 def test_a_circle_without_an_fmu_is_refused(tmp_path: Path) -> None:
@@ -165,4 +165,4 @@ def test_a_circle_without_an_fmu_is_refused(tmp_path: Path) -> None:
         "top", "", loop + component("q", "Plain"), line("loop.b", "loop.a") + line("q.u", "loop.b")
     )
     with pytest.raises(InputFault, match=r"in a circle without an FMU: loop\.b -> loop\.a"):
-        scene_file.load(ssp(tmp_path, root), ["haptics.rate=50"])
+        open_scene.load(ssp(tmp_path, root), ["haptics.rate=50"])

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.orchestrator import scene_file
-from hapticlink.orchestrator.faults import InputFault
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault
 
 from .ssps import (
     ON,
@@ -46,7 +46,7 @@ def starts(
     folder: Path, box: str = "", top: str = "", gives: str = "", **entries: str
 ) -> dict[str, dict[str, object]]:
     root = PARAMETERS.replace("{box}", box).replace("{top}", top).replace("{gives}", gives)
-    read = scene_file.load(ssp(folder, root, **entries), ["haptics.rate=50"])
+    read = open_scene.load(ssp(folder, root, **entries), ["haptics.rate=50"])
     return {f.name: dict(f.start) for f in read.fmu}
 
 
@@ -102,7 +102,7 @@ def test_a_value_in_a_unit_is_converted_to_that_of_its_variable(tmp_path: Path) 
     bound = connectors(gain="parameter cm") + bindings(binding(values(("gain", "30 mm"))))
     root = component("p", "Plain", bound) + component("q", "Plain")
     root = system("top", "", root, line("p.y", "q.u"))
-    plain, _ = scene_file.load(ssp(tmp_path, root), ["haptics.rate=50"]).fmu
+    plain, _ = open_scene.load(ssp(tmp_path, root), ["haptics.rate=50"]).fmu
     assert plain.start["gain"] == pytest.approx(3.0, rel=1e-15)
     scaled = binding(values(("gain", "30 mm")), mapping(("gain", "gain", linear(2, 1))))
     raw = scaled.replace("<ssm:MappingEntry", '<ssm:MappingEntry suppressUnitConversion="true"')

@@ -11,13 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.description import Description
-from hapticlink.orchestrator.faults import InputFault
-from hapticlink.orchestrator.plan import Plan
-from hapticlink.orchestrator.run import Outcome
-from hapticlink.orchestrator.stamps import delays
-from hapticlink.orchestrator.step_control import StepControl, rounded
-from hapticlink.orchestrator.system import System
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import delays
+from hapticlink.orchestrator.run.event_loop import Outcome
+from hapticlink.orchestrator.run.step_control import rounded
+from hapticlink.orchestrator.scene.records import StepControl
+from hapticlink.orchestrator.system.system import System
 
 from . import oscillator
 from .conftest import clock

@@ -17,9 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.builder import FmuBuilder
 
-from hapticlink.orchestrator.energy import Energy
-from hapticlink.orchestrator.faults import InputFault
-from hapticlink.orchestrator.results import Results, Table
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.tables import Results, Table
+from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.sweep import figure, grid, row, table
 from hapticlink.orchestrator.sweep.grid import Axis, listed, parse
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.ticks import (
+from hapticlink.orchestrator.base.ticks import (
     Timeline,
     aligned,
     common_base,

@@ -6,10 +6,7 @@ from itertools import accumulate
 
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.foreign import ForeignFmu
-from hapticlink.orchestrator.rates import AnyRate, VariableRate
-from hapticlink.orchestrator.scene import Haptics, Scene
-from hapticlink.orchestrator.ticks import (
+from hapticlink.orchestrator.base.ticks import (
     Clock,
     Timeline,
     aligned,
@@ -18,6 +15,8 @@ from hapticlink.orchestrator.ticks import (
     periodic,
     variable,
 )
+from hapticlink.orchestrator.scene.records import AnyRate, ForeignFmu, VariableRate
+from hapticlink.orchestrator.scene.scene import Haptics, Scene
 
 
 def fixed(haptics: Fraction, graphics: Fraction, steps: int, align: str = "exact") -> Timeline:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.tracking import tracking
+from hapticlink.orchestrator.results.tracking import tracking
 
 
 @pytest.fixture(scope="module")

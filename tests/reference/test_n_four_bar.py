@@ -17,8 +17,8 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipkinc
 
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.orchestrator import scene_file
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.commands import main
 
 G = 9.81
@@ -59,7 +59,7 @@ class Fast:
 
 
 def mechanism(n, rate):
-    scene = scene_file.load("n-four-bar", [f"linkage.n={n}"])
+    scene = open_scene.load("n-four-bar", [f"linkage.n={n}"])
     return Fast(virtual_mechanism(scene.linkage, scene.mechanism, step_s=1 / rate), 1 / rate)
 
 
@@ -103,7 +103,7 @@ def turned(linkage, angle):
 
 def test_steps_and_stages_that_land_on_a_singular_pose():
     """At these rates one comes within 1e-4 to 1e-7 rad: what mu cuts, and what rounding makes."""
-    scene = scene_file.load("n-four-bar", ["linkage.n=2"])
+    scene = open_scene.load("n-four-bar", ["linkage.n=2"])
     linkage, R = turned(scene.linkage, 0.7)
     component = virtual_mechanism(linkage, scene.mechanism, step_s=1e-3)
     for rate in (561, 596, 976, 1016, 1289, 2246):

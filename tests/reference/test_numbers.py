@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from hapticlink.fmus.check import session
-from hapticlink.orchestrator import blocks, scene_file
-from hapticlink.orchestrator.timeline import timeline
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.system import fmu_files
+from hapticlink.orchestrator.system.timeline import timeline
 
 Q = (0.784991951649258, -1.572795639643859, -1.25622704583455, 1.570109063323428)
 QDD = (4.287604403298784, -8.025937758732525, -12.053370282343105, 13.642585235436435)
@@ -28,8 +29,8 @@ WRENCH = (-0.5, 0.0, -0.0025)
 @pytest.fixture(scope="module")
 def at_rest(tmp_path_factory):
     """Outputs by name of the two FMUs in initialisation, the wrench set on the mechanism."""
-    scene = scene_file.load("closed-loop", ["mechanism.directions=true"])
-    files = blocks.fmu_files(scene, timeline(scene), tmp_path_factory.mktemp("fmus"))
+    scene = open_scene.load("closed-loop", ["mechanism.directions=true"])
+    files = fmu_files.fmu_files(scene, timeline(scene), tmp_path_factory.mktemp("fmus"))
     found = {}
     for name in ("virtual_mechanism", "virtual_environment"):
         with session(files[name]) as opened:

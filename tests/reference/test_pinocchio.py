@@ -17,12 +17,13 @@ from mechanisms import five_bar, linkages
 
 from benchmarks.mechanisms import chain, n_four_bar
 from benchmarks.peers import pinocchio_peer
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Signals
-from hapticlink.components.linkage import LinkageModel, parameters
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.components.operational_space import OperationalSpace
-from hapticlink.components.specs import Mechanism
-from hapticlink.orchestrator import scene_file
+from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.variables import parameters
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.linkage import Mechanism
+from hapticlink.orchestrator import open_scene
 
 
 def ours(linkage, q, qd, F):
@@ -164,7 +165,7 @@ def test_shipped_linkages_in_motion(name):
 
     Where closures repeat each other W' lambda is compared, as lambda is not unique.
     """
-    shipped = scene_file.load(name).linkage
+    shipped = open_scene.load(name).linkage
     passive = {"stiffness": None, "damping": None, "friction": None, "drive": None, "rest": None}
     joints = tuple(replace(j, **passive) for j in shipped.joint)
     linkage = replace(shipped, joint=joints, spring=(), point=())

@@ -7,15 +7,15 @@ import pytest
 from blocks import Running
 from scipy.integrate import solve_ivp
 
-from hapticlink.components.mechanism import virtual_mechanism
-from hapticlink.orchestrator import scene_file
-from hapticlink.orchestrator.faults import SceneFault
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import SceneFault
 
 H = 1 / 512
 
 
 def running(name, *options):
-    scene = scene_file.load(name, options)
+    scene = open_scene.load(name, options)
     return Running(virtual_mechanism(scene.linkage, scene.mechanism, step_s=H))
 
 
@@ -105,7 +105,7 @@ def test_the_instrument_turns_about_the_trocar():
 
 def test_a_family_has_the_members_asked_for_and_takes_changes():
     options = ["linkage.body.rocker3.mass=2.0", "linkage.n=3", "linkage.gravity=[0.0, -1.0]"]
-    linkage = scene_file.load("n-four-bar", options).linkage
+    linkage = open_scene.load("n-four-bar", options).linkage
     assert [len(linkage.body), len(linkage.joint), len(linkage.loop)] == [7, 7, 3]
     assert [b.mass for b in linkage.body] == [1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0]
     assert linkage.gravity == (0.0, -1.0)
@@ -121,4 +121,4 @@ def test_a_family_has_the_members_asked_for_and_takes_changes():
 )
 def test_a_family_refuses_what_it_cannot_build(option, message):
     with pytest.raises(SceneFault, match=message):
-        scene_file.load("n-four-bar", [option])
+        open_scene.load("n-four-bar", [option])

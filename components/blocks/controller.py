@@ -1,0 +1,146 @@
+"""Controller of the haptic device: impedance, teleoperation and topology parts in one block.
+
+    u = M_d [Lambda^-1 (F_h + F_drift + F_env - B_d v - K_d (x - x_ref)) + a_bias]
+        + C_d v - F_h + F_T
+
+the report's (4.6) with (4.3) as corrected: F_h counts once, F_T stays outside Lambda^-1.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from hapticlink.components import specs
+from hapticlink.components.component import (
+    ACCELERATION,
+    DAMPING,
+    IDENTITY,
+    INERTIA,
+    MOBILITY,
+    POSE,
+    STIFFNESS,
+    TWIST,
+    WRENCH,
+    Block,
+    Component,
+    Variable,
+)
+from hapticlink.components.control import impedance, teleoperation, topology
+
+
+def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variable]:
+    """The inputs that the chosen parts need."""
+    coupled = bool(spec.teleoperation or law)
+    needed = {
+        Variable("x_S", (3,), POSE, description="pose of the operational point"): coupled,
+        Variable("v_S", (3,), TWIST, description="velocity of the operational point"): coupled,
+        Variable("x_D", (3,), POSE, description="pose of the handle"): (
+            coupled or spec.stiffness is not None
+        ),
+        Variable("v_D", (3,), TWIST, description="velocity of the handle"): (
+            coupled or spec.damping is not None
+        ),
+        Variable("F_hand", (3,), WRENCH, description="wrench of the hand"): spec.impedance,
+        Variable("F_env", (3,), WRENCH, description="wrench of all contacts"): spec.contact,
+        Variable("M", (3, 3), INERTIA, IDENTITY, "inertia of the device"): bool(
+            spec.impedance or law
+        ),
+        Variable("c", (3,), WRENCH, description="device's velocity term C_d v"): spec.impedance,
+        Variable(
+            "Lambda_inv", (3, 3), MOBILITY, IDENTITY, "inverse inertia of the mechanism"
+        ): spec.impedance,
+        Variable("P_c", (3, 3), description="projector on the resisted directions"): bool(law),
+        Variable(
+            "a_bias", (3,), ACCELERATION, description="mechanism's acceleration without wrench"
+        ): spec.bias == "full",
+    }
+    return [variable for variable, wanted in needed.items() if wanted]
+
+
+def _gains(
+    spec: specs.Controller, law: specs.Topology | None, length_scale: float
+) -> list[Variable]:
+    gains = []
+    if spec.damping is not None:
+        gains += [Variable("B_d", (3,), DAMPING, spec.damping, "desired damping")]
+    if spec.stiffness is not None:
+        gains += [
+            Variable("K_d", (3,), STIFFNESS, spec.stiffness, "desired stiffness"),
+            Variable("x_ref", (3,), POSE, 0.0, "pose about which K_d acts"),
+        ]
+    if spec.teleoperation:
+        K_pc, B_pc = spec.teleoperation.stiffness, spec.teleoperation.damping
+        gains += [
+            Variable("K_pc", (3,), STIFFNESS, K_pc, "stiffness of the position channels"),
+            Variable("B_pc", (3,), DAMPING, B_pc, "damping of the position channels"),
+        ]
+    if law:
+        gains += [
+            Variable("k_j", (), "1/s2", law.stiffness, "joint-constraint stiffness, N/m per kg"),
+            Variable("b_j", (), "1/s", law.damping, "joint-constraint damping, N/(m/s) per kg"),
+            Variable("length_scale", (), "m", length_scale, "L, makes rotations comparable"),
+        ]
+    return gains
+
+
+def controller(spec: specs.Controller, length_scale: float) -> Component:
+    """The parts of `spec` that are on; the others have no term, no input and no parameter.
+
+    Sampled and without memory: F_motor, F_drift, F_constraint of t_k from inputs of t_k.
+    Without the impedance part the wrenches act on the device as they are,
+    u = F_drift + F_env - B_d v - K_d (x - x_ref) + F_T. length_scale is L (m).
+
+    Raises ValueError for bias "full" without the impedance part, which carries it.
+    """
+    if spec.bias == "full" and not spec.impedance:
+        raise ValueError(
+            "`controller.bias` = 'full' adds to the impedance law, and `controller.impedance` "
+            "is false: turn impedance on, or take bias = 'none'"
+        )
+    law = specs.Topology() if spec.topology is True else (spec.topology or None)
+    outputs = [Variable("F_motor", (3,), WRENCH, description="wrench asked of the motors")]
+    if spec.teleoperation:
+        outputs += [Variable("F_drift", (3,), WRENCH, description="+ on device, - on mechanism")]
+    if law:
+        outputs += [Variable("F_constraint", (3,), WRENCH, description="F_T, topology wrench")]
+    block = Block(
+        inputs=_signals(spec, law), parameters=_gains(spec, law, length_scale), outputs=outputs
+    )
+    u, p = block.u, block.p
+
+    output: dict[str, ca.SX] = {}
+    force = ca.SX.zeros(3)
+    if spec.teleoperation:
+        output["F_drift"] = teleoperation.drift_wrench(
+            u["x_S"] - u["x_D"], u["v_S"] - u["v_D"], p["K_pc"], p["B_pc"]
+        )
+        force += output["F_drift"]
+    if spec.contact:
+        force += u["F_env"]
+    if spec.damping is not None:
+        force -= p["B_d"] * u["v_D"]
+    if spec.stiffness is not None:
+        force -= p["K_d"] * (u["x_D"] - p["x_ref"])
+
+    motor = force
+    if spec.impedance:
+        a = impedance.desired_acceleration(u["Lambda_inv"], u["F_hand"] + force)
+        if spec.bias == "full":
+            a += u["a_bias"]
+        motor = impedance.motor_wrench(u["M"], a, u["c"], u["F_hand"])
+    if law:
+        pull = p["k_j"] * (u["x_S"] - u["x_D"]) + p["b_j"] * (u["v_S"] - u["v_D"])
+        wrench = topology.plain_wrench if law.form == "plain" else topology.constraint_wrench
+        output["F_constraint"] = wrench(pull, u["M"], u["P_c"], p["length_scale"])
+        motor += output["F_constraint"]
+    output["F_motor"] = motor
+
+    return block.component(
+        "controller",
+        "Impedance, four-channel teleoperation and topology controller",
+        "sampled",
+        initial={},
+        step={},
+        output=output,
+        documentation=controller.__doc__ or "",
+    )

@@ -1,0 +1,118 @@
+"""The user's hand: a constant wrench, a wrench from a table, or an arm behind a grip.
+
+Sampled: F of t_k from the handle's x and v of t_k, with + on the handle.
+"""
+
+from __future__ import annotations
+
+from hapticlink.components import integrators, specs
+from hapticlink.components.component import (
+    DAMPING,
+    POSE,
+    STIFFNESS,
+    TWIST,
+    WRENCH,
+    Block,
+    Component,
+    Variable,
+)
+from hapticlink.components.time_tables import interpolate, slope
+
+_F = Variable("F", (3,), WRENCH, description="wrench of the hand on the handle")
+_X = Variable("x", (3,), POSE, description="pose of the handle")
+_V = Variable("v", (3,), TWIST, description="velocity of the handle")
+
+
+def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
+    """F = F(t) - B v, the damper to ground where the spec has one."""
+    parameters, inputs = [], []
+    if isinstance(spec, specs.ConstantHand):
+        parameters += [Variable("wrench", (3,), WRENCH, spec.wrench, "wrench on the handle")]
+    if spec.damping is not None:
+        inputs += [_V]
+        parameters += [Variable("damping", (3,), DAMPING, spec.damping, "damping to ground")]
+    block = Block(inputs=inputs, parameters=parameters, outputs=[_F])
+    if isinstance(spec, specs.ConstantHand):
+        F, kind = block.p["wrench"], "a constant wrench"
+    else:
+        F, kind = interpolate(spec.table, block.t, "hand.table"), "a wrench from a table"
+    if spec.damping is not None:
+        F = F - block.p["damping"] * block.u["v"]
+    return block.component(
+        "hand",
+        f"Hand: {kind}",
+        "sampled",
+        initial={},
+        step={},
+        output={"F": F},
+        documentation=hand.__doc__ or "",
+    )
+
+
+def _arm(spec: specs.ArmHand) -> Component:
+    """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F, the grip
+    F = K_gr (x_a - x) + B_gr (x_a' - v)."""
+    block = Block(
+        inputs=[_X, _V],
+        parameters=[
+            Variable("mass", (3,), ("kg", "kg", "kg.m2"), spec.mass, "mass of the arm"),
+            Variable("stiffness", (3,), STIFFNESS, spec.stiffness, "arm to target path"),
+            Variable("damping", (3,), DAMPING, spec.damping, "arm to target path"),
+            Variable("grip_stiffness", (3,), STIFFNESS, spec.grip_stiffness, "arm to handle"),
+            Variable("grip_damping", (3,), DAMPING, spec.grip_damping, "arm to handle"),
+        ],
+        states=[
+            Variable("x_arm", (3,), POSE, description="pose of the arm"),
+            Variable("v_arm", (3,), TWIST, description="velocity of the arm"),
+        ],
+        outputs=[_F],
+    )
+    x, u, p, t = block.x, block.u, block.p, block.t
+    target = interpolate(spec.target, t, "hand.target")
+    target_rate = slope(spec.target, t)
+    F = p["grip_stiffness"] * (x["x_arm"] - u["x"]) + p["grip_damping"] * (x["v_arm"] - u["v"])
+    pull = p["stiffness"] * (target - x["x_arm"]) + p["damping"] * (target_rate - x["v_arm"])
+    ode = block.ode({"x_arm": x["v_arm"], "v_arm": (pull - F) / p["mass"]})
+    return block.component(
+        "hand",
+        "Hand: an arm behind a grip",
+        "sampled",
+        initial={"x_arm": u["x"], "v_arm": u["v"]},
+        step=integrators.step("rk4", ode, x.vector, u.vector, p.vector, t, block.h, [0, 1, 2]),
+        output={"F": F},
+        documentation=hand.__doc__ or "",
+    )
+
+
+def _spring(spec: specs.SpringHand) -> Component:
+    """F = K (x_t - x) + B (x_t' - v)."""
+    damped = spec.damping is not None
+    parameters = [Variable("stiffness", (3,), STIFFNESS, spec.stiffness, "to target path")]
+    if spec.damping is not None:
+        parameters.append(Variable("damping", (3,), DAMPING, spec.damping, "to target path"))
+    block = Block(inputs=[_X, _V] if damped else [_X], parameters=parameters, outputs=[_F])
+    F = block.p["stiffness"] * (interpolate(spec.target, block.t, "hand.target") - block.u["x"])
+    if damped:
+        F += block.p["damping"] * (slope(spec.target, block.t) - block.u["v"])
+    return block.component(
+        "hand",
+        "Hand: a spring to a target path",
+        "sampled",
+        initial={},
+        step={},
+        output={"F": F},
+        documentation=hand.__doc__ or "",
+    )
+
+
+def hand(spec: specs.Hand) -> Component:
+    """The hand that `spec` describes.
+
+    Constant or profile: F = F(t) - B v; x is no input, and v only where there is damping.
+    Arm: a mass held to a target path, F through the spring and damper of the grip, the
+    handle's x and v held over each step. It starts at the handle's x and v with F = 0.
+    Spring: an arm without a mass.
+    """
+    if isinstance(spec, specs.ArmHand):
+        return _arm(spec)
+    return _spring(spec) if isinstance(spec, specs.SpringHand) else _wrench(spec)

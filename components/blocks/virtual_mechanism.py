@@ -1,0 +1,212 @@
+"""The virtual mechanism: the linkage's own dynamics, at the rate of the haptic loop.
+
+    D qdd + C qd = Q + J_h' (F_hand - F_drift) + W' lambda,   W qdd + w_stab = 0   (B.6)
+    w_stab = w + 2 alpha beta W qd + alpha^2 h                                  (B.5) as corrected
+
+Contacts add Q = sum_i J_i' F_i (contact.py). Closures are kept by the stabilisation that the scene
+names: none, Baumgarte, or projection of position and velocity after each step. The start pose is
+assembled in initialisation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from hapticlink.components import forces, integrators
+from hapticlink.components.component import WRENCH, Block, Component, Variable
+from hapticlink.components.contact import contact_forces
+from hapticlink.components.contact.detection import touches
+from hapticlink.components.dynamics import closure_diagnostics, further_points, local_model
+from hapticlink.components.dynamics.articulated_body import TreeInertia
+from hapticlink.components.dynamics.assembly import assemble, require_closed
+from hapticlink.components.dynamics.constrained_directions import resisted_directions
+from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.projection import projection
+from hapticlink.components.dynamics.variables import (
+    direction_outputs,
+    direction_parameters,
+    length_parameter,
+    mechanism_parameters,
+    mobility_output,
+    motion_outputs,
+    states,
+)
+from hapticlink.components.formulations import independent_coordinates
+from hapticlink.components.formulations.embedding import Embedding
+from hapticlink.components.formulations.partitioning import Partitioning
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
+
+
+def virtual_mechanism(
+    linkage: Linkage,
+    mechanism: Mechanism,
+    directions: Directions | None = None,
+    contacts: Contacts | None = None,
+    *,
+    step_s: float,
+    length_scale: float | None = None,
+    frame_s: float | None = None,
+) -> Component:
+    """The FMU `virtual_mechanism`. With `directions` it puts out its own Lambda_inv and P_c;
+    frame_s (s) makes it the local model (B.15), with D, W, w and J_h as inputs, held for a frame.
+
+    step_s (s), the communication step, sets the default Baumgarte alpha; length_scale (m) makes
+    rotations comparable where `directions` does not say so. Raises AssemblyError where a loop
+    does not close, ValueError for an unknown method, and for a formulation that does not fit.
+    """
+    method = integrators.METHODS.get(mechanism.integrator)
+    if method is None:
+        known = sorted(integrators.METHODS)
+        raise ValueError(f"`integrator`: {mechanism.integrator!r} is unknown; take one of {known}")
+    independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
+    if contacts and not contact_forces.places(linkage, contacts):
+        contacts = None
+    parts = _Parts(linkage, mechanism, directions, contacts, frame_s)
+    block = _block(parts, method, step_s / mechanism.substeps, length_scale)
+    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"], block.t)
+    space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
+    applied = space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
+    applied += further_points.efforts(model, block.u)
+    energy = model.kinetic_energy + forces.energy(model)
+    output: dict[str, ca.SX] = {}
+    if contacts:
+        here = contacts.detection == "haptics"
+        found = (
+            touches(model, contacts, block.p)
+            if here
+            else contact_forces.held(linkage, contacts, block.u["contacts"])
+        )
+        touching = contact_forces.contact_forces(model, contacts, block.p, found)
+        applied += touching.Q
+        energy += touching.energy
+        felt = space.terms.J_h @ space.response(touching.Q)[0]
+        F_env = contact_forces.equivalent_wrench(
+            space.Lambda_inv, space.open_mobility, felt, block.p["length_scale"]
+        )
+        output |= {"F_env": F_env, "contact_gap": touching.gap}
+    qdd, multipliers = space.motion(applied)
+    output |= {
+        "x": model.x_h,
+        "v": model.v_h,
+        "q": model.q,
+        "qd": model.qd,
+        "qdd": qdd,
+        "a_bias": space.a_bias,
+        "energy": energy,
+    }
+    if linkage.loop:
+        output |= {"lambda": multipliers, "closure_error": model.closure_error}
+        output |= closure_diagnostics.values(space.solver) if mechanism.diagnostics else {}
+    output |= further_points.values(space, directions is not None)
+
+    q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
+    initial = {"q": q0, "qd": qd0}
+    stepped = _step(block, model, mechanism, applied, space)
+    if directions:
+        q1 = stepped[: model.q.numel()]
+        resisted = resisted_directions(block, space, q0, q1)
+        initial["n_resisted"] = resisted.first
+        stepped = ca.vertcat(stepped, resisted.after)
+        output |= {"Lambda_inv": space.Lambda_inv, **resisted.output}
+    component = block.component(
+        "virtual_mechanism",
+        "The linkage's own dynamics under the hand's and the drift wrench",
+        "continuous",
+        initial=initial,
+        step=stepped,
+        output=output,
+        substeps=mechanism.substeps,
+        documentation=__doc__ or "",
+        shared=not frame_s,
+    )
+    require_closed(component, model)
+    return component
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """What the mechanism has."""
+
+    linkage: Linkage
+    mechanism: Mechanism
+    directions: Directions | None
+    contacts: Contacts | None
+    frame_s: float | None
+
+
+def _block(
+    parts: _Parts, method: integrators.Integrator, step_s: float, length_scale: float | None
+) -> Block:
+    """The variables of the parts."""
+    linkage, directions, contacts = parts.linkage, parts.directions, parts.contacts
+    inputs = [
+        Variable("F_hand", (3,), WRENCH, description="wrench of the hand"),
+        Variable("F_drift", (3,), WRENCH, description="drift wrench; acts here as -"),
+    ]
+    baumgarte, period = method.baumgarte, step_s
+    if parts.frame_s:
+        baumgarte, period = local_model.BAUMGARTE, parts.frame_s
+    parameters = mechanism_parameters(linkage, parts.mechanism, baumgarte, period)
+    outputs = motion_outputs(linkage)
+    inputs += further_points.inputs(linkage)
+    outputs += further_points.outputs(linkage, directions is not None)
+    if parts.frame_s:
+        inputs += local_model.ports(linkage)
+    if linkage.loop and parts.mechanism.diagnostics:
+        outputs += closure_diagnostics.outputs()
+    memory = states(linkage)
+    if contacts or directions:
+        length = directions.length_scale if directions else length_scale
+        parameters.append(length_parameter(linkage, length))
+    if contacts:
+        parameters += contact_forces.contact_parameters(linkage, contacts)
+        outputs += contact_forces.contact_outputs()
+        if contacts.detection == "graphics":
+            inputs.append(contact_forces.contact_port(linkage, contacts))
+    if directions:
+        memory.append(Variable("n_resisted"))
+        parameters += direction_parameters(directions)
+        outputs += [mobility_output(), *direction_outputs()]
+    return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
+
+
+def _step(
+    block: Block,
+    model: LinkageModel,
+    mechanism: Mechanism,
+    applied: ca.SX,
+    space: OperationalSpace,
+) -> ca.SX:
+    """(q, qd) after h: the method on the stabilised equations, then projection if chosen; or the
+    method in independent coordinates."""
+    n = model.q.numel()
+    efforts = space.terms.efforts + applied
+    x, u, p, t = ca.vertcat(model.q, model.qd), block.u.vector, block.p.vector, block.t
+    closing = -space.terms.w
+    if model.linkage.loop and mechanism.stabilization == "baumgarte":
+        alpha, beta = block.p["alpha"], block.p["beta"]
+        closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
+    if model.linkage.loop and mechanism.formulation == "embedding":
+        given = ca.Function("efforts", [x, u, p, t], [efforts], {"cse": True})
+        embedded = Embedding(
+            model, block.p, independent_coordinates.start_pose(model, block.p), given
+        )
+        return independent_coordinates.step(mechanism.integrator, embedded, x, u, p, t, block.h)
+    qdd = space.solver.follow(efforts, closing)
+    ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
+    if model.linkage.loop and mechanism.formulation == "partitioning":
+        parted = Partitioning(
+            model, block.p, independent_coordinates.start_pose(model, block.p), ode
+        )
+        return independent_coordinates.step(mechanism.integrator, parted, x, u, p, t, block.h)
+    after = integrators.step(mechanism.integrator, ode, x, u, p, t, block.h, range(n))
+    if mechanism.stabilization == "projection":
+        own = space.terms.inertia
+        project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))
+        q1, qd1 = project(after[:n], after[n:], p)
+        after = ca.vertcat(q1, qd1)
+    return after

@@ -1,0 +1,1 @@
+"""Contacts of a linkage with an enclosure and obstacles."""

@@ -1,0 +1,83 @@
+"""Which bodies can never touch an obstacle: they need no narrow phase.
+
+A chain of revolute joints keeps every point of a body within the sum of its links' lengths of
+the joint on the ground. A prismatic or free joint on the way has no such bound. Loops only make
+the reach smaller. Lengths are those of the scene: this is structure, settled once. Pairs within
+reach are evaluated at every pose.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hapticlink.components.specs.contacts import Contacts, Pair, pairs
+from hapticlink.components.specs.linkage import Linkage, Point
+
+ORIGIN = (0.0, 0.0)
+
+
+def reach(linkage: Linkage, body: str) -> tuple[Point, float]:
+    """(centre, radius) in m of a disc that the body's shape never leaves; the radius may be inf."""
+    by_child = {j.child: j for j in linkage.joint}
+    shape = next(b for b in linkage.body if b.name == body)
+    joint = by_child[body]
+    here = joint.at_child or ORIGIN
+    length = max(math.dist(here, end) for end in shape.capsule) + (shape.radius or 0.0)
+    while True:
+        if joint.type != "revolute":
+            return ORIGIN, math.inf
+        there = joint.at_parent or ORIGIN
+        if joint.parent == "ground":
+            return there, length
+        joint = by_child[joint.parent]
+        length += math.dist(there, joint.at_child or ORIGIN)
+
+
+def near(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
+    """The pairs that can touch."""
+    far = set(out_of_reach(linkage, contacts))
+    return tuple(pair for pair in pairs(linkage, contacts) if pair not in far)
+
+
+def out_of_reach(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
+    """The pairs that can never touch, and are left out."""
+    if not contacts.broad_phase:
+        return ()
+    return tuple(p for p in pairs(linkage, contacts) if not _can_touch(linkage, contacts, p))
+
+
+def _can_touch(linkage: Linkage, contacts: Contacts, pair: Pair) -> bool:
+    center, radius = reach(linkage, pair.body)
+    if pair.kind == "disc":
+        disc = contacts.disc[pair.index]
+        return math.dist(center, disc.center) < radius + disc.radius
+    if pair.kind == "enclosure":
+        walls = edges(counterclockwise(contacts.enclosure or ()))
+        return any(_beyond(center, *wall) > -radius for wall in walls)
+    walls = edges(counterclockwise(contacts.polygon[pair.index].corners))
+    if all(_beyond(center, *wall) <= 0 for wall in walls):
+        return True
+    return min(_distance(center, *wall) for wall in walls) < radius
+
+
+def counterclockwise(corners: tuple[Point, ...]) -> tuple[Point, ...]:
+    """The corners with the inside on the left of every edge."""
+    area = sum(a[0] * b[1] - b[0] * a[1] for a, b in edges(corners))
+    return corners if area > 0 else corners[::-1]
+
+
+def edges(corners: tuple[Point, ...]) -> list[tuple[Point, Point]]:
+    return list(zip(corners, (*corners[1:], *corners[:1]), strict=True))
+
+
+def _beyond(point: Point, a: Point, b: Point) -> float:
+    """Distance of a point to the right of a -> b, negative on the left."""
+    across = (b[1] - a[1]) * (point[0] - a[0]) - (b[0] - a[0]) * (point[1] - a[1])
+    return across / math.dist(a, b)
+
+
+def _distance(point: Point, a: Point, b: Point) -> float:
+    """Distance of a point to the segment a b."""
+    along = (b[0] - a[0]) * (point[0] - a[0]) + (b[1] - a[1]) * (point[1] - a[1])
+    s = min(max(along / math.dist(a, b) ** 2, 0.0), 1.0)
+    return math.dist(point, (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])))

@@ -1,0 +1,145 @@
+"""Penalty contact of capsule-shaped links, without pulling (k_contact, b_contact of section B.6).
+
+    g  = n . (x - x_plane) - r,   g' = n . v          gap (m) and its rate at the contact point
+    F  = n max(0, -k g - b g')  where g < 0, else 0
+    Q  = sum_i J_i' F_i
+
+At the operational point all contacts together act as F_env (2.18), which has their effect there
+and the least norm in the scaled metric S = diag(1, 1, L):
+
+    Lambda^-1 F_env = J D^-1 (I - W' (W D^-1 W')^-1 W D^-1) sum_i J_i' F_i
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from hapticlink.components.component import WRENCH, Signals, Variable
+from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.contact.detection import (
+    COLUMNS,
+    Touch,
+    obstacle_parameters,
+    shape_parameters,
+    touches,
+)
+from hapticlink.components.dynamics import constrained_directions
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.linkage import Linkage
+
+FAR = 1e9  # m
+# Share of the largest eigenvalue below which a direction takes no part in F_env; nor does one
+# that the loops lock.
+RANK = 1e-6
+
+
+def places(linkage: Linkage, contacts: Contacts) -> int:
+    """Number of places where a link can touch an obstacle."""
+    return sum(pair.places for pair in near(linkage, contacts))
+
+
+def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
+    """The contact geometry that the virtual environment hands to the mechanism, a row a place."""
+    rows = places(linkage, contacts)
+    text = "active, point in the body, point and normal of the obstacle's plane, a row a contact"
+    return Variable("contacts", (rows, len(COLUMNS)), COLUMNS, description=text)
+
+
+def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
+    """Of the side that evaluates the forces."""
+    return [
+        *detection_parameters(linkage, contacts, contacts.detection == "haptics"),
+        Variable("k_contact", (), "N/m", contacts.stiffness, "stiffness of a contact"),
+        Variable("b_contact", (), "N.s/m", contacts.damping, "damping of a contact"),
+    ]
+
+
+def detection_parameters(
+    linkage: Linkage, contacts: Contacts, obstacles: bool = True
+) -> list[Variable]:
+    """Radii of the links, and the obstacles where they are searched."""
+    radii = {b.name: b.radius for b in linkage.body if b.radius is not None}
+    found = shape_parameters(near(linkage, contacts), radii)
+    return found + (obstacle_parameters(contacts) if obstacles else [])
+
+
+def contact_outputs() -> list[Variable]:
+    return [
+        Variable("F_env", (3,), WRENCH, description="wrench of all contacts at operational point"),
+        Variable("contact_gap", (), "m", description="smallest gap of an active contact"),
+    ]
+
+
+def gap(model: LinkageModel, touch: Touch) -> ca.SX:
+    """g, m."""
+    at = model.frames[touch.body].point(touch.point)
+    return ca.dot(touch.normal, at - touch.plane) - model.p[f"{touch.body}.radius"]
+
+
+def detected(model: LinkageModel, contacts: Contacts) -> ca.SX:
+    """The `contacts` rows at the model's pose; active within the margin."""
+    rows = []
+    for touch in touches(model, contacts, model.p):
+        active = ca.logic_and(touch.active, gap(model, touch) < contacts.margin)
+        rows.append(Touch(touch.body, active, touch.point, touch.plane, touch.normal).row)
+    return ca.vertcat(*rows)
+
+
+def held(linkage: Linkage, contacts: Contacts, rows: ca.SX) -> list[Touch]:
+    """The places that the `contacts` rows tell of."""
+    bodies = [pair.body for pair in near(linkage, contacts) for _ in range(pair.places)]
+    return [
+        Touch(body, row[0] > 0.5, row[1:3].T, row[3:5].T, row[5:7].T)
+        for body, row in zip(bodies, ca.vertsplit(rows), strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class ContactForces:
+    """Q (n x 1) of all contacts, the energy (J) stored in them, and the smallest gap (m)."""
+
+    Q: ca.SX
+    energy: ca.SX
+    gap: ca.SX
+
+
+def contact_forces(
+    model: LinkageModel, contacts: Contacts, p: Signals, found: list[Touch]
+) -> ContactForces:
+    """Forces at the model's pose and velocity; the touching point counts as one of the body."""
+    wrenches: dict[str, ca.SX] = {}
+    energy, least = ca.SX(0), ca.SX(FAR)
+    for touch in found:
+        frame = model.frames[touch.body]
+        arm = frame.rotation @ touch.point
+        turning = model.rate(frame.angle)
+        v = model.rate(frame.origin) + turning * ca.vertcat(-arm[1], arm[0])
+        g, rate = gap(model, touch), ca.dot(touch.normal, v)
+        touching = ca.logic_and(touch.active, g < 0)
+        push = ca.fmax(0, -p["k_contact"] * g - p["b_contact"] * rate)
+        F = touch.normal * ca.if_else(touching, push, 0)
+        wrench = ca.vertcat(F, arm[0] * F[1] - arm[1] * F[0])
+        wrenches[touch.body] = wrenches.get(touch.body, ca.SX(3, 1)) + wrench
+        energy += ca.if_else(touching, 0.5 * p["k_contact"] * g**2, 0)
+        least = ca.fmin(least, ca.if_else(touch.active, g, FAR))
+    poses = [ca.vertcat(model.frames[b].origin, model.frames[b].angle) for b in wrenches]
+    Q = ca.SX(model.q.numel(), 1)
+    if poses:
+        Q = ca.jtimes(ca.vertcat(*poses), model.q, ca.vertcat(*wrenches.values()), True)
+    return ContactForces(Q, energy, ca.if_else(least < FAR, least, contacts.margin))
+
+
+def equivalent_wrench(
+    Lambda_inv: ca.SX, open_mobility: ca.SX, acceleration: ca.SX, length_scale: ca.SX
+) -> ca.SX:
+    """F of least scaled norm with Lambda^-1 F = a: S (S Lambda^-1 S)^+ S a; open_mobility is
+    J D^-1 J' of the open linkage."""
+    S = constrained_directions.scaling(length_scale)
+    values, vectors = constrained_directions.eigen(S @ Lambda_inv @ S)
+    least = constrained_directions.locked(open_mobility, length_scale)
+    kept = values > ca.fmax(RANK * constrained_directions.largest(values), least)
+    inverse = ca.if_else(kept, 1 / ca.if_else(kept, values, 1), 0)
+    return S @ (vectors @ (inverse * (vectors.T @ (S @ acceleration))))

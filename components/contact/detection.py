@@ -1,0 +1,165 @@
+"""Where a link is nearest to what it can touch: point, normal and gap, by bounded work.
+
+A link is a capsule, the points within `radius` of a segment. Each place of a pair is a `Touch`: a
+point on the segment, and the plane of the obstacle that faces it. There is always a fixed number
+of places, each with a flag: no iteration, no branch.
+
+    enclosure   each end against its two nearest walls
+    disc        the segment's point nearest to the centre
+    polygon     each end's nearest point of the boundary, and the corner that is nearest to
+                the inside of the segment
+
+A link that sinks in deeper than its radius is still pushed back by the way that it came, up to the
+middle of the obstacle, where another way out is as short (closest.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from hapticlink.components.component import Signals, Variable
+from hapticlink.components.contact.broad_phase import counterclockwise, near
+from hapticlink.components.contact.closest_points import (
+    TINY,
+    along,
+    between,
+    edges,
+    nearest_on_boundary,
+    select,
+    way_out,
+)
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.contacts import Contacts, Pair
+
+COLUMNS = ("1", "m", "m", "m", "m", "1", "1")
+"""A row of the `contacts` port: active, point in the body (x, y), point and normal of the plane."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A place where a link may touch: in the body's frame the point, in the world the plane."""
+
+    body: str
+    active: ca.SX
+    point: ca.SX
+    plane: ca.SX
+    normal: ca.SX
+
+    @property
+    def row(self) -> ca.SX:
+        return ca.vertcat(self.active, self.point, self.plane, self.normal).T
+
+
+def obstacle_parameters(contacts: Contacts) -> list[Variable]:
+    """Geometry of the obstacles as `fixed` parameters, corners counterclockwise."""
+
+    def corners(name: str, points: tuple[tuple[float, float], ...]) -> Variable:
+        ordered = counterclockwise(points)
+        flat = tuple(value for point in ordered for value in point)
+        text = f"corners of {name}, counterclockwise"
+        return Variable(f"{name}.corners", (len(points), 2), "m", flat, text, "fixed")
+
+    found = []
+    if contacts.enclosure:
+        found.append(corners("enclosure", contacts.enclosure))
+    for i, disc in enumerate(contacts.disc):
+        name = disc.name or f"disc{i + 1}"
+        text = f"centre of {name}"
+        found.append(Variable(f"{name}.center", (2,), "m", disc.center, text, "fixed"))
+        found.append(Variable(f"{name}.radius", (), "m", disc.radius, f"of {name}", "fixed"))
+    for i, polygon in enumerate(contacts.polygon):
+        found.append(corners(polygon.name or f"polygon{i + 1}", polygon.corners))
+    return found
+
+
+def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) -> list[Variable]:
+    """Radii of the bodies that can touch something, by body name."""
+    names = dict.fromkeys(pair.body for pair in pairs)
+    return [
+        Variable(f"{n}.radius", (), "m", model_bodies[n], f"radius of {n}", "fixed") for n in names
+    ]
+
+
+def touches(model: LinkageModel, contacts: Contacts, p: Signals) -> list[Touch]:
+    """Every place of every pair within reach, in the order of `reach.near`."""
+    found = []
+    for pair in near(model.linkage, contacts):
+        ends = _ends(model, pair.body)
+        if pair.kind == "enclosure":
+            found += [t for end in ends for t in _in_corner(model, pair.body, end, p)]
+        elif pair.kind == "disc":
+            found.append(_on_disc(model, pair, ends, p))
+        else:
+            found += _on_polygon(model, pair, ends, p)
+    return found
+
+
+def _ends(model: LinkageModel, body: str) -> list[ca.SX]:
+    shape = next(b for b in model.linkage.body if b.name == body)
+    return [ca.SX(list(end)) for end in shape.capsule]
+
+
+def _in_corner(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:
+    at = model.frames[body].point(end)
+    walls = [
+        [ca.dot(at - a, -outward), a, -outward] for a, _, outward in edges(p["enclosure.corners"])
+    ]
+    first, second = select(walls[0][0] < walls[1][0], walls[0] + walls[1], walls[1] + walls[0]), []
+    first, second = first[:3], first[3:]
+    for wall in walls[2:]:
+        nearer, next_one = wall[0] < first[0], wall[0] < second[0]
+        second = select(nearer, first, select(next_one, wall, second))
+        first = select(nearer, wall, first)
+    return [Touch(body, ca.SX(1), end, plane, normal) for _, plane, normal in (first, second)]
+
+
+def _on_disc(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) -> Touch:
+    center, radius = p[f"{pair.obstacle}.center"], p[f"{pair.obstacle}.radius"]
+    world = [model.frames[pair.body].point(end) for end in ends]
+    s = ca.fmin(ca.fmax(along(ends, world, center), 0), 1)
+    away = between(world, s) - center
+    distance = ca.norm_2(away)
+    # A link's axis through the very centre has no way out of its own: across is the shortest.
+    span = world[-1] - world[0] if len(world) == 2 else ca.SX([1.0, 0.0])
+    across = ca.vertcat(-span[1], span[0]) / ca.norm_2(span)
+    normal = ca.if_else(distance > 0, away / (distance + TINY), across)
+    return Touch(pair.body, ca.SX(1), between(ends, s), center + radius * normal, normal)
+
+
+def _on_polygon(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) -> list[Touch]:
+    corners = p[f"{pair.obstacle}.corners"]
+    world = [model.frames[pair.body].point(end) for end in ends]
+    found = []
+    for end, at in zip(ends, world, strict=True):
+        plane, normal = nearest_on_boundary(edges(corners), at)
+        found.append(Touch(pair.body, ca.SX(1), end, plane, normal))
+    if len(ends) == 2:
+        found.append(_nearest_corner(pair.body, ends, world, corners))
+    return found
+
+
+def _nearest_corner(body: str, ends: list[ca.SX], world: list[ca.SX], corners: ca.SX) -> Touch:
+    """The corner nearest to the inside of the segment, not active where none faces it.
+
+    The plane stands along the segment. Its normal points to the segment; where the segment has
+    sunk in past the corner, no deeper than its way out, to the side where it gets out.
+    """
+    span = world[1] - world[0]
+    side = ca.vertcat(-span[1], span[0]) / ca.norm_2(span)
+    heights = [ca.dot(side, world[0] - corners[k, :].T) for k in range(corners.shape[0])]
+    depth, outward = way_out(world, corners, side, heights)
+    up = ca.if_else(ca.dot(outward, side) >= 0, 1, -1)
+    best: list[ca.SX] = []
+    for k, height in enumerate(heights):
+        corner = corners[k, :].T
+        s = along(ends, world, corner)
+        inside = ca.logic_and(s > 0, s < 1)
+        sunk = ca.logic_and(depth <= up * height, depth < 0)
+        sign = ca.if_else(sunk, up, ca.if_else(height >= 0, 1, -1))
+        distance = ca.if_else(inside, sign * height, ca.SX(1e9))
+        point = between(ends, ca.fmin(ca.fmax(s, 0), 1))
+        this = [distance, inside, point, corner, sign * side]
+        best = select(distance < best[0], this, best) if best else this
+    return Touch(body, *best[1:])

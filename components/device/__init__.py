@@ -1,0 +1,1 @@
+"""The haptic device: twin pantograph, encoders, observer."""

@@ -1,0 +1,160 @@
+"""Products with D and D^-1 of a tree in linear work: the articulated-body recursion.
+
+Featherstone, Rigid Body Dynamics Algorithms (2008), sections 5.3 and 7.3, in the plane. Spatial
+vectors (omega, v_x, v_y) stand in the world's axes at the coordinate's own joint point; X carries
+them from the parent's point, forces go back by X' (so a revolute S is (1, 0, 0), and nothing is
+lost to rounding in a mechanism far from the origin):
+
+    leaf to root   U_i = I_i S_i,  d_i = S_i' U_i,  I_parent += X_i' (I_i - U_i U_i'/d_i) X_i
+    inward b       u_i = b_i - S_i' p_i,  p_parent += X_i' (p_i + U_i u_i/d_i)
+    outward u      a_i = u_i - U_i' X_i A_parent/d_i,  A_i = X_i A_parent + S_i a_i
+    D a            A_i = X_i A_parent + S_i a_i, then leaf to root  f_parent += X_i' f_i,
+                   f_i += I_i A_i,  b_i = S_i' f_i
+
+    D^-1 = outward d^-1 inward, and outward is the transpose of inward
+
+The same D as (2.10): a serial chain of n links costs O(n), where D itself has n^2 entries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from hapticlink.components.linkage.model import LinkageModel
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One column of motion: its index in q, the one it stands on, its twist and inertia."""
+
+    index: int
+    parent: int | None
+    X: ca.SX
+    S: ca.SX
+    inertia: ca.SX
+
+
+def to_point(r: ca.SX) -> ca.SX:
+    """X with (v_x, v_y, omega) at an offset r (m) = X (omega, v_x, v_y) here."""
+    return ca.vertcat(ca.horzcat(-r[1], 1, 0), ca.horzcat(r[0], 0, 1), ca.horzcat(1, 0, 0))
+
+
+def _shift(r: ca.SX) -> ca.SX:
+    """X with (omega, v_x, v_y) at an offset r (m) = X (omega, v_x, v_y) here."""
+    return ca.sparsify(to_point(r))[[2, 0, 1], :]
+
+
+def symmetric(A: ca.SX) -> ca.SX:
+    """A symmetric matrix by its lower triangle: the upper one's operations are never made."""
+    return ca.tril2symm(ca.tril(A))
+
+
+def _coordinates(model: LinkageModel, extra: Mapping[str, tuple[ca.SX, ca.SX]]) -> list[Coordinate]:
+    """From the ground outward; a body's inertia stands on the last coordinate of its joint."""
+    found: list[Coordinate] = []
+    tip: dict[str, tuple[int | None, ca.SX]] = {"ground": (None, ca.SX(2, 1))}
+    bodies = {b.name: b for b in model.linkage.body}
+    for joint in model.outward:
+        body = bodies[joint.child]
+        m, inertia = model.p[f"{body.name}.mass"], model.p[f"{body.name}.inertia"]
+        at, twists = model.twists(joint)
+        parent, before = tip[joint.parent]
+        X = ca.sparsify(to_point(model.centers[body.name] - at))
+        own = symmetric(X.T @ ca.diag(ca.vertcat(m, m, inertia)) @ X)
+        if body.name in extra:
+            point, K = extra[body.name]
+            X = ca.sparsify(to_point(point - at))
+            own = own + symmetric(X.T @ K @ X)
+        for k, S in enumerate(twists):
+            last = k == len(twists) - 1
+            shift = _shift(at - before) if k == 0 else ca.SX.eye(3)
+            index = model.coordinate(joint.name) + k
+            found.append(Coordinate(index, parent, shift, S, own if last else ca.SX(3, 3)))
+            parent = len(found) - 1
+        tip[joint.child] = parent, at
+    return found
+
+
+class TreeInertia:
+    """D + sum over bodies of J_b' K_b J_b, as an operator on n x r columns.
+
+    extra: by body, a point (m, in the world) and a symmetric K_b on (v_x, v_y, omega) there.
+    """
+
+    def __init__(
+        self, model: LinkageModel, extra: Mapping[str, tuple[ca.SX, ca.SX]] | None = None
+    ) -> None:
+        self.n = model.q.numel()
+        self._tree = _coordinates(model, extra or {})
+        articulated = [c.inertia for c in self._tree]
+        # U/d, and 1/d in the order of q.
+        self._gain: list[ca.SX] = [ca.SX(3, 1)] * self.n
+        d_inv: list[ca.SX] = [ca.SX(0)] * self.n
+        for i in reversed(range(self.n)):
+            c = self._tree[i]
+            U = articulated[i] @ c.S
+            d_inv[c.index] = 1 / ca.dot(c.S, U)
+            self._gain[i] = U * d_inv[c.index]
+            if c.parent is not None:
+                rest = _across(c.S, symmetric(articulated[i] - self._gain[i] @ U.T))
+                rest = _across(c.S, rest.T)
+                articulated[c.parent] += symmetric(c.X.T @ rest @ c.X)
+        self.d_inv = ca.vertcat(*d_inv)
+
+    def solve(self, b: ca.SX) -> ca.SX:
+        """a with D a = b."""
+        u = self.inward(b)
+        return self.outward(u * ca.repmat(self.d_inv, 1, b.shape[1]))
+
+    def inward(self, b: ca.SX) -> ca.SX:
+        """Efforts left at each coordinate when those farther out move freely, n x r."""
+        p = [ca.SX(3, b.shape[1])] * self.n
+        rows = [ca.SX(1, b.shape[1])] * self.n
+        for i in reversed(range(self.n)):
+            c = self._tree[i]
+            u = b[c.index, :] - c.S.T @ p[i]
+            rows[c.index] = u
+            if c.parent is not None:
+                passed = p[i] + self._gain[i] @ u
+                if c.S.nnz() == 1:  # S' passed = b: a joint hands on its own effort
+                    passed = _across(c.S, passed) + c.S @ b[c.index, :]
+                p[c.parent] = p[c.parent] + c.X.T @ passed
+        return ca.vertcat(*rows)
+
+    def outward(self, u: ca.SX) -> ca.SX:
+        """Accelerations from each coordinate's own, as if it stood still, n x r."""
+        A: list[ca.SX] = []
+        rows = [ca.SX(1, u.shape[1])] * self.n
+        for i, c in enumerate(self._tree):
+            before = ca.SX(3, u.shape[1]) if c.parent is None else c.X @ A[c.parent]
+            a = u[c.index, :] - self._gain[i].T @ before
+            A.append(before + c.S @ a)
+            rows[c.index] = a
+        return ca.vertcat(*rows)
+
+    def apply(self, a: ca.SX) -> ca.SX:
+        """D a."""
+        r = a.shape[1]
+        A: list[ca.SX] = []
+        for c in self._tree:
+            before = ca.SX(3, r) if c.parent is None else c.X @ A[c.parent]
+            A.append(before + c.S @ a[c.index, :])
+        f = [c.inertia @ A[i] for i, c in enumerate(self._tree)]
+        rows = [ca.SX(1, r)] * self.n
+        for i in reversed(range(self.n)):
+            c = self._tree[i]
+            rows[c.index] = c.S.T @ f[i]
+            if c.parent is not None:
+                f[c.parent] = f[c.parent] + c.X.T @ f[i]
+        return ca.vertcat(*rows)
+
+
+def _across(S: ca.SX, forces: ca.SX) -> ca.SX:
+    """Forces that are zero along S: where S is a unit vector, zero in structure."""
+    if S.nnz() == 1:
+        forces = ca.SX(forces)
+        forces[S.row()[0], :] = 0
+    return ca.sparsify(forces)

@@ -1,0 +1,140 @@
+"""Linear solve of closed-loop dynamics, with bounded work at every pose.
+
+    D a - W' lambda = b,   W a = c        (B.6) with lambda as in (2.3)
+
+The coordinates are eliminated before the constraints that touch them, leaf to root (tree.py);
+what remains, S = W D^-1 W', is made definite by mu (quasi-definite: Vanderbei, SIAM J. Optim.
+5, 1995); a refinement on the unregularised system or proximal steps take mu out of the answer
+again. No pivoting, no branch: redundant and singular closures cost the same as regular ones.
+
+mu is relative to the mean of S_ii over the two rows of each loop, so that a loop of heavy links
+beside light ones counts as much as they do, in whatever frame. Where an eigenvalue sigma^2 of S, so
+scaled, is below mu its direction is cut: the closure does not act along it. Which mu is right near
+a singular pose depends on the right-hand side. W D^-1 b lies in the range of W by construction, and
+cutting it lets the linkage go with the acceleration that b alone would give: mu is as small as the
+rounding of S allows (its pivots are then mu within 2e-15). c = -Wdot qd does so only for rates on
+the branch; what the rates are off is divided by sigma. `follow` therefore cuts c early, and is for
+accelerations that are integrated.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Protocol
+
+import casadi as ca
+
+from hapticlink.components.dynamics.articulated_body import symmetric
+
+ROUNDING = 1e-16  # of S: a loop whose rows are all below it says nothing
+TINY = 1e-200
+
+# Relative to the mean of S_ii over a loop's rows.
+MU = 1e-14
+MU_FOLLOWING = 1e-6  # of c in `follow`
+MU_MULTIPLIERS = 1e-9  # of multipliers of least norm: rounding along null(W') is divided by it
+PROXIMAL_STEPS = 2
+
+
+class Inertia(Protocol):
+    """D as an operator on n x r columns, D^-1 = outward d_inv inward with outward = inward'."""
+
+    n: int
+    d_inv: ca.SX
+
+    def inward(self, b: ca.SX) -> ca.SX: ...
+
+    def outward(self, u: ca.SX) -> ca.SX: ...
+
+
+class UnitInertia:
+    """D = 1: changes of least norm."""
+
+    def __init__(self, n: int) -> None:
+        self.n = n
+        self.d_inv = ca.SX.ones(n)
+
+    def inward(self, b: ca.SX) -> ca.SX:
+        return b
+
+    def outward(self, u: ca.SX) -> ca.SX:
+        return u
+
+
+def loop_scale(S: ca.SX) -> ca.SX:
+    """Mean of S_ii over the rows of each loop, two by two; m x 1. Turning the frame leaves it."""
+    m = S.shape[0]
+    least = ROUNDING * ca.trace(S) / m + TINY
+    pairs = [ca.diag(S)[i : i + 2] for i in range(0, m, 2)]
+    scales = [(pair, ca.fmax(ca.sum1(pair) / pair.numel(), least)) for pair in pairs]
+    return ca.vertcat(*(ca.repmat(scale, pair.numel()) for pair, scale in scales))
+
+
+class Regularised:
+    """S + diag(shift) for a symmetric, positive semi-definite S."""
+
+    def __init__(self, S: ca.SX, shift: ca.SX) -> None:
+        self.shift = ca.diag(shift)
+        self.d, self.upper, self.order = ca.ldl(ca.sparsify(S + self.shift), False)
+
+    def solve(self, b: ca.SX) -> ca.SX:
+        return ca.ldl_solve(b, self.d, self.upper, self.order)
+
+    def proximal(self, b: ca.SX) -> ca.SX:
+        """S y = b with mu taken out: S_mu y_{k+1} = b + mu y_k (Parikh & Boyd, Proximal
+        Algorithms, 2014, section 4.1.2)."""
+        y = self.solve(b)
+        for _ in range(PROXIMAL_STEPS):
+            y = self.solve(b + self.shift @ y)
+        return y
+
+
+class ClosedLoopSolver:
+    """Factors of D and W (m x n); m = 0 leaves D^-1 alone."""
+
+    def __init__(self, inertia: Inertia, W: ca.SX, mu: float = MU) -> None:
+        self.inertia, self.W = inertia, W
+        self.m = W.shape[0]
+        if self.m:
+            self._Z = inertia.inward(W.T)
+            self._Y = ca.diag(inertia.d_inv) @ self._Z
+            self.S = symmetric(self._Z.T @ self._Y)
+            self._sharp = Regularised(self.S, mu * loop_scale(self.S))
+
+    @cached_property
+    def _following(self) -> Regularised:
+        return Regularised(self.S, MU_FOLLOWING * loop_scale(self.S))
+
+    def _shortest(self, multipliers: ca.SX) -> ca.SX:
+        """Their part in the range of W, which columns of unit length leave free of units and
+        masses, and an equal mu for all rows free of weights."""
+        columns = ca.sum1(self.W**2).T
+        A = symmetric(self.W @ ca.diag(1 / (columns + TINY)) @ self.W.T)
+        equal = MU_MULTIPLIERS * ca.SX.ones(self.m)
+        return Regularised(A, equal).proximal(A @ multipliers)
+
+    def solve(self, b: ca.SX, c: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """(a, lambda), lambda of least norm, for right-hand sides b (n x r) and c (m x r)."""
+        free = self._free(b)
+        if not self.m:
+            return self.inertia.outward(free), ca.SX(0, b.shape[1])
+        first = self._sharp.solve(c - self._Z.T @ free)
+        a = self.inertia.outward(free + self._Y @ first)
+        left = self._sharp.solve(c - self.W @ a)
+        return a + self.inertia.outward(self._Y @ left), self._shortest(first + left)
+
+    def follow(self, b: ca.SX, c: ca.SX) -> ca.SX:
+        """a as in `solve`, unrefined, for rates that are near the branch: n x r."""
+        free = self._free(b)
+        if self.m:
+            taken = self._sharp.solve(-(self._Z.T @ free))
+            free = free + self._Y @ (taken + self._following.proximal(c))
+        return self.inertia.outward(free)
+
+    def constrain(self, c: ca.SX) -> ca.SX:
+        """The least change a (in the metric D) with W a = c, unrefined: for iterations that
+        correct themselves."""
+        return self.inertia.outward(self._Y @ self._sharp.solve(c))
+
+    def _free(self, b: ca.SX) -> ca.SX:
+        return ca.diag(self.inertia.d_inv) @ self.inertia.inward(b)

@@ -1,0 +1,108 @@
+"""The local model of interaction (B.15): D, W, w, J_h held from the graphics rate.
+
+    Dh qdd = sum_i J_i' F_i + J_hh' F_h + Q + Wh' lambda
+    Wh qdd = -(wh + 2 alpha beta h' + alpha^2 h)
+
+with a trailing h for the values of the last frame. Coriolis terms are left out, as the report does.
+The closures h(q), their rate, applied forces Q and contacts are the mechanism's own at every step,
+or the loop opens between frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+
+from hapticlink.components import forces
+from hapticlink.components.component import Signals, Variable
+from hapticlink.components.dynamics.assembly import assemble
+from hapticlink.components.dynamics.operational_space import Terms
+from hapticlink.components.dynamics.variables import parameters, start_parameters
+from hapticlink.components.integrators.base import Baumgarte
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import coordinate_units
+from hapticlink.components.specs.linkage import Linkage
+
+BAUMGARTE = Baumgarte(alpha_h=0.4, beta=1.0)
+"""With h the frame's period: Wh is stale by up to a frame, and a faster correction overshoots.
+Projection with the held matrices diverges for the same reason."""
+
+
+def ports(linkage: Linkage) -> list[Variable]:
+    """D n x n, W m x n, w m, J_h 3 x n; they start as those of the assembled start pose."""
+    units, m = coordinate_units(linkage), 2 * len(linkage.loop)
+    n = len(units)
+    lengths = tuple("m" if unit == "rad" else "1" for unit in units)
+    turns = tuple("1" if unit == "rad" else "1/m" for unit in units)
+    inertias = {("m", "m"): "kg.m2", ("m", "1"): "kg.m", ("1", "m"): "kg.m", ("1", "1"): "kg"}
+    D_units = tuple(inertias[a, b] for a in lengths for b in lengths)
+    at = _at_start(linkage)
+    found = [Variable("D", (n, n), D_units, at["D"], "joint-space inertia")]
+    if m:
+        found.append(Variable("W", (m, n), lengths, at["W"], "Jacobian of the loop closures"))
+        found.append(Variable("w", (m,), "m/s2", at["w"], "Wdot qd"))
+    J_units = (*lengths, *lengths, *turns)
+    found.append(Variable("J_h", (3, n), J_units, at["J_h"], "Jacobian of the operational point"))
+    return found
+
+
+def values(model: LinkageModel) -> dict[str, ca.SX]:
+    """The values of the ports at the model's pose."""
+    found = {"D": model.D, "J_h": model.J_h}
+    return found | {"W": model.W, "w": model.w} if model.linkage.loop else found
+
+
+def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
+    p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
+    n = len(coordinate_units(linkage))
+    start = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
+    assembled = ca.Function("assembled", [p.vector], list(start))
+    q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
+    at = values(LinkageModel(linkage, p, q, qd))
+    rows = [ca.vec(ca.densify(value).T) for value in at.values()]
+    evaluated = ca.Function("evaluated", [q, qd, p.vector], rows)
+    defaults = [s for v in p.variables for s in v.starts]
+    numbers = evaluated.call([*assembled.call([ca.DM(defaults)]), ca.DM(defaults)])
+    return {
+        name: tuple(float(x) for x in column.elements())
+        for name, column in zip(at, numbers, strict=True)
+    }
+
+
+class DenseInertia:
+    """D from its entries: D = L d L', so D^-1 = L'^-1 d^-1 L^-1."""
+
+    def __init__(self, D: ca.SX) -> None:
+        self.n = D.shape[0]
+        d, upper, _ = ca.ldl(D, False)
+        self.d_inv = 1 / d
+        self._L = upper.T + ca.SX.eye(self.n)
+
+    def inward(self, b: ca.SX) -> ca.SX:
+        rows: list[ca.SX] = []
+        for i in range(self.n):
+            rows.append(
+                b[i, :] - sum((self._L[i, j] * rows[j] for j in range(i)), start=0 * b[i, :])
+            )
+        return ca.vertcat(*rows)
+
+    def outward(self, u: ca.SX) -> ca.SX:
+        rows = [u[i, :] for i in range(self.n)]
+        for i in reversed(range(self.n)):
+            for j in range(i + 1, self.n):
+                rows[i] = rows[i] - self._L[j, i] * rows[j]
+        return ca.vertcat(*rows)
+
+
+def held(model: LinkageModel, u: Mapping[str, ca.SX]) -> Terms:
+    """The terms of (B.15) from the ports `u`."""
+    n, loop = model.q.numel(), bool(model.linkage.loop)
+    return Terms(
+        inertia=DenseInertia(u["D"]),
+        W=u["W"] if loop else ca.SX(0, n),
+        w=u["w"] if loop else ca.SX(0, 1),
+        J_h=u["J_h"],
+        Jdot_qd=ca.SX(3, 1),
+        efforts=forces.efforts(model),
+    )

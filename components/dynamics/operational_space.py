@@ -1,0 +1,83 @@
+"""The linkage as the hand feels it: mobility and bias acceleration at the operational point.
+
+    Lambda^-1 = J_h D^-1 (J_h' - W' (W D^-1 W')^-1 W D^-1 J_h')      (B.13); (5.4) without loops
+    a_bias    = J_h qdd|_{F=0} + Jdot_h qd
+
+The bias is what (B.7) to (B.13) call negligible: the operational acceleration at zero hand
+and drift wrench, from velocities, gravity, springs and drives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+
+from hapticlink.components import forces
+from hapticlink.components.dynamics.articulated_body import TreeInertia
+from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, Inertia
+from hapticlink.components.linkage.model import LinkageModel
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The terms of (B.6): D as an operator, W, w, J_h, Jdot_h qd, and the efforts Q - C qd."""
+
+    inertia: Inertia
+    W: ca.SX
+    w: ca.SX
+    J_h: ca.SX
+    Jdot_qd: ca.SX
+    efforts: ca.SX
+
+
+def own_terms(model: LinkageModel) -> Terms:
+    """At the model's own pose and velocity."""
+    efforts = forces.efforts(model) - model.C_qd
+    return Terms(TreeInertia(model), model.W, model.w, model.J_h, model.Jdot_qd, efforts)
+
+
+class OperationalSpace:
+    """Shares one factorisation of the linkage's D and W among all that the hand needs."""
+
+    def __init__(self, model: LinkageModel, terms: Terms | None = None) -> None:
+        self.model = model
+        self.terms = own_terms(model) if terms is None else terms
+        self.solver = ClosedLoopSolver(self.terms.inertia, self.terms.W)
+
+    def mobility(self, J: ca.SX) -> ca.SX:
+        """J D^-1 (J' - W' (W D^-1 W')^-1 W D^-1 J') of the points whose Jacobian is J, k x k."""
+        forced, _ = self.solver.solve(J.T, ca.SX(self.solver.m, J.shape[0]))
+        mobility = J @ forced
+        return 0.5 * (mobility + mobility.T)
+
+    @cached_property
+    def _bias(self) -> tuple[ca.SX, ca.SX]:
+        return self.solver.solve(self.terms.efforts, -self.terms.w)
+
+    @cached_property
+    def Lambda_inv(self) -> ca.SX:
+        """3 x 3, symmetric; 1/kg, 1/(kg.m), 1/(kg.m2)."""
+        return self.mobility(self.terms.J_h)
+
+    @cached_property
+    def open_mobility(self) -> ca.SX:
+        """J_h D^-1 J_h' of the linkage with its loops open, 3 x 3."""
+        inertia = self.terms.inertia
+        passed = inertia.inward(self.terms.J_h.T)
+        return passed.T @ ca.diag(inertia.d_inv) @ passed
+
+    @cached_property
+    def a_bias(self) -> ca.SX:
+        """3 x 1: m/s2, m/s2, rad/s2."""
+        return self.terms.J_h @ self._bias[0] + self.terms.Jdot_qd
+
+    def response(self, Q: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """What generalised forces Q (n x 1) add to (qdd, lambda)."""
+        return self.solver.solve(Q, ca.SX(self.solver.m, 1))
+
+    def motion(self, Q: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """(qdd, lambda) under generalised forces Q beside the linkage's own (B.6)."""
+        qdd, multipliers = self.response(Q)
+        return self._bias[0] + qdd, self._bias[1] + multipliers

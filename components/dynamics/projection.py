@@ -1,0 +1,40 @@
+"""Projection of a linkage's state onto its closures, in the metric of D.
+
+    q <- q - A h(q)  (repeated),   qd <- qd - A W(q) qd (repeated),   A = D^-1 W' (W D^-1 W')^-1
+
+A is factored once, at the pose that the integrator left, and used as a chord: each repeat
+multiplies the closure error by about the size of the correction itself.
+
+Near a singular pose a gap that is rounding (1e-16 m) would move the pose by 1e-16/sigma, and its
+rate by 1e-16/sigma^2, along the direction that W is losing, onto another branch. So mu is large
+here, as it may be: what one step leaves, away from the singular pose the next one closes.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from hapticlink.components.dynamics.articulated_body import TreeInertia
+from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
+from hapticlink.components.linkage.model import LinkageModel
+
+REPEATS = 3  # of the pose
+RATE_REPEATS = 2
+MU = 1e-6  # as in closure.py
+
+
+def projection(model: LinkageModel, inertia: TreeInertia) -> ca.Function:
+    """(q, qd, p) -> (q, qd) moved onto h(q) = 0 and W(q) qd = 0; unchanged without a loop.
+
+    inertia: the model's own."""
+    p, closed, rate = model.p.vector, model.q, model.qd
+    if model.linkage.loop:
+        h = ca.Function("h", [model.q, p], [model.h])
+        W = ca.Function("W", [model.q, p], [model.W])
+        solver = ClosedLoopSolver(inertia, model.W, MU)
+        for _ in range(REPEATS):
+            closed = closed - solver.constrain(h(closed, p))
+        W_closed = W(closed, p)
+        for _ in range(RATE_REPEATS):
+            rate = rate - solver.constrain(W_closed @ rate)
+    return ca.Function("project", [model.q, model.qd, p], [closed, rate], {"cse": True})

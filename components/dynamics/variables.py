@@ -1,0 +1,93 @@
+"""Variables of the virtual mechanism, and those that it shares with the virtual environment."""
+
+from __future__ import annotations
+
+from hapticlink.components import forces
+from hapticlink.components.component import ACCELERATION, MOBILITY, POSE, TWIST, Variable
+from hapticlink.components.integrators.base import Baumgarte
+from hapticlink.components.linkage.parameters import (
+    body_parameters,
+    coordinate_units,
+    coordinates,
+    mean_link_length,
+)
+from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
+
+
+def parameters(linkage: Linkage) -> tuple[Variable, ...]:
+    """Masses and geometry of the linkage, and what its forces need."""
+    return (*body_parameters(linkage), *forces.parameters(linkage))
+
+
+def mechanism_parameters(
+    linkage: Linkage, mechanism: Mechanism, default: Baumgarte, period_s: float
+) -> list[Variable]:
+    """`default` is that of the method, for steps of period_s."""
+    found = [*parameters(linkage), *start_parameters(linkage)]
+    if linkage.loop and mechanism.stabilization == "baumgarte":
+        alpha = default.alpha_h / period_s if mechanism.alpha is None else mechanism.alpha
+        beta = default.beta if mechanism.beta is None else mechanism.beta
+        found.append(Variable("alpha", (), "1/s", alpha, "Baumgarte frequency of (3.3)"))
+        found.append(Variable("beta", (), "1", beta, "Baumgarte damping ratio of (3.3)"))
+    return found
+
+
+def start_parameters(linkage: Linkage) -> list[Variable]:
+    """Start pose before assembly, and start velocity before its projection."""
+    units = coordinate_units(linkage)
+    rates = tuple(f"{u}/s" for u in units)
+    q, qd = (tuple(coordinates(linkage, s)) for s in (linkage.start, linkage.start_velocity))
+    n = (len(units),)
+    return [
+        Variable("q_start", n, units, q, "joint coordinates before assembly", "fixed"),
+        Variable("qd_start", n, rates, qd, "joint rates before projection", "fixed"),
+    ]
+
+
+def length_parameter(linkage: Linkage, length: float | None) -> Variable:
+    """L; None takes the mean link length."""
+    length = mean_link_length(linkage) if length is None else length
+    return Variable("length_scale", (), "m", length, "L of S = diag(1, 1, L)")
+
+
+def direction_parameters(directions: Directions) -> list[Variable]:
+    """Tolerance and hysteresis of the test for resisted directions."""
+    return [
+        Variable("rank_tolerance", (), "1", directions.rank_tolerance, "share that counts as none"),
+        Variable("hysteresis", (), "1", directions.hysteresis, "factor to leave a direction free"),
+    ]
+
+
+def states(linkage: Linkage) -> list[Variable]:
+    units = coordinate_units(linkage)
+    n = (len(units),)
+    return [Variable("q", n, units), Variable("qd", n, tuple(f"{u}/s" for u in units))]
+
+
+def motion_outputs(linkage: Linkage) -> list[Variable]:
+    units, m = coordinate_units(linkage), 2 * len(linkage.loop)
+    n = (len(units),)
+    found = [
+        Variable("x", (3,), POSE, description="pose of the operational point"),
+        Variable("v", (3,), TWIST, description="its velocity"),
+        Variable("q", n, units, description="joint coordinates"),
+        Variable("qd", n, tuple(f"{u}/s" for u in units), description="joint rates"),
+        Variable("qdd", n, tuple(f"{u}/s2" for u in units), description="joint accelerations"),
+        Variable("a_bias", (3,), ACCELERATION, description="operational acceleration at no wrench"),
+        Variable("energy", (), "J", description="kinetic and potential energy"),
+    ]
+    if m:
+        found.append(Variable("lambda", (m,), "N", description="Lagrange multipliers of the loops"))
+        found.append(Variable("closure_error", (), "m", description="largest gap over the loops"))
+    return found
+
+
+def mobility_output() -> Variable:
+    return Variable("Lambda_inv", (3, 3), MOBILITY, description="mobility at the operational point")
+
+
+def direction_outputs() -> list[Variable]:
+    return [
+        Variable("P_c", (3, 3), "1", description="projector on the resisted directions, scaled"),
+        Variable("n_constraints", (), "1", description="number of resisted directions"),
+    ]

@@ -1,0 +1,1 @@
+"""Coordinates in which a closed loop can be integrated."""

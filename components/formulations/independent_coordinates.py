@@ -1,0 +1,72 @@
+"""Motion in independent coordinates z, part of q: the families of section B.2 beside multipliers.
+
+A formulation gives, from z, zd and a pose `near` on the branch meant, the q and qd that close every
+loop, and zdd. Only (z, zd) is integrated, so closures need no stabilisation. Which coordinates are
+independent is settled at the start pose: where the others meet a singularity of their own the
+formulation fails, though the linkage need not.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import casadi as ca
+import numpy as np
+
+from hapticlink.components import integrators
+from hapticlink.components.component import Signals
+from hapticlink.components.dynamics.assembly import assemble
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.linkage import Mechanism
+
+
+class Formulation(Protocol):
+    """independent: indices in q of z (k); ode: ((z, zd), (u, near), p, t) -> (zd, zdd);
+    complete: ((z, zd), near, p) -> (q, qd)."""
+
+    independent: list[int]
+    ode: ca.Function
+    complete: ca.Function
+
+
+def require_fitting(mechanism: Mechanism, held: bool) -> None:
+    """Raises ValueError for settings that independent coordinates have no use for.
+
+    held: the matrices come from outside (local_model)."""
+    if mechanism.formulation == "multipliers":
+        return
+    name = f'`mechanism.formulation` = "{mechanism.formulation}"'
+    if mechanism.stabilization == "baumgarte":
+        raise ValueError(
+            f"{name} closes its loops by itself: Baumgarte's terms do not appear; "
+            "leave `mechanism.stabilization` out, or take multipliers"
+        )
+    if held:
+        raise ValueError(f"{name} needs the linkage at its own pose: `local_model` = false, please")
+
+
+def start_pose(model: LinkageModel, parameters: Signals) -> tuple[np.ndarray, np.ndarray]:
+    """(q, p): the assembled start pose and the parameters' defaults."""
+    p = np.array([s for v in parameters.variables for s in v.starts])
+    q0, _ = assemble(
+        LinkageModel(model.linkage, parameters, parameters["q_start"], parameters["qd_start"])
+    )
+    return np.array(ca.Function("start", [parameters.vector], [q0])(p)).ravel(), p
+
+
+def step(
+    method: str,
+    formulation: Formulation,
+    x: ca.SX,
+    u: ca.SX,
+    p: ca.SX,
+    t: ca.SX,
+    h: ca.SX,
+) -> ca.SX:
+    """(q, qd) after h from x = (q, qd)."""
+    n, k = x.numel() // 2, len(formulation.independent)
+    near = x[:n]
+    z = x[[*formulation.independent, *(n + i for i in formulation.independent)]]
+    inputs = ca.vertcat(u, near)
+    z = integrators.step(method, formulation.ode, z, inputs, p, t, h, range(k))
+    return formulation.complete(z, near, p)

@@ -1,0 +1,53 @@
+"""Generalised coordinate partitioning: Wehage and Haug, J. Mech. Design 104 (1982), 247.
+
+q = (z, y) with a regular block W_y of W at the start pose, by elimination with full pivoting:
+
+    y <- y - W_y^-1 h(z, y)   repeated,   yd = -W_y^-1 W_z zd,   zdd = rows of qdd in (B.6)
+
+The accelerations are those of the multipliers; of them only zdd is integrated. Newton starts at the
+pose before the step, and squares its error (about h |yd|) with each of a fixed number of repeats.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from hapticlink.components.component import Signals
+from hapticlink.components.linkage.branch import dependent_coordinates
+from hapticlink.components.linkage.model import LinkageModel
+
+REPEATS = 4
+
+
+class Partitioning:
+    """Of a model at its start pose (q, p); ode: (x, u, p, t) -> (qd, qdd) by multipliers."""
+
+    def __init__(
+        self,
+        model: LinkageModel,
+        parameters: Signals,
+        start: tuple[np.ndarray, np.ndarray],
+        ode: ca.Function,
+    ) -> None:
+        n = model.q.numel()
+        rows, dependent = dependent_coordinates(model, np.concatenate(start), unseen_first=False)
+        self.independent = free = [i for i in range(n) if i not in dependent]
+        p, k = parameters.vector, len(free)
+        closures = ca.Function("closures", [model.q, p], [model.h[rows], model.W[rows, :]])
+        state, near = ca.SX.sym("z", 2 * k), ca.SX.sym("near", n)
+        q = ca.SX(near)
+        q[free] = state[:k]
+        for _ in range(REPEATS):
+            h, W = closures(q, p)
+            q[dependent] = q[dependent] - ca.solve(W[:, dependent], h)
+        W, qd = closures(q, p)[1], ca.SX(n, 1)
+        qd[free] = state[k:]
+        qd[dependent] = -ca.solve(W[:, dependent], W[:, free] @ state[k:])
+        self.complete = ca.Function(
+            "complete", [state, near, p], [ca.vertcat(q, qd)], {"cse": True}
+        )
+        u, t = ca.SX.sym("u", ode.numel_in(1)), ca.SX.sym("t")
+        after = ode(self.complete(state, near, p), u, p, t)
+        rates = after[[*free, *(n + i for i in free)]]
+        self.ode = ca.Function("ode", [state, ca.vertcat(u, near), p, t], [rates], {"cse": True})

@@ -1,0 +1,1 @@
+"""A linkage: bodies, joints, loops, and its kinematics as a graph."""

@@ -1,0 +1,223 @@
+"""Kinematics and Lagrangian terms of a planar linkage, by differentiation of the kinematics.
+
+Relative joint coordinates q of the tree; loops stay open in q and are closed by
+h(q) = 0 (2.13). The terms of (2.3), D qdd + C qd + g = J_h' F_h + W' lambda:
+
+    D   = sum_i m_i J_i' J_i + I_i J_theta,i' J_theta,i       (2.7), (2.10)
+    C qd = J' M Jdot qd of all bodies, stacked                (2.11) contracted with qd
+    W   = dh/dq,   w = Wdot qd                                (2.14), (3.2) as corrected
+    J_h = d x_h/dq                                            (2.18)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+
+from hapticlink.components.component import Signals
+from hapticlink.components.linkage.parameters import COORDINATES, loop_name
+from hapticlink.components.specs.linkage import Joint, Linkage
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A body's frame in the world: origin (m) and angle (rad), with its cosine and sine."""
+
+    origin: ca.SX
+    angle: ca.SX
+    rotation: ca.SX
+
+    @staticmethod
+    def at(origin: ca.SX, angle: ca.SX) -> Frame:
+        return Frame(origin, angle, _rotation(angle))
+
+    def point(self, at: ca.SX | None) -> ca.SX:
+        """World position of a point of the body; None is the frame's origin."""
+        return self.origin if at is None else self.origin + self.rotation @ at
+
+
+def _rotation(angle: ca.SX) -> ca.SX:
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(c, -s), ca.horzcat(s, c))
+
+
+class LinkageModel:
+    """The terms of (2.3) at q, qd, each built when it is first asked for.
+
+    q, qd: n x 1; p: the parameters by name. D n x n, W m x n (m two for each loop),
+    J_h 3 x n. Raises ValueError for bodies that no joint connects to the ground.
+    """
+
+    def __init__(
+        self, linkage: Linkage, p: Signals, q: ca.SX, qd: ca.SX, t: ca.SX | None = None
+    ) -> None:
+        self.linkage, self.p, self.q, self.qd = linkage, p, q, qd
+        self.t = ca.SX(0) if t is None else t
+
+    @cached_property
+    def _offsets(self) -> dict[str, int]:
+        offsets, n = {}, 0
+        for j in self.linkage.joint:
+            offsets[j.name], n = n, n + COORDINATES[j.type]
+        return offsets
+
+    def coordinate(self, joint: str) -> int:
+        """Index in q of the (first) coordinate of a joint."""
+        return self._offsets[joint]
+
+    @cached_property
+    def outward(self) -> list[Joint]:
+        """The joints in an order in which each stands on the ground or an earlier child."""
+        reached, order, waiting = {"ground"}, [], list(self.linkage.joint)
+        while waiting:
+            ready = [j for j in waiting if j.parent in reached]
+            if not ready:
+                names = ", ".join(f"`{j.name}`" for j in waiting)
+                raise ValueError(f"joints {names}: no chain of joints leads to `ground`")
+            order += ready
+            reached |= {j.child for j in ready}
+            waiting = [j for j in waiting if j not in ready]
+        return order
+
+    @cached_property
+    def frames(self) -> dict[str, Frame]:
+        """World frame of every body, from the ground outward."""
+        frames = {"ground": Frame.at(ca.SX(2, 1), ca.SX(0))}
+        for j in self.outward:
+            frames[j.child] = self._child(j, frames[j.parent], self._of(j))
+        return frames
+
+    def _of(self, joint: Joint) -> ca.SX:
+        k = self.coordinate(joint.name)
+        return self.q[k : k + COORDINATES[joint.type]]
+
+    def _pivot(self, joint: Joint) -> ca.SX:
+        """World position of the joint's point of the parent, m."""
+        return self.frames[joint.parent].point(self.p.get(f"{joint.name}.at_parent"))
+
+    def twists(self, joint: Joint) -> tuple[ca.SX, list[ca.SX]]:
+        """The joint's point in the world (m), and (omega, v_x, v_y) there of a unit rate of each
+        of its coordinates."""
+        R, at = self.frames[joint.parent].rotation, self._pivot(joint)
+        turn = ca.sparsify(ca.SX([1, 0, 0]))
+
+        def slide(direction: ca.SX) -> ca.SX:
+            return ca.vertcat(ca.SX(1, 1), direction)
+
+        if joint.type == "revolute":
+            return at, [turn]
+        if joint.type == "prismatic":
+            axis = self.p[f"{joint.name}.axis"]
+            along = R @ ca.vertcat(ca.cos(axis), ca.sin(axis))
+            return at + along * self._of(joint), [slide(along)]
+        moved = at + R @ self._of(joint)[:2]
+        return moved, [slide(R[:, 0]), slide(R[:, 1]), turn]
+
+    def _child(self, joint: Joint, parent: Frame, q: ca.SX) -> Frame:
+        def at(end: str) -> ca.SX | None:
+            return self.p.get(f"{joint.name}.{end}")
+
+        pivot, angle = parent.point(at("at_parent")), parent.angle
+        if joint.type == "revolute":
+            angle = angle + q
+        elif joint.type == "prismatic":
+            axis = self.p[f"{joint.name}.axis"]
+            pivot = pivot + parent.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis)) * q
+        else:
+            pivot, angle = pivot + parent.rotation @ q[:2], angle + q[2]
+        child = Frame.at(pivot, angle)
+        back = at("at_child")
+        return (
+            child if back is None else Frame(pivot - child.rotation @ back, angle, child.rotation)
+        )
+
+    def rate(self, r: ca.SX) -> ca.SX:
+        """dr/dt along the motion, of an expression in q."""
+        return ca.jtimes(r, self.q, self.qd)
+
+    @cached_property
+    def centers(self) -> dict[str, ca.SX]:
+        """World position of every body's centre of mass, m."""
+        return {
+            b.name: self.frames[b.name].point(self.p.get(f"{b.name}.center"))
+            for b in self.linkage.body
+        }
+
+    @cached_property
+    def _bodies(self) -> tuple[ca.SX, ca.SX]:
+        """(x, y, theta of every body's centre of mass; weights m, m, I), stacked, 3k x 1."""
+        poses, weights = [], []
+        for b in self.linkage.body:
+            mass, inertia = self.p[f"{b.name}.mass"], self.p[f"{b.name}.inertia"]
+            poses += [self.centers[b.name], self.frames[b.name].angle]
+            weights += [mass, mass, inertia]
+        return ca.vertcat(*poses), ca.vertcat(*weights)
+
+    @cached_property
+    def D(self) -> ca.SX:
+        poses, weights = self._bodies
+        J = ca.jacobian(poses, self.q)
+        return J.T @ ca.diag(weights) @ J
+
+    @cached_property
+    def C_qd(self) -> ca.SX:
+        """Centripetal and Coriolis terms C qd, n x 1."""
+        poses, weights = self._bodies
+        return ca.jtimes(poses, self.q, weights * self.rate(self.rate(poses)), True)
+
+    @cached_property
+    def kinetic_energy(self) -> ca.SX:
+        poses, weights = self._bodies
+        return 0.5 * ca.dot(weights, self.rate(poses) ** 2)
+
+    @cached_property
+    def h(self) -> ca.SX:
+        """Loop closures, two rows a loop: the gap from bodies[1]'s point to bodies[0]'s, m."""
+        gaps = []
+        for i, loop in enumerate(self.linkage.loop):
+            name = loop_name(self.linkage, i)
+            ends = [
+                self.frames[body].point(self.p[f"{name}.at{k + 1}"])
+                for k, body in enumerate(loop.bodies)
+            ]
+            gaps.append(ends[0] - ends[1])
+        return ca.vertcat(*gaps) if gaps else ca.SX(0, 1)
+
+    @cached_property
+    def W(self) -> ca.SX:
+        return ca.jacobian(self.h, self.q)
+
+    @cached_property
+    def w(self) -> ca.SX:
+        """Wdot qd (3.2), so that hddot = W qdd + w."""
+        return self.rate(self.rate(self.h))
+
+    @cached_property
+    def closure_error(self) -> ca.SX:
+        """Largest gap over the loops, m."""
+        gaps = [ca.norm_2(self.h[2 * i : 2 * i + 2]) for i in range(len(self.linkage.loop))]
+        return ca.SX(0) if not gaps else gaps[0] if len(gaps) == 1 else ca.mmax(ca.vertcat(*gaps))
+
+    @cached_property
+    def x_h(self) -> ca.SX:
+        """Pose (x, y, theta) of the operational point (2.16)."""
+        return self.pose(self.linkage.operational_point.body, "operational_point.at")
+
+    def pose(self, body: str, at: str) -> ca.SX:
+        """(x, y, theta) of the point of a body that parameter `at` gives, or of its origin."""
+        frame = self.frames[body]
+        return ca.vertcat(frame.point(self.p.get(at)), frame.angle)
+
+    @cached_property
+    def J_h(self) -> ca.SX:
+        return ca.jacobian(self.x_h, self.q)
+
+    @cached_property
+    def v_h(self) -> ca.SX:
+        return self.rate(self.x_h)
+
+    @cached_property
+    def Jdot_qd(self) -> ca.SX:
+        return self.rate(self.v_h)

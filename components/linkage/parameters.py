@@ -1,0 +1,92 @@
+"""Masses and geometry of a linkage as parameters, and its coordinates by joint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from hapticlink.components.component import Variable
+from hapticlink.components.specs.linkage import Linkage, Point
+
+
+def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
+    """Masses and geometry as `fixed` FMI parameters: `link1.mass`, `elbow1.at_parent[1]`.
+
+    A point that the scene does not mention is structure: the frame's origin.
+    """
+
+    def fixed(name: str, unit: str, value: float | Point, text: str) -> Variable:
+        shape = () if isinstance(value, int | float) else (2,)
+        return Variable(name, shape, unit, value, text, variability="fixed")
+
+    found = []
+    for b in linkage.body:
+        found.append(fixed(f"{b.name}.mass", "kg", b.mass, f"mass of {b.name}"))
+        found.append(
+            fixed(f"{b.name}.inertia", "kg.m2", b.inertia, f"inertia of {b.name} about its centre")
+        )
+        if b.center is not None:
+            found.append(fixed(f"{b.name}.center", "m", b.center, f"centre of mass of {b.name}"))
+    for j in linkage.joint:
+        if j.at_parent is not None:
+            found.append(fixed(f"{j.name}.at_parent", "m", j.at_parent, f"{j.name} on {j.parent}"))
+        if j.at_child is not None:
+            found.append(fixed(f"{j.name}.at_child", "m", j.at_child, f"{j.name} on {j.child}"))
+        if j.type == "prismatic":
+            found.append(fixed(f"{j.name}.axis", "rad", j.axis or 0.0, f"direction of {j.name}"))
+    for i, loop in enumerate(linkage.loop):
+        name = loop_name(linkage, i)
+        for k, (body, at) in enumerate(zip(loop.bodies, loop.at, strict=True)):
+            found.append(fixed(f"{name}.at{k + 1}", "m", at, f"{name} on {body}"))
+    if linkage.operational_point.at is not None:
+        at, body = linkage.operational_point.at, linkage.operational_point.body
+        found.append(fixed("operational_point.at", "m", at, f"operational point on {body}"))
+    for point in linkage.point:
+        if point.at is not None:
+            text = f"{point.name} on {point.body}"
+            found.append(fixed(f"{point.name}.at", "m", point.at, text))
+    return tuple(found)
+
+
+def loop_name(linkage: Linkage, index: int) -> str:
+    return linkage.loop[index].name or f"loop{index + 1}"
+
+
+def coordinate_units(linkage: Linkage) -> tuple[str, ...]:
+    return tuple(unit for j in linkage.joint for unit in UNITS[j.type])
+
+
+def coordinates(linkage: Linkage, values: Mapping[str, float | tuple[float, ...]]) -> list[float]:
+    """Flat joint coordinates from values by joint name; what is missing is 0."""
+    flat: list[float] = []
+    for j in linkage.joint:
+        value = values.get(j.name, (0.0,) * COORDINATES[j.type])
+        flat.extend(value if isinstance(value, tuple | list) else (value,))
+    return flat
+
+
+def mean_link_length(linkage: Linkage) -> float:
+    """Mean over the bodies of the largest distance between two of their joint points, m.
+
+    A linkage without any such distance takes its mean radius of gyration.
+    """
+    points: dict[str, list[Point]] = {b.name: [] for b in linkage.body}
+    for j in linkage.joint:
+        points[j.child].append(j.at_child or (0.0, 0.0))
+        if j.parent in points:
+            points[j.parent].append(j.at_parent or (0.0, 0.0))
+    for loop in linkage.loop:
+        for body, at in zip(loop.bodies, loop.at, strict=True):
+            if body in points:
+                points[body].append(at)
+    spans = [max(math.dist(a, b) for a in p for b in p) for p in points.values() if p]
+    lengths = [s for s in spans if s > 0] or [
+        math.sqrt(b.inertia / b.mass) for b in linkage.body if b.mass > 0 and b.inertia > 0
+    ]
+    return sum(lengths) / len(lengths) if lengths else 1.0
+
+
+COORDINATES = {"revolute": 1, "prismatic": 1, "free": 3}
+
+
+UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}

@@ -1,0 +1,83 @@
+"""The tables of a scene that describe components, as frozen records."""
+
+from hapticlink.components.specs.contacts import (
+    Contacts,
+    Disc,
+    Pair,
+    Polygon,
+)
+from hapticlink.components.specs.control import (
+    Controller,
+    Teleoperation,
+    Topology,
+)
+from hapticlink.components.specs.device import (
+    Device,
+    Observer,
+)
+from hapticlink.components.specs.hand import (
+    ArmHand,
+    ConstantHand,
+    Hand,
+    ProfileHand,
+    SpringHand,
+)
+from hapticlink.components.specs.linkage import (
+    Body,
+    ConstantDrive,
+    Damping,
+    Directions,
+    Drive,
+    FurtherPoint,
+    GraphicsCopy,
+    Inertia,
+    Joint,
+    Linkage,
+    Loop,
+    Mechanism,
+    OperationalPoint,
+    PDDrive,
+    Point,
+    ProfileDrive,
+    Spring,
+    Stiffness,
+    Vector3,
+    Wrench,
+)
+
+__all__ = [
+    "ArmHand",
+    "Body",
+    "ConstantDrive",
+    "ConstantHand",
+    "Contacts",
+    "Controller",
+    "Damping",
+    "Device",
+    "Directions",
+    "Disc",
+    "Drive",
+    "FurtherPoint",
+    "GraphicsCopy",
+    "Hand",
+    "Inertia",
+    "Joint",
+    "Linkage",
+    "Loop",
+    "Mechanism",
+    "Observer",
+    "OperationalPoint",
+    "PDDrive",
+    "Pair",
+    "Point",
+    "Polygon",
+    "ProfileDrive",
+    "ProfileHand",
+    "Spring",
+    "SpringHand",
+    "Stiffness",
+    "Teleoperation",
+    "Topology",
+    "Vector3",
+    "Wrench",
+]

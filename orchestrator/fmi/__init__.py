@@ -1,0 +1,1 @@
+"""One FMU: its description, variables, calls and state. Knows no scene."""

@@ -1,0 +1,79 @@
+"""FMUs and SSPs are zip archives with XML from anywhere: opened only where nothing in them can
+write outside its folder or expand without end."""
+
+from __future__ import annotations
+
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from hapticlink.orchestrator.base.faults import InputFault
+
+MOST_XML = 256 * 2**20
+"""Bytes of one XML entry; the largest FMUs (10^5 variables) have some 50 MB."""
+
+
+@contextmanager
+def opened(path: Path, kind: str) -> Iterator[zipfile.ZipFile]:
+    """The archive at `path`, a `kind` ("FMU"). Raises InputFault where it is missing, damaged, or
+    holds an entry that would land outside the folder that it is unpacked to."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for entry in archive.infolist():
+                if fault := _outside(entry):
+                    raise InputFault(
+                        f"{path}: entry {entry.filename!r} {fault}; take no {kind} from there"
+                    )
+            yield archive
+    except FileNotFoundError:
+        raise InputFault(f"{path}: there is no such file; give the path of an {kind}") from None
+    except OSError as error:
+        raise InputFault(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, EOFError, zlib.error, NotImplementedError, RuntimeError) as error:
+        raise InputFault(f"{path}: damaged, not a readable zip archive ({error})") from error
+
+
+def _outside(entry: zipfile.ZipInfo) -> str:
+    """Why an entry is refused, "" where it is not."""
+    name = entry.orig_filename
+    if "\\" in name or ":" in name.split("/")[0] or "\0" in name:
+        return "is not a path with forward slashes"
+    if name.startswith("/") or ".." in PurePosixPath(name).parts:
+        return "points outside the archive"
+    if stat.S_ISLNK(entry.external_attr >> 16):
+        return "is a symbolic link"
+    return ""
+
+
+def read_xml(archive: zipfile.ZipFile, entry: str) -> bytes:
+    """An XML entry, well-formed and without a document type: neither FMI nor SSP has one, and
+    entities that expand without end need one. Raises InputFault."""
+    path = archive.filename
+    try:
+        info = archive.getinfo(entry)
+    except KeyError:
+        raise InputFault(f"{path}: holds no {entry}") from None
+    if info.file_size > MOST_XML:
+        raise InputFault(f"{path}: {entry} has {info.file_size} bytes; at most {MOST_XML} are read")
+    text = archive.read(info)
+    parser = expat.ParserCreate()
+
+    def refuse(*_: object) -> None:
+        raise InputFault(f"{path}: {entry} declares a document type, which may expand without end")
+
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise InputFault(f"{path}: {entry} is not well-formed XML: {error}") from error
+    return text
+
+
+def xml_tree(archive: zipfile.ZipFile, entry: str) -> ElementTree.Element:
+    """The root element of an XML entry, read as `read_xml` does."""
+    return ElementTree.fromstring(read_xml(archive, entry))

@@ -1,0 +1,31 @@
+"""What an FMU says of itself in its capability flags, by FMI version."""
+
+from __future__ import annotations
+
+from hapticlink.orchestrator.fmi.description import Description
+
+VARIABLE_STEP = "canHandleVariableCommunicationStepSize"
+INPUT_DERIVATIVES = "canInterpolateInputs"
+STATE = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
+"""FMI 2.0.5 section 4.3.1, FMI 3.0 section 4.3.1."""
+DIRECTIONAL_DERIVATIVES = {
+    "2": "providesDirectionalDerivative",
+    "3": "providesDirectionalDerivatives",
+}
+
+
+def varies_step(description: Description) -> bool:
+    return VARIABLE_STEP in description.flags
+
+
+def takes_input_derivatives(description: Description) -> bool:
+    """FMI 3.0 has no fmi2SetRealInputDerivatives."""
+    return description.fmi == "2" and INPUT_DERIVATIVES in description.flags
+
+
+def restores_state(description: Description) -> bool:
+    return STATE[description.fmi] in description.flags
+
+
+def gives_directional_derivatives(description: Description) -> bool:
+    return DIRECTIONAL_DERIVATIVES[description.fmi] in description.flags

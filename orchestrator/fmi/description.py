@@ -1,0 +1,142 @@
+"""What an FMU says of itself: ports (scalars grouped into vectors and matrices) and timing."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.units import BASES, Unit
+from hapticlink.orchestrator.fmi.variables import TYPES, Scalar, differences, numbers, text
+
+if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
+    from hapticlink.components.component import Timing
+
+
+@dataclass(frozen=True)
+class Description:
+    """A co-simulation FMU, as its modelDescription.xml says.
+
+    fmi is "2" or "3"; flags are the capabilities of its CoSimulation element that are true.
+    """
+
+    path: Path
+    guid: str
+    identifier: str
+    timing: Timing
+    scalars: tuple[Scalar, ...]
+    fmi: str = "2"
+    units: dict[str, Unit] = field(default_factory=dict)
+    flags: frozenset[str] = frozenset()
+    step_size: str | None = None
+    dependencies: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """By output: the variables that it depends on directly. An output that is not here may depend
+    on every input."""
+    strings: tuple[Scalar, ...] = ()
+    """Variables that are text: they are set at the start, never connected."""
+
+    def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
+        """The entries of vector `name` (or the scalar of that very name), in the order of their
+        indices: some tools write x[10] before x[2]."""
+        found = (s for s in self.scalars if name in (s.port, s.name) and s.causality in causalities)
+        return tuple(sorted(found, key=lambda s: s.indices))
+
+    def follows(self, output: Scalar, inputs: Iterable[Scalar] | None = None) -> bool:
+        """Whether an output depends directly on one of `inputs`; None are all."""
+        if inputs is None:
+            inputs = (s for s in self.scalars if s.causality == "input")
+        declared = self.dependencies.get(output.name, self.dependencies.get(output.port))
+        return declared is None or any(s.name in declared or s.port in declared for s in inputs)
+
+    def unit(self, scalar: Scalar) -> Unit | None:
+        return None if scalar.unit is None else self.units.get(scalar.unit, Unit(scalar.unit))
+
+    @cached_property
+    def outputs(self) -> tuple[Scalar, ...]:
+        """All outputs, type by type in the order of TYPES."""
+        found = [s for s in self.scalars if s.causality == "output"]
+        return tuple(sorted(found, key=lambda s: TYPES.index(s.type)))
+
+
+def describe(path: Path) -> Description:
+    """Raises InputFault where the file is no co-simulation FMU of FMI 2.0 or 3.0 that can run
+    here."""
+    with opened(path, "FMU") as archive:
+        content = read_xml(archive, "modelDescription.xml")
+        tree = ElementTree.fromstring(content)
+        version = tree.get("fmiVersion") or "none"
+        if version.partition(".")[0] not in ("2", "3") or tree.find("CoSimulation") is None:
+            raise InputFault(
+                f"{path}: FMI version {version}, co-simulation: "
+                f"{tree.find('CoSimulation') is not None}; "
+                "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
+            )
+        try:
+            model = read_model_description(_only_xml(content), validate=False)
+            relative = differences(tree)
+            scalars = tuple(
+                s for v in model.modelVariables for s in numbers(v, version[0], v.name in relative)
+            )
+        except Exception as error:  # FMPy raises bare Exception for what it cannot read
+            raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
+        _require_binary(archive, model.coSimulation.modelIdentifier, version[0])
+    block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
+    timing: Timing = "continuous"
+    if block is not None and block.get("timing") == "sampled":
+        timing = "sampled"
+    capable = {k for k, value in tree.find("CoSimulation").items() if value == "true"}  # type: ignore[union-attr]
+    return Description(
+        path,
+        model.guid,
+        model.coSimulation.modelIdentifier,
+        timing,
+        scalars,
+        version[0],
+        {u.name: _unit(u) for u in model.unitDefinitions},
+        frozenset(capable),
+        model.defaultExperiment and model.defaultExperiment.stepSize,
+        dependencies={
+            output.variable.name: frozenset(v.name for v in output.dependencies)
+            for output in model.outputs
+            if output.dependencies is not None
+        },
+        strings=tuple(text(v) for v in model.modelVariables if v.type == "String" and not v.shape),
+    )
+
+
+def _only_xml(text: bytes) -> BytesIO:
+    """FMPy reads an archive or a file's name; this is an archive with nothing but the text."""
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+    return file
+
+
+def _unit(unit: Any) -> Unit:
+    base = unit.baseUnit
+    if base is None:
+        return Unit(unit.name)
+    powers = tuple(int(getattr(base, b)) for b in BASES)
+    return Unit(unit.name, powers, float(base.factor), float(base.offset))
+
+
+def _require_binary(archive: zipfile.ZipFile, identifier: str, fmi: str) -> None:
+    here = platform if fmi == "2" else platform_tuple
+    wanted = f"binaries/{here}/{identifier}{sharedLibraryExtension}"
+    if wanted in archive.NameToInfo:
+        return
+    parts = (name.split("/") for name in archive.namelist() if name.startswith("binaries/"))
+    there = sorted({p[1] for p in parts if len(p) > 2 and p[2]})
+    raise InputFault(
+        f"{archive.filename}: no binary for this platform ({wanted}), only for "
+        f"{', '.join(there) or 'none'}; take an FMU that was built for {here}"
+    )

@@ -1,0 +1,167 @@
+"""An instance whose FMU runs in a process of its own: when that dies or hangs, the run does not.
+
+The worker has an `Instance`; here each call is a message to it and its answer. Inputs go with the
+call that comes next and the outputs come back with a step, so that a step is one message; it is
+answered when somebody asks, so that several FMUs step at the same time (`rounds`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
+from hapticlink.orchestrator.fmi.instance import Instance, Vector
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.worker_process import Died, Process
+
+CLOSING = 10.0
+"""Seconds that an FMU may take to terminate."""
+LOADING = 60.0
+"""Seconds at least that a process and its FMU may take to load, whatever the timeout of a call."""
+
+
+class Isolated(Instance):
+    """An FMU in a worker process. `step` starts a step, `finish` waits for it."""
+
+    _process: Process | None = None
+    _fresh: bytes | FmuFault | None = None
+    """Outputs that have come with a step and not been read, or why they could not be."""
+    _smaller = 0
+    _dismissed = False
+
+    def _load(self) -> None:
+        self._pending: list[tuple[int, bytes]] = []
+        self._process = Process("hapticlink.orchestrator.fmi.worker")
+        what = (self.name, self.description, len(self.outputs), self.starts, self.policy)
+        # The answer waits for `enter_initialization`: all FMUs of a run load at the same time.
+        self._send("load", *what, self._folder, allowed=max(self.policy.timeout, LOADING))
+
+    # --- messages -------------------------------------------------------------------------
+
+    def _send(self, call: str, *arguments: Any, allowed: float | None = None) -> None:
+        assert self._process is not None
+        if self._process.busy:
+            self._drop()
+        self._fresh = None
+        try:
+            self._process.send((self._pending, call, arguments), allowed or self.policy.timeout)
+        except Died as how:
+            raise self._died(how) from None
+        self._pending = []
+
+    def _answer(self) -> Any:
+        """The worker's answer. Raises its FmuFault, or one that says how it ended."""
+        assert self._process is not None
+        try:
+            kind, answer = self._process.answer()
+        except Died as how:
+            raise self._died(how) from None
+        if kind == "fault":
+            raise FmuFault(self.name, *answer)
+        return answer
+
+    def _ask(self, call: str, *arguments: Any) -> Any:
+        self._send(call, *arguments)
+        return self._answer()
+
+    def _drop(self) -> None:
+        """Wait for a step that nobody waits for, because another FMU's in its round has failed."""
+        try:
+            self._answer()
+        except FmuFault as fault:
+            if not fault.passing:
+                raise
+
+    def _died(self, how: Died) -> FmuFault:
+        self._process = None
+        return FmuFault(self.name, f"its process {how}", self.time)
+
+    # --- the calls of Instance ------------------------------------------------------------
+
+    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
+        return self._remote(self._ask("connect", list(scalars)), places)
+
+    def connect_derivatives(
+        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
+    ) -> Callable[[Vector], None]:
+        return self._remote(self._ask("connect_derivatives", list(scalars), list(orders)), places)
+
+    def _remote(self, key: int, places: Sequence[int]) -> Callable[[Vector], None]:
+        """What keeps the values at `places` for the setter `key` of the worker."""
+        where = np.array(places, dtype=np.intp)
+
+        def set_from(board: Vector) -> None:
+            self._pending.append((key, board[where].tobytes()))
+
+        return set_from
+
+    def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
+        found: Matrix | None = self._ask("jacobian", outputs, inputs)
+        return found
+
+    def enter_initialization(self, stop_time: float) -> None:
+        self._answer()  # of `_load`
+        self._ask("enter_initialization", stop_time)
+
+    def exit_initialization(self) -> None:
+        self._ask("exit_initialization")
+        self._start_loop()
+
+    def read(self) -> None:
+        if self._fresh is None or self._pending:
+            self._fresh = self._ask("read")
+        if isinstance(self._fresh, FmuFault):
+            raise self._fresh
+        self.outputs[:] = np.frombuffer(self._fresh)
+
+    @property
+    def smaller_steps(self) -> int:
+        return self._smaller
+
+    def step(self, time: float, end: float, size: float) -> None:
+        self.time, self._end = time, end
+        self._send("step", time, end, size)
+
+    def finish(self) -> None:
+        """Wait for the step. Raises its FmuFault."""
+        outputs, fault, self.step_time, self._smaller = self._answer()
+        self._fresh = outputs if fault is None else FmuFault(self.name, *fault)
+        self.time = self._end
+
+    def save(self, slot: int = 0) -> None:
+        self._ask("save", slot)
+        self._saved_time[slot] = self.time
+
+    def rollback(self, slot: int = 0) -> None:
+        self._pending = []  # inputs are part of the state
+        self._ask("rollback", slot)
+        self.time = self._saved_time[slot]
+
+    def dismiss(self) -> None:
+        """Have the FMU closed; `close` waits for that, so that all of a run close together."""
+        process = self._process
+        if process is None or self._dismissed:
+            return
+        self._dismissed = True
+        with suppress(Died):  # the run has its results, and the process ends in any case
+            if process.busy:
+                process.answer(CLOSING)
+            process.send(([], "close", ()), CLOSING)
+
+    def close(self) -> None:
+        process = self._process
+        try:
+            self.dismiss()
+            if process is not None and process.busy:
+                with suppress(Died):
+                    process.answer()
+        finally:
+            self._process = None
+            if process is not None:
+                process.end()
+            super().close()

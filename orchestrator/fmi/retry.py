@@ -1,0 +1,84 @@
+"""A step that an FMU discards, taken again in halves (FMI 2.0.5 section 4.2.2, FMI 3.0 section
+4.2.1: fmi2Discard allows the master to try a smaller step from the state before)."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+from hapticlink.orchestrator.fmi.description import Description
+
+WARNING, DISCARD = 1, 2
+HALVINGS = 10
+_NEEDED = {
+    "2": ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate"),
+    "3": ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUState"),
+}
+
+
+class Saved:
+    """A place for one state of an FMU. save and restore give the status of the call."""
+
+    def __init__(self, slave: Any, fmi: str) -> None:
+        state = "state" if fmi == "2" else "State"
+        self._instance, self._state = ctypes.c_void_p(slave.component), ctypes.c_void_p()
+        calls = (slave.dll[f"fmi{fmi}{verb}FMU{state}"] for verb in ("Get", "Set", "Free"))
+        self._get, self._set, self._free = calls
+
+    def save(self) -> int:
+        return self._get(self._instance, ctypes.byref(self._state))
+
+    def restore(self) -> int:
+        return self._set(self._instance, self._state)
+
+    def free(self) -> None:
+        if self._state:
+            self._free(self._instance, ctypes.byref(self._state))
+
+
+class Retry:
+    """Steps with the state before each saved. `smaller` counts the steps taken in halves; `renew`
+    sets inputs that vary as they are so long (s) after the beginning of the step."""
+
+    def __init__(self, slave: Any, fmi: str, advance: Callable[[float, float], int]) -> None:
+        self._advance, self.smaller, self._begin = advance, 0, 0.0
+        self.renew: Callable[[float], int] = lambda elapsed: 0
+        self._saved = [Saved(slave, fmi) for _ in range(HALVINGS + 1)]
+
+    @staticmethod
+    def possible(description: Description) -> bool:
+        return not Retry.why_not(description)
+
+    @staticmethod
+    def why_not(description: Description) -> str:
+        """Why steps of an FMU cannot be taken again in smaller ones, "" where they can."""
+        if description.timing == "sampled":
+            return "not retried: a sampled block takes whole periods only"
+        missing = [n for n in _NEEDED[description.fmi] if n not in description.flags]
+        return f"not retried: the FMU lacks {' and '.join(missing)}" if missing else ""
+
+    def step(self, time: float, size: float, depth: int = 0) -> int:
+        """Status of a step from `time` over `size` (s), in up to 2^10 parts; inputs stay, or go on
+        as they vary."""
+        saved = self._saved[depth]
+        if depth == 0:
+            self._begin = time
+        if (status := saved.save()) > WARNING:
+            return status
+        status = self._advance(time, size)
+        if status != DISCARD or depth == HALVINGS:
+            return status
+        self.smaller += depth == 0
+        if (status := saved.restore()) > WARNING:
+            return status
+        half = size / 2
+        if (status := self.step(time, half, depth + 1)) > WARNING:
+            return status
+        if (status := self.renew(time + half - self._begin)) > WARNING:
+            return status
+        return self.step(time + half, half, depth + 1)
+
+    def free(self) -> None:
+        for saved in self._saved:
+            saved.free()

@@ -1,0 +1,92 @@
+"""Values between a vector and an FMU, one C call for each FMI type."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
+
+Vector = NDArray[np.float64]
+_IN_C: dict[str, type[np.generic]] = {
+    "Real": np.float64, "Integer": np.int32,
+    "Float64": np.float64, "Float32": np.float32,
+    "Int64": np.int64, "Int32": np.int32, "Int16": np.int16, "Int8": np.int8,
+    "UInt64": np.uint64, "UInt32": np.uint32, "UInt16": np.uint16, "UInt8": np.uint8,
+}  # fmt: skip
+_BOOLEAN = {"2": np.int32, "3": np.bool_}  # fmi2Boolean is an int, fmi3Boolean a bool
+
+
+class Unfit(Exception):
+    """A number that its FMI type cannot hold."""
+
+
+class Transfer:
+    """The scalars of one FMI type within a vector, and the C call that moves them.
+
+    Entries of an FMI 3.0 array move together, so they stand side by side and none is left out.
+    """
+
+    def __init__(
+        self, slave: Any, fmi: str, verb: str, scalars: Sequence[Scalar], type_: str, values: Vector
+    ) -> None:
+        chosen = [i for i, s in enumerate(scalars) if s.type == type_]
+        self.name = f"fmi{fmi}{verb}{type_}"
+        self._values = values[chosen[0] : chosen[-1] + 1]
+        in_c = _IN_C.get(type_) or _BOOLEAN[fmi]
+        self._boolean, self._whole = type_ == "Boolean", np.issubdtype(in_c, np.integer)
+        if self._whole:
+            self._limits = np.iinfo(in_c)
+            self._named = f"{type_} holds {self._limits.min} to {self._limits.max}"
+            self._names = [scalars[i].name for i in chosen]
+        direct = in_c is np.float64
+        self._buffer: Any = self._values if direct else np.zeros(len(chosen), in_c)
+        references = [scalars[i].reference for i in chosen if scalars[i].entry == 0]
+        count = [ctypes.c_size_t(len(chosen))] * (fmi == "3")
+        # Argument objects and pointers are made once; a fresh function has no other types set.
+        self._transfer: Callable[[], int] = partial(
+            slave.dll[self.name],
+            ctypes.c_void_p(slave.component),
+            (ctypes.c_uint * len(references))(*references),
+            ctypes.c_size_t(len(references)),
+            ctypes.c_void_p(self._buffer.ctypes.data),
+            *count,
+        )
+        through = {"Get": self._get, "Set": self._set}[verb]
+        self.call: Callable[[], int] = self._transfer if direct else through
+
+    def _get(self) -> int:
+        status = self._transfer()
+        self._values[:] = self._buffer
+        return status
+
+    def _set(self) -> int:
+        if self._boolean:
+            self._buffer[:] = self._values >= 0.5
+        else:
+            self._buffer[:] = self._rounded() if self._whole else self._values
+        return self._transfer()
+
+    def _rounded(self) -> Vector:
+        """The nearest whole numbers. Raises Unfit."""
+        rounded, limits = np.rint(self._values), self._limits
+        # max + 1 is a power of two, so it is exact where max is not.
+        fits = (rounded >= limits.min) & (rounded < float(limits.max + 1))
+        if not fits.all():
+            i = int(np.argmin(fits))
+            value = float(self._values[i])
+            raise Unfit(f"{self._names[i]} cannot be {value!r}: {self._named}")
+        return rounded
+
+
+def transfers(
+    slave: Any, fmi: str, verb: str, scalars: Sequence[Scalar], values: Vector
+) -> list[Transfer]:
+    """One for each type present; `scalars` are sorted by type."""
+    present = [t for t in TYPES if any(s.type == t for s in scalars)]
+    return [Transfer(slave, fmi, verb, scalars, t, values) for t in present]

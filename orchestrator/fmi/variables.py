@@ -1,0 +1,123 @@
+"""The numbers of an FMU: variables of FMI 2.0, entries of the arrays of FMI 3.0."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import prod
+from typing import Any
+from xml.etree import ElementTree
+
+from hapticlink.orchestrator.fmi.units import SAME, Linear
+
+TYPES = (
+    "Real", "Integer",
+    "Float64", "Float32", "Int64", "Int32", "Int16", "Int8", "UInt64", "UInt32", "UInt16", "UInt8",
+    "Boolean",
+)  # fmt: skip
+"""The FMI types that are numbers, by the name in their get and set functions: FMI 2.0's two,
+FMI 3.0's ten, and Boolean of both."""
+_CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
+_ENTRY = re.compile(r"\[[\d, ]+\]$")
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array.
+
+    `conversion` is what a connection does to a value on its way in, `nominal` a size that counts,
+    1 where the FMU gives none (FMI 2.0.5 section 2.2.7).
+    """
+
+    name: str
+    reference: int
+    type: str
+    causality: str
+    unit: str | None
+    variability: str = "continuous"
+    start: float = 0.0
+    relative: bool = False
+    entry: int = 0
+    conversion: Linear = SAME
+    nominal: float = 1.0
+    initial: str | None = None
+    items: tuple[tuple[str, int], ...] = ()
+    """Of an enumeration: name and value of each."""
+
+    @cached_property
+    def port(self) -> str:
+        """`x` of `x[1]`: the vector or matrix that the scalar is an entry of."""
+        return _ENTRY.sub("", self.name)
+
+    @cached_property
+    def indices(self) -> tuple[int, ...]:
+        """(2, 3) of `x[2,3]`, () of a scalar."""
+        found = _ENTRY.search(self.name)
+        return tuple(map(int, re.findall(r"\d+", found[0]))) if found else ()
+
+    @property
+    def settable(self) -> bool:
+        """Whether it may be set until initialisation ends, or be connected to."""
+        return self.causality in ("input", "parameter") and self.variability != "constant"
+
+    @property
+    def startable(self) -> bool:
+        """Whether it takes a start value: states do too, where the FMU says how they start
+        (FMI 2.0.5 section 2.2.7, FMI 3.0 section 2.4.7)."""
+        started = self.initial in ("exact", "approx") and self.variability != "constant"
+        return self.settable or started
+
+
+def differences(tree: ElementTree.Element) -> set[str | None]:
+    """Names of the variables that are differences; FMPy 0.3.32 overlooks the attribute."""
+    return {
+        variable.get("name")
+        for variable in tree.iterfind("./ModelVariables/*")
+        if any(e.get("relativeQuantity") == "true" for e in (variable, *variable))
+    }
+
+
+def numbers(variable: Any, fmi: str, relative: bool) -> Iterator[Scalar]:
+    """The numbers of a variable; entries of an FMI 3.0 array row by row, named from 1."""
+    kind = _CALLED.get((fmi, variable.type), variable.type)
+    if kind not in TYPES:
+        return
+    shape = tuple(variable.shape or ())
+    starts = [_number(text) for text in (variable.start or "").split()] or [0.0]
+    if len(starts) == 1:
+        starts *= prod(shape)
+    places = product(*(range(1, n + 1) for n in shape))
+    names = [f"{variable.name}[{','.join(map(str, p))}]" if p else variable.name for p in places]
+    declared = variable.declaredType
+    for i, (name, start) in enumerate(zip(names, starts, strict=True)):
+        yield Scalar(
+            name,
+            variable.valueReference,
+            kind,
+            variable.causality or "local",
+            variable.unit or (declared and declared.unit),
+            variable.variability,
+            start,
+            relative or bool(declared and declared.relativeQuantity == "true"),
+            i,
+            nominal=_nominal(variable),
+            initial=variable.initial,
+            items=tuple((i.name, int(i.value)) for i in declared.items) if declared else (),
+        )
+
+
+def _nominal(variable: Any) -> float:
+    given = variable.nominal or (variable.declaredType and variable.declaredType.nominal)
+    return abs(float(given or 1.0)) or 1.0
+
+
+def text(v: Any) -> Scalar:
+    about = v.causality or "local", None, v.variability
+    return Scalar(v.name, v.valueReference, "String", *about, initial=v.initial)
+
+
+def _number(text: str) -> float:
+    return float(text == "true") if text in ("true", "false") else float(text)

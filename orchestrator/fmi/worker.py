@@ -1,0 +1,128 @@
+"""The process of an isolated FMU: answers the messages of `isolated.Isolated` until it is told to
+close or its caller is gone."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.instance3 import Instance3
+
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+class Worker:
+    """One instance and the ways to set its inputs."""
+
+    def __init__(self) -> None:
+        self._instance: Instance | None = None
+        self._setters: list[Callable[[Any], None]] = []
+
+    @property
+    def instance(self) -> Instance:
+        assert self._instance is not None
+        return self._instance
+
+    def load(
+        self, name: str, description: Any, outputs: int, starts: Any, policy: Any, folder: str
+    ) -> None:
+        kind = {"2": Instance, "3": Instance3}[description.fmi]
+        self._instance = kind(name, description, np.zeros(outputs), starts, policy, folder)
+        self.instance.__enter__()
+
+    def connect(self, scalars: Any) -> int:
+        self._setters.append(self.instance.connect(scalars, range(len(scalars))))
+        return len(self._setters) - 1
+
+    def connect_derivatives(self, scalars: Any, orders: Any) -> int:
+        made = self.instance.connect_derivatives(scalars, orders, range(len(scalars)))
+        self._setters.append(made)
+        return len(self._setters) - 1
+
+    def jacobian(self, outputs: Any, inputs: Any) -> Any:
+        return self.instance.jacobian(outputs, inputs)
+
+    def set_all(self, pending: Any) -> None:
+        """`pending`: (key, values as bytes) of setters, in order."""
+        for key, values in pending:
+            self._setters[key](np.frombuffer(values))
+
+    def enter_initialization(self, stop_time: float) -> None:
+        self.instance.enter_initialization(stop_time)
+
+    def exit_initialization(self) -> None:
+        self.instance.exit_initialization()
+
+    def read(self) -> bytes:
+        self.instance.read()
+        return self.instance.outputs.tobytes()
+
+    def step(self, time: float, end: float, size: float) -> Any:
+        """(outputs, or why they cannot be read, time in steps, steps taken in smaller ones)."""
+        outputs, fault = b"", None
+        self.instance.step(time, end, size)
+        try:
+            outputs = self.read()
+        except FmuFault as failed:  # told when somebody reads
+            fault = _told(failed)
+        return outputs, fault, self.instance.step_time, self.instance.smaller_steps
+
+    def save(self, slot: int) -> None:
+        self.instance.save(slot)
+
+    def rollback(self, slot: int) -> None:
+        self.instance.rollback(slot)
+
+    def close(self) -> None:
+        instance, self._instance = self._instance, None
+        if instance is not None:
+            instance.close()
+
+
+def _told(fault: FmuFault) -> tuple[Any, ...]:
+    return fault.what, fault.time, fault.messages, fault.passing
+
+
+def serve(requests: BinaryIO, answers: BinaryIO) -> None:
+    """Answer until `close`, or until there is nobody left to ask."""
+    worker = Worker()
+    call = ""
+    while call != "close":
+        try:
+            pending, call, arguments = pickle.load(requests)
+        except EOFError:
+            break
+        try:
+            worker.set_all(pending)
+            answer = ("answer", getattr(worker, call)(*arguments))
+        except FmuFault as fault:
+            answer = ("fault", _told(fault))
+        pickle.dump(answer, answers)
+        answers.flush()
+    worker.close()
+
+
+def main() -> None:
+    """Messages come and go by the first two streams; what the FMU prints goes to the third."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)  # the caller ends the run, and then this process
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.dup2(2, 1)
+    serve(requests, answers)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Which operation comes when: the plan of a run, as data."""

@@ -1,0 +1,106 @@
+"""The order that dependencies give, and the loops in which they give none."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from hapticlink.orchestrator.system.system import System, Unit
+
+
+@dataclass(frozen=True)
+class Loop:
+    """FMUs that feed each other, in the order that they step in, and a way round among them."""
+
+    fmus: tuple[str, ...]
+    ring: str
+
+
+def groups(system: System, units: Iterable[Unit]) -> list[list[Unit]]:
+    """`units`, each group after those that feed it; a group of more than one is a loop."""
+    names = {u.name for u in units}
+    feeds = {u.name: [c.source for c in system.into(u.name) if c.source in names] for u in units}
+    return [[system.unit[n] for n in group] for group in components(feeds)]
+
+
+def direct(system: System, units: Iterable[Unit]) -> dict[str, set[str]]:
+    """By unit: those of `units` that one of its outputs depends on directly (ModelStructure, FMI
+    2.0.5 section 2.2.8)."""
+    names = {u.name for u in units}
+    return {
+        u.name: {
+            c.source
+            for c in system.into(u.name)
+            if c.source in names
+            and any(u.description.follows(y, c.inputs) for y in u.description.outputs)
+        }
+        for u in units
+    }
+
+
+def plants(system: System, units: Iterable[Unit]) -> Iterator[list[Unit]]:
+    """The groups in order; in a loop direct dependencies order, and what they leave the system's
+    order."""
+    for group in groups(system, units):
+        parts = components(direct(system, group))
+        yield [system.unit[name] for part in parts for name in part]
+
+
+def loops(system: System) -> Iterator[Loop]:
+    """Among the FMUs that the coupling puts in an order: sampled blocks, and plants that read the
+    end of each other's steps."""
+    ordered = [[u for u in system.units if u.sampled]]
+    continuous = [u for u in system.units if not u.sampled]
+    if system.coupling == "jacobi":
+        return
+    if system.coupling == "gauss-seidel-plants":
+        ordered.append(continuous)
+    if system.coupling == "iterated":
+        clocks = dict.fromkeys(u.clock for u in continuous)
+        ordered += [[u for u in continuous if u.clock == clock] for clock in clocks]
+    for units in ordered:
+        for group in plants(system, units):
+            names = tuple(u.name for u in group)
+            feeds = {n: [c.source for c in system.into(n) if c.source in names] for n in names}
+            if len(names) > 1:
+                yield Loop(names, ring(feeds, names))
+
+
+def components(feeds: Mapping[str, Collection[str]]) -> list[list[str]]:
+    """The nodes of a graph `node -> those that feed it`, each group after those that feed it.
+
+    A group of more than one node is a loop (a strongly connected component; Tarjan 1972).
+    """
+    found: list[list[str]] = []
+    number: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    path: list[str] = []
+
+    def visit(node: str) -> None:
+        number[node] = lowest[node] = len(number)
+        path.append(node)
+        for before in (n for n in feeds[node] if n in feeds):
+            if before not in number:
+                visit(before)
+                lowest[node] = min(lowest[node], lowest[before])
+            elif before in path:
+                lowest[node] = min(lowest[node], number[before])
+        if lowest[node] == number[node]:
+            at = path.index(node)
+            found.append(sorted(path[at:], key=list(feeds).index))
+            del path[at:]
+
+    for node in feeds:
+        if node not in number:
+            visit(node)
+    return found
+
+
+def ring(feeds: Mapping[str, Collection[str]], group: Collection[str]) -> str:
+    """A way round inside a loop, as `a -> b -> a`."""
+    path = [next(iter(group))]
+    while True:
+        before = sorted(n for n in feeds[path[-1]] if n in group)[0]
+        if before in path:
+            return " -> ".join([before, *reversed(path[path.index(before) :])])
+        path.append(before)

@@ -1,0 +1,121 @@
+"""`--explain`: a plan as text. What runs when, and which sample each input is made from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from itertools import groupby
+
+from hapticlink.orchestrator.base.ticks import Clock, exact
+from hapticlink.orchestrator.plan import dependency_order
+from hapticlink.orchestrator.plan.operations import Event, Operation, Repeat
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import uses
+from hapticlink.orchestrator.system.system import System
+
+LEGEND = """\
+Time is counted in ticks. What is done at an instant is a block; instants of one kind share one:
+  get        read an FMU's outputs              set      write an FMU's inputs
+  push       give a hold the newest sample      step     an FMU's doStep, over `dticks` ticks
+  evaluate   ask a hold for its value           record   write a row of a rate's table
+`ahead n`: for a time n ticks after the instant. More: docs/holds.md, docs/coupling.md.
+"""
+PRINTED = 600
+"""Events of a table that somebody reads off a screen."""
+
+
+def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
+    """Clocks, the block of each kind of event, then a table of the whole run, or of as much of it
+    as tells the rest (`_last`); of the first `rows` events where it is to be cut."""
+    system, timeline = plan.system, plan.system.timeline
+    base = timeline.base
+    yield LEGEND
+    yield f"ticks of {base.numerator}/{base.denominator} s, {system.coupling}"
+    for clock in timeline.clocks:
+        units = ", ".join(
+            u.name + (" (sampled)" if u.sampled else "")
+            for u in system.units
+            if u.clock == clock.name
+        )
+        yield f"  {clock.name}: {_steps(clock)}: {units}"
+    yield from _holds(system)
+    for loop in dependency_order.loops(system):
+        yield f"  loop {loop.ring}: {', '.join(loop.fmus)} in this order"
+    last, names = _last(system), dict[Event, str]()
+    events: dict[int, str] = {}
+    cut = False
+    for tick, event in plan:
+        if tick > last or (cut := len(events) == rows):
+            break
+        events[tick] = names.setdefault(event, _letters(len(names)))
+    yield ""
+    for event, name in names.items():
+        yield f"block {name}: {_kind(event)}"
+        yield from _lines(plan.block(event), "  ")
+    yield ""
+    yield "tick, time (s), block, FMU that is set: each input @ the tick its newest sample is of"
+    connections = {c.name: c for c in system.connections}
+    made = ((u.tick, connections[u.connection], u.stamp) for u in uses(plan, max(events)))
+    for (tick, target), group in groupby(made, key=lambda use: (use[0], use[1].target)):
+        inputs = " ".join(f"{c.target_port}@{stamp}" for _, c, stamp in group)
+        yield f"{tick:>8}  {timeline.seconds(tick):<12.9g} {events[tick]:<3} {target}: {inputs}"
+    if cut:
+        yield f"cut after {rows} events; a run writes them all to plan.txt"
+
+
+def _last(system: System) -> int:
+    """The last tick of the table: that of the first hyperperiod in which all phases have begun and
+    constant latencies are over, the end of a run in which nothing comes round."""
+    timeline = system.timeline
+    clocks, late = timeline.clocks, [c.latency for c in system.connections if c.latency]
+    drawn = any(way.loss or way.max not in (None, way.min) for way in late)
+    periods = [c.period for c in clocks if c.period]
+    if drawn or len(periods) < len(clocks):
+        return timeline.end
+    begun = max(c.first % c.longest for c in clocks)
+    begun += max((math.ceil(exact(way.min) / timeline.base) for way in late), default=0)
+    return min(timeline.end, begun + math.lcm(*periods))
+
+
+def _letters(n: int) -> str:
+    return chr(ord("A") + n) if n < 26 else _letters(n // 26 - 1) + _letters(n % 26)
+
+
+def _steps(clock: Clock) -> str:
+    if clock.period:
+        return f"every {clock.period} ticks" + f", first {clock.first}" * (
+            clock.first != clock.period
+        )
+    return f"steps of {clock.shortest} to {clock.longest} ticks"
+
+
+def _holds(system: System) -> Iterator[str]:
+    for c in system.connections:
+        if c.hold:
+            late = f", latency {c.latency}" if c.latency else ""
+            kind = f" of a {c.kind}" if c.kind else ""
+            yield f"  {c.name}: {c.hold}{kind}{late}"
+
+
+def _kind(event: Event) -> str:
+    told = (f"{f.clock} {f.dticks}" + " (last)" * f.final for f in event.firings)
+    return ("the start, " if event.first else "") + ", ".join(told)
+
+
+def _lines(block: Iterable[Operation], indent: str) -> Iterator[str]:
+    for operation in block:
+        if isinstance(operation, Repeat):
+            yield f"{indent}repeat until these agree: {', '.join(operation.connections)}"
+            yield from _lines((*operation.guess, *operation.body), indent + "  ")
+            yield from _lines(operation.again, indent + "  again: ")
+        else:
+            yield indent + _line(operation)
+
+
+def _line(operation: Operation) -> str:
+    """`step virtual_mechanism dticks 15`: the operation, what it works on, what is not usual."""
+    first, *others = vars(operation).items() or [("", "")]
+    usual = {f.name: f.default for f in fields(operation)}
+    given = [f"{name} {value}" for name, value in others if value != usual[name]]
+    return " ".join(filter(None, [type(operation).__name__.lower(), str(first[1]), *given]))

@@ -1,0 +1,75 @@
+"""The plan: what happens at each event, as plain data.
+
+An event is an instant at which clocks fire. Events of one kind run the same block of
+operations, so a plan is a finite set of blocks and an iterator of (tick, event). A scheme
+orders a block; `run` carries it out; `stamps` reads causality off it.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import NamedTuple
+
+from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.plan.operations import Advance, Event, Firing, Operation, Part, flat
+from hapticlink.orchestrator.plan.schemes import SCHEMES, step_control
+from hapticlink.orchestrator.system.system import System
+
+Block = tuple[Operation, ...]
+
+
+class Moment(NamedTuple):
+    tick: int
+    event: Event
+
+
+@dataclass
+class Plan:
+    """The blocks of a system's events, made when an event of a new kind comes."""
+
+    system: System
+    _blocks: dict[Event | Part, Block] = field(default_factory=dict)
+
+    def block(self, kind: Event | Part) -> Block:
+        if kind not in self._blocks:
+            self._blocks[kind] = self._made(kind)
+        return self._blocks[kind]
+
+    def _made(self, kind: Event | Part) -> Block:
+        scheme = SCHEMES[self.system.coupling]
+        if isinstance(kind, Part):
+            return step_control.part(self.system, kind, scheme)
+        if self.system.step_control:
+            return step_control.block(self.system, kind, scheme)
+        return scheme(self.system, kind)
+
+    def unrolled(self, event: Event) -> Iterator[Operation]:
+        """The operations of `event`: a repetition carried out once, step control in one step."""
+        for operation in flat(self.block(event)):
+            if isinstance(operation, Advance):
+                yield from flat(self.block(Part(operation.clock, operation.dticks)))
+            else:
+                yield operation
+
+    def __iter__(self) -> Iterator[Moment]:
+        return moments(self.system.timeline)
+
+
+def moments(timeline: Timeline) -> Iterator[Moment]:
+    """All events from 0 to the end, in time; clocks that fire together share one."""
+    merged = heapq.merge(*(_firings(i, c, timeline.end) for i, c in enumerate(timeline.clocks)))
+    for tick, firing in groupby(merged, key=lambda entry: entry[0]):
+        yield Moment(tick, Event(tick == 0, tuple(entry[2] for entry in firing)))
+
+
+def _firings(order: int, clock: Clock, end: int) -> Iterator[tuple[int, int, Firing]]:
+    """A step that would end after the end of the run is `final`: it only completes the row."""
+    starts = clock.starts
+    for i in range(len(starts) - 1):
+        start, dticks = starts[i], starts[i + 1] - starts[i]
+        if start > end:
+            return
+        yield start, order, Firing(clock.name, dticks, start + dticks > end)

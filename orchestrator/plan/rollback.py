@@ -1,0 +1,21 @@
+"""Schemes that take steps back need FMUs whose state can be restored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.capabilities import STATE, restores_state
+from hapticlink.orchestrator.system.system import System
+
+
+def require(system: System, names: Iterable[str], what: str) -> None:
+    """Raises InputFault naming the FMUs that cannot roll back."""
+    unable = [n for n in names if not restores_state(system.unit[n].description)]
+    if unable:
+        flags = {STATE[system.unit[n].description.fmi] for n in unable}
+        raise InputFault(
+            f"{what} takes steps back, and {', '.join(unable)} cannot save and restore its state "
+            f"({' or '.join(sorted(flags))} is not true); take coupling = 'gauss-seidel' or "
+            "'jacobi' with a higher rate"
+        )

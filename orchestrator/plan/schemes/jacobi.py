@@ -1,0 +1,29 @@
+"""Jacobi, as FMI allows it: get all, set all, step all.
+
+Everybody takes what was read before anybody is set, so what a sampled block puts out at t
+reaches the others one event later. Sampled outputs are read and recorded with their own
+stamp t.
+"""
+
+from __future__ import annotations
+
+from hapticlink.orchestrator.plan import building_blocks
+from hapticlink.orchestrator.plan.operations import Event, Operation
+from hapticlink.orchestrator.system.system import System
+
+
+def block(system: System, event: Event) -> tuple[Operation, ...]:
+    """The operations of `event`."""
+    sampled, continuous = building_blocks.firing(system, event)
+    started = building_blocks.starting(event, continuous)
+    operations: list[Operation] = [*building_blocks.publish_ended(system, event, continuous)]
+    for unit in [*sampled, *started]:
+        operations += building_blocks.feed(system, event, unit)
+    for unit in sampled:
+        operations += building_blocks.step(system, event, unit)
+    for unit in sampled:
+        operations += building_blocks.publish(system, unit)
+    operations += building_blocks.record(system, event)
+    for unit in started:
+        operations += building_blocks.step(system, event, unit)
+    return tuple(operations)

@@ -1,0 +1,84 @@
+"""Step control laid over a scheme: sampled blocks as they are, plants in steps found as they go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
+from hapticlink.orchestrator.plan import building_blocks, rollback
+from hapticlink.orchestrator.plan.operations import Advance, Event, Firing, Operation, Part, Record
+from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.system.ports import carries_power
+from hapticlink.orchestrator.system.system import Connection, System
+
+Scheme = Callable[[System, Event], tuple[Operation, ...]]
+
+
+def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]:
+    """The operations of `event`; clocks whose plants are not connected keep their steps.
+
+    Raises InputFault naming plants whose steps cannot be chosen, or where there is nothing to do.
+    """
+    assert system.step_control is not None
+    between = {u.clock: _between(system, u.clock) for u in system.units}
+    if not any(between.values()):
+        raise InputFault(
+            "[step_control] chooses when connected plants of one rate exchange values, and there "
+            "are none: take it out, with more substeps or a finer integrator where needed"
+        )
+    clocks = [f.clock for f in event.firings if between.get(f.clock) and not f.final]
+    operations = [*scheme(system, building_blocks.without_steps(event, clocks))]
+    for clock in clocks:
+        plants = [u for u in system.units if u.clock == clock and not u.sampled]
+        fixed = [u.name for u in plants if not varies_step(u.description)]
+        if fixed:
+            raise InputFault(
+                f"[step_control] varies the step, and {', '.join(fixed)} cannot take that "
+                f"({VARIABLE_STEP} is not true); take it out, with a higher rate"
+            )
+        if system.step_control.method == "doubling":
+            what = "[step_control] method = 'doubling'"
+            rollback.require(system, [u.name for u in plants], what)
+        else:
+            _require_energy(system, clock, between[clock])
+        dticks = next(f.dticks for f in event.firings if f.clock == clock)
+        operations.append(Advance(clock, dticks))
+    return tuple(operations)
+
+
+def _between(system: System, clock: str) -> list[Connection]:
+    """The connections between plants of a clock."""
+    plants = [u.name for u in system.units if u.clock == clock and not u.sampled]
+    return [c for name in plants for c in system.into(name) if c.source in plants]
+
+
+def _require_energy(system: System, clock: str, between: list[Connection]) -> None:
+    """Raises InputFault where there is no energy to look at, or nothing to measure it against."""
+    assert system.step_control is not None
+    if not any(carries_power(c, system.power) for c in between):
+        raise InputFault(
+            "[step_control] method = 'ecco' looks at the energy between plants, and no connection "
+            f"between plants of {clock} carries power: name efforts and displacements in "
+            "[[power]], or take method = 'doubling'"
+        )
+    if system.step_control.energy is None:
+        raise InputFault(
+            "[step_control] method = 'ecco' measures against the energy that matters in the "
+            "scene: give energy (J)"
+        )
+    if system.coupling not in CAUSAL:
+        raise InputFault(
+            "[step_control] method = 'ecco' estimates what extrapolation errs, and coupling = "
+            f"{system.coupling!r} interpolates: take 'jacobi', 'gauss-seidel', or 'doubling'"
+        )
+
+
+def part(system: System, kind: Part, scheme: Scheme) -> tuple[Operation, ...]:
+    """One step of the plants of a clock, alone, from outputs that have been read; or the reading
+    at its end, carried out at that tick."""
+    plants = tuple(u for u in system.units if u.clock == kind.clock and not u.sampled)
+    alone = replace(system, units=plants, ends_when=None)
+    event = Event(not kind.ended, (Firing(kind.clock, kind.dticks, kind.ended),))
+    return tuple(op for op in scheme(alone, event) if not isinstance(op, Record))

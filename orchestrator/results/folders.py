@@ -1,0 +1,43 @@
+"""The folder that a command writes to."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.files import write_json
+
+
+def made(folder: Path | str) -> Path:
+    """The folder, made where there is none. Raises InputFault where it cannot be written to."""
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        why = "is a file"
+    except OSError as error:
+        why = f"cannot be made ({error.strerror})"
+    else:
+        if os.access(folder, os.W_OK | os.X_OK):
+            return folder
+        why = "may not be written to"
+    raise InputFault(f"--out {folder}: {why}; name a folder that can be written to")
+
+
+def clear(folder: Path) -> None:
+    """Remove the files that the run.json of an earlier run there lists, and nothing else."""
+    with suppress(OSError, ValueError, AttributeError):
+        for name in json.loads((folder / "run.json").read_text(encoding="utf-8")).get("files", ()):
+            if isinstance(name, str) and Path(name).name == name:
+                (folder / name).unlink(missing_ok=True)
+
+
+def add(folder: Path, names: Iterable[str]) -> None:
+    """List more files of a run in its run.json."""
+    run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    run["files"] = list(dict.fromkeys([*run["files"], *names]))
+    write_json(folder / "run.json", run)

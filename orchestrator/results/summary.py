@@ -1,0 +1,73 @@
+"""What a run tells in the terminal beside how it ended: where it is not what was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby, islice
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.tracking import table_of
+
+
+def lines(results: Results) -> Iterator[str]:
+    """A line for each kind of thing in run.json, and for each joint whose start was moved far."""
+    run = results.run
+    yield from _start(results)
+    for fmu, count in run["held_outputs"].items():
+        yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
+    for fmu, count in run["smaller_steps"].items():
+        yield f"{fmu}: {count} steps were discarded and taken again in smaller ones"
+    if (found := run["iterations"]) and found["unconverged"]:
+        yield f"{found['unconverged']} of {found['steps']} iterated steps did not converge"
+    for clock, steps in run["controlled_steps"].items():
+        if steps["forced"]:
+            few = f"{steps['forced']} of {steps['taken']} steps were taken at the least size"
+            yield f"{clock}: {few} though their error was too large"
+    for name, link in run["links"].items():
+        if link["lost"] or link["overtaken"]:
+            lost = f"{link['lost']} of {link['sent']} samples were lost"
+            yield f"{name}: {lost}, {link['overtaken']} overtaken"
+    refused = sorted(run["holds_that_did_not_fit"].items(), key=lambda item: item[1]["hold"])
+    for hold, group in groupby(refused, key=lambda item: item[1]["hold"]):
+        gave_way = [f"{name} ({why['reason']})" for name, why in group]
+        more = f" and {len(gave_way) - 1} more" if len(gave_way) > 1 else ""
+        yield f"hold {hold} does not fit {gave_way[0]}{more}: zoh there"
+
+
+def _start(results: Results) -> Iterator[str]:
+    linkage = results.run["scene"]["linkage"]
+    table = table_of(results, f"{MECHANISM}.q")
+    if linkage and table and len(table["time"]):
+        yield from moved(linkage, table[f"{MECHANISM}.q"][0])
+
+
+def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
+    """A line where the start of joints in [linkage] is far from the assembled q."""
+    if far := list(_far(linkage, q)):
+        yield f"the loops do not close at the start given; assembly moved {', '.join(far)}"
+
+
+def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
+    rest = iter(q)
+    for joint in linkage["joint"]:
+        units = _UNITS[joint["type"]]
+        found = list(islice(rest, len(units)))
+        if joint["name"] not in linkage["start"]:
+            continue
+        given = np.atleast_1d(linkage["start"][joint["name"]]).tolist()
+        for start, value, unit in zip(given, found, units, strict=True):
+            if abs(value - start) > TOLD[unit]:
+                yield f"{joint['name']} from {start:.6g} to {value:.6g} {unit}"
+
+
+TOLD = {"rad": 0.1, "m": 0.01}
+"""From here on a move is told."""
+
+
+_UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}
+
+
+MECHANISM = "virtual_mechanism"

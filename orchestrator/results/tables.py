@@ -1,0 +1,91 @@
+"""Results on disk: one CSV per rate, streamed, and `run.json`; and reading them back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.base.faults import InputFault
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Table(Mapping[str, Vector]):
+    """The columns of one rate. `table["device.x"]` stacks `device.x[1]`, `device.x[2]`, ...
+
+    into (rows, n), a matrix into (rows, n, m); a full name gives its column, (rows,). `others` are
+    the tables of the same run.
+    """
+
+    columns: tuple[str, ...]
+    rows: Vector
+    others: Mapping[str, Table] = field(default_factory=dict, repr=False, compare=False)
+
+    def __getitem__(self, name: str) -> Vector:
+        if name in self.columns:
+            return self.rows[:, self.columns.index(name)]
+        entries = [(i, c) for i, c in enumerate(self.columns) if c.startswith(f"{name}[")]
+        if not entries:
+            there = [other for other, table in self.others.items() if name in table]
+            found = f"; it is in tables[{there[0]!r}]" if there else ""
+            raise KeyError(f"no signal {name!r}{found}; there are {', '.join(self.columns)}")
+        last = entries[-1][1]
+        shape = tuple(int(n) for n in last[len(name) + 1 : -1].split(","))
+        return self.rows[:, [i for i, _ in entries]].reshape(-1, *shape)
+
+    def __contains__(self, name: object) -> bool:
+        return any(c == name or c.startswith(f"{name}[") for c in self.columns)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+@dataclass(frozen=True)
+class Results:
+    """A run read back: `run` is run.json, `tables` the CSVs by rate."""
+
+    folder: Path
+    run: dict[str, Any]
+    tables: dict[str, Table]
+
+    @property
+    def haptics(self) -> Table:
+        return self.tables["haptics"]
+
+    @property
+    def graphics(self) -> Table:
+        return self.tables["graphics"]
+
+
+def load(folder: Path | str) -> Results:
+    """Read a run's folder. Raises InputFault where it holds no run."""
+    folder = Path(folder)
+    try:
+        run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError) as error:
+        raise InputFault(f"{folder}: not the folder of a run: {error}") from error
+    tables: dict[str, Table] = {}
+    for name in run["rates"]:
+        tables[name] = read_table(folder / f"{name}.csv", tables)
+    return Results(folder, run, tables)
+
+
+def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
+    """One CSV of a run, whose other tables are `others`."""
+    import csv
+
+    with path.open(encoding="utf-8", newline="") as file:
+        columns = tuple(next(csv.reader([file.readline()])))
+        rows = file.readlines()
+    values = np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.zeros((0, len(columns)))
+    return Table(columns, values, {} if others is None else others)

@@ -1,0 +1,1 @@
+"""A plan carried out: FMUs called, samples held, rows recorded."""

@@ -1,0 +1,186 @@
+"""Operations of a plan bound to the calls that carry them out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from hapticlink.orchestrator.fmi.isolated import Isolated
+from hapticlink.orchestrator.plan.operations import (
+    Advance,
+    Blend,
+    Evaluate,
+    Get,
+    Operation,
+    Part,
+    Push,
+    Record,
+    Repeat,
+    Rollback,
+    Save,
+    Set,
+    Step,
+    StopWhen,
+)
+from hapticlink.orchestrator.run import parallel_steps
+from hapticlink.orchestrator.run.fixed_point import Loop
+from hapticlink.orchestrator.run.simulation import Call, Live
+from hapticlink.orchestrator.run.step_control import Advancer
+from hapticlink.orchestrator.scene.conditions import COMPARISONS
+from hapticlink.orchestrator.system import held_polynomials
+
+
+class Stop(Exception):
+    """The stop condition holds."""
+
+
+class Binder:
+    """One way to bind each operation. `calls` gives the bound operations of a part of a plan."""
+
+    def __init__(self, live: Live, calls: Callable[[Part], Sequence[Call]]) -> None:
+        self._live, self._calls = live, calls
+        self._isolated = {n: i for n, i in live.instances.items() if isinstance(i, Isolated)}
+        self.loops: dict[Repeat, Loop] = {}
+        self.advancers: dict[str, Advancer] = {}
+
+    def bind_all(
+        self, operations: Iterable[Operation], bind: Callable[[Operation], Call] | None = None
+    ) -> list[Call]:
+        return parallel_steps.bound(operations, bind or self.bind, self._isolated)
+
+    def bind(self, operation: Operation) -> Call:
+        live = self._live
+        match operation:
+            case Get(fmu, ahead):
+                return live.meters.read(fmu, ahead, live.instances[fmu].get)
+            case Set(fmu, now, derivatives):
+                if now:
+                    return live.now_setters[fmu]
+                setters = live.varying_setters if derivatives else live.setters
+                return live.meters.fed(fmu, setters[fmu])
+            case Step(fmu, dticks, part, parts):
+                return self._step(fmu, dticks, part, parts)
+            case Push(connection, ahead):
+                return self._push(connection, ahead)
+            case Evaluate(connection, ahead, 0):
+                return self._evaluate(connection, float(ahead))
+            case Evaluate(connection, ahead, order, width):
+                return self._derive(connection, float(ahead), order, float(width))
+            case Blend(connection, points):
+                return self._blend(connection, points)
+            case Save(fmu):
+                save = live.instances[fmu].save
+                return lambda tick: save()
+            case Rollback(fmu):
+                rollback = live.instances[fmu].rollback
+                return lambda tick: rollback()
+            case Advance(clock, dticks):
+                advance = self._advancer(clock).advance
+                return lambda tick: advance(tick, dticks)
+            case Repeat():
+                return self._repeat(operation)
+            case Record(clock):
+                row, seconds = live.recorders[clock].row, live.seconds
+                return lambda tick: row(seconds(tick))
+            case StopWhen():
+                return self._stop_when()
+
+    def _step(self, fmu: str, dticks: int, part: int, parts: int) -> Call:
+        live = self._live
+        step, seconds = live.instances[fmu].step, live.seconds
+        size = seconds(dticks)
+        # A sampled output is stamped at the start of its step.
+        valid = 0 if live.system.unit[fmu].sampled else dticks
+        if parts > 1:
+            base = live.system.timeline.base / parts
+            begin, size = part * dticks, float(dticks * base)
+
+            def substep(tick: int) -> None:
+                start = tick * parts + begin
+                step(float(start * base), float((start + dticks) * base), size)
+
+            return substep
+        return lambda tick: step(seconds(tick), seconds(tick + valid), size)
+
+    def _push(self, connection: str, ahead: int) -> Call:
+        live = self._live
+        hold, values = live.holds[connection], live.board.values
+        sources = live.board.sources(live.system.connection[connection])
+        view = live.board.view(sources)
+        if view is not None:
+            return lambda tick: hold.push(tick + ahead, view, tick)
+        return lambda tick: hold.push(tick + ahead, values[sources], tick)
+
+    def _evaluate(self, connection: str, ahead: float) -> Call:
+        live = self._live
+        hold, view = live.holds[connection], live.board.values[live.board.hold(connection)]
+
+        def evaluate(tick: int) -> None:
+            view[:] = hold.value(tick, ahead)
+
+        return evaluate
+
+    def _derive(self, connection: str, ahead: float, order: int, width: float) -> Call:
+        live = self._live
+        hold, values, board = live.holds[connection], live.board.values, live.board
+        view, span = values[board.hold(connection)], board.derivatives(connection)
+        derived, mean = values[span], values[span.stop : span.stop + len(view)]
+        instants = [ahead + i * width / order for i in range(order + 1)]
+        seconds = live.seconds(width)
+
+        def derive(tick: int) -> None:
+            found = np.stack([hold.value(tick, at) for at in instants])
+            view[:] = found[0]
+            derivatives, mean[:] = held_polynomials.split(found, seconds)
+            derived[:] = derivatives.ravel()
+
+        return derive
+
+    def _advancer(self, clock: str) -> Advancer:
+        if clock not in self.advancers:
+            self.advancers[clock] = Advancer(clock, self._live, self._calls)
+        return self.advancers[clock]
+
+    def _blend(self, connection: str, points: tuple[tuple[float, Fraction], ...]) -> Call:
+        live = self._live
+        hold, view = live.holds[connection], live.board.values[live.board.hold(connection)]
+        pairs = [(weight, float(ahead)) for weight, ahead in points]
+
+        def blend(tick: int) -> None:
+            view[:] = sum(weight * hold.value(tick, ahead) for weight, ahead in pairs)
+
+        return blend
+
+    def _repeat(self, operation: Repeat) -> Loop:
+        """The loop of a Repeat; events share it, and what its solver has learned."""
+        live = self._live
+        if operation in self.loops:
+            return self.loops[operation]
+
+        def bind(op: Operation) -> Call:  # finite or not: an iteration comes back from infinity
+            if isinstance(op, Get):
+                return live.meters.read(op.fmu, op.ahead, live.instances[op.fmu].read)
+            return self.bind(op)
+
+        body = self.bind_all(operation.body, bind)
+        calls = (self.bind_all(operation.guess), body, self.bind_all(operation.again))
+        held = [self.bind(op) for op in operation.body if isinstance(op, Blend)]
+        loop = Loop(operation, self._live, calls, held)
+        self.loops[operation] = loop
+        return loop
+
+    def _stop_when(self) -> Call:
+        live = self._live
+        condition = live.system.ends_when
+        assert condition is not None
+        place = live.board.scalar(condition.fmu, condition.variable)
+        holds, values = COMPARISONS[condition.comparison], live.board.values
+        limit = condition.value
+
+        def stop_when(tick: int) -> None:
+            if holds(values[place], limit):
+                raise Stop
+
+        return stop_when

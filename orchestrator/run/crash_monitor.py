@@ -1,0 +1,61 @@
+"""A process beside a run with FMUs of others in its own process: where one of them takes the run
+with it, this one writes how it ended into run.json and removes the temporary folders."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from hapticlink.orchestrator.base import temporary_folders
+
+
+@contextmanager
+def beside(folder: Path) -> Iterator[None]:
+    """Within, a crash of this process is told in `folder`/run.json."""
+    command = [sys.executable, "-P", "-m", __name__, str(folder.resolve()), str(os.getpid())]
+    # A session of its own: Ctrl-C is for the run. Its input ends when this process does.
+    with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+def finish(folder: Path, process: int) -> None:
+    """What the run in `process`, which is gone, could not do any more."""
+    from hapticlink.orchestrator.results.files import write_json
+    from hapticlink.orchestrator.results.tables import load
+
+    temporary_folders.clear(process)
+    results = load(folder)
+    story = dict(results.run)
+    rows = results.tables[story["rates"][0]]["time"]
+    time = float(rows[-1]) if len(rows) else 0.0
+    message = (
+        f"the process of the run ended after t = {time!r} s; an FMU may have crashed it: with "
+        "isolate = true it has a process of its own, and the run tells which"
+    )
+    story |= {
+        "end": {"reason": "fault", "time": time},
+        "fault": {"kind": "Crash", "message": message},
+    }
+    write_json(folder / "run.json", story)
+    print(f"hapticlink: {message}; results are in {folder}", file=sys.stderr)
+
+
+def main() -> None:
+    """Wait for the end of the run, which kills this process where it ends in good order."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    sys.stdin.buffer.read()
+    with suppress(OSError):  # a full disk, a folder that is gone
+        finish(Path(sys.argv[1]), int(sys.argv[2]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""The power that a connection carries, entry by entry: a bond, as bond graphs call it.
+
+An entry y of the source reaches the target's effort input as e = a y + b (its units converted,
+`factor` and `offset` of the connection), and works on the displacement x that [[power]] pairs with
+that input: power = sign e dx/dt. In W: units of the FMUs count by their factors to SI, and an FMU
+that says none is taken to use N and m, N.m and rad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.system.ports import paired, slope
+from hapticlink.orchestrator.system.system import Connection, System
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bond:
+    """By entry of the connection that carries power.
+
+    entries: its place in the connection. moved: the displacement's place on the board; moving: that
+    of its derivative, none where the target does not put it out. The effort (SI) is factor y +
+    offset, its displacement (SI, with the sign) scale x.
+    """
+
+    entries: tuple[int, ...]
+    moved: tuple[int, ...]
+    moving: tuple[int, ...]
+    factor: Vector
+    offset: Vector
+    scale: Vector
+
+    def of(self, places: Sequence[int]) -> list[int]:
+        """Those of `places`, one for each entry of the connection, that carry power."""
+        return [places[i] for i in self.entries]
+
+    @property
+    def work(self) -> Vector:
+        """J for a value of 1 in the source over a displacement of 1, both in their own units."""
+        return self.factor * self.scale
+
+
+def bond(c: Connection, system: System, board: Board) -> Bond | None:
+    """The bond of a connection; None where it carries no power."""
+    target = system.unit[c.target].description
+    pairs = [(i, s, paired(c, s, system.power)) for i, s in enumerate(c.inputs)]
+    found = [(i, s, p) for i, s, p in pairs if p]
+    if not found or c.initial:
+        return None
+    units = [_factor(target, s) for _, s, _ in found]
+    moved = [_displacement(target, s, p.effort, p.displacement) for _, s, p in found]
+    signs = [p.sign * _factor(target, x) for x, (_, _, p) in zip(moved, found, strict=True)]
+    return Bond(
+        tuple(i for i, _, _ in found),
+        tuple(board.scalar(c.target, x.name) for x in moved),
+        _moving(target, c.target, moved, board),
+        np.array([s.conversion.factor for _, s, _ in found]) * units,
+        np.array([s.conversion.offset for _, s, _ in found]) * units,
+        np.array(signs),
+    )
+
+
+def _displacement(target: Description, s: Scalar, effort: str, displacement: str) -> Scalar:
+    """The entry of `displacement` that stands where `s` stands in `effort`."""
+    efforts, moved = (name.partition(".")[2] for name in (effort, displacement))
+    place = [e.name for e in target.port(efforts, "input")].index(s.name)
+    return target.port(moved, "output")[place]
+
+
+def _moving(
+    target: Description, name: str, moved: Sequence[Scalar], board: Board
+) -> tuple[int, ...]:
+    """The places of the derivatives, all or none."""
+    found = []
+    for x in moved:
+        entries = [s.name for s in target.port(x.port, "output")]
+        if derivative := slope(target, x.port, len(entries)):
+            rows = target.port(derivative, "output")
+            found.append(board.scalar(name, rows[entries.index(x.name)].name))
+    return tuple(found) if len(found) == len(moved) else ()
+
+
+def _factor(target: Description, scalar: Scalar) -> float:
+    unit = target.unit(scalar)
+    return unit.factor if unit else 1.0
+
+
+def reader(
+    board: Board, places: Sequence[int], factor: Vector, offset: Vector | float = 0.0
+) -> Callable[[], Vector]:
+    """What reads factor y + offset of the values at `places`, each time into a new vector."""
+    values, view, where = board.values, board.view(places), np.array(places, dtype=np.intp)
+    if np.any(factor != 1.0) or np.any(offset != 0.0):
+        return lambda: factor * values[where] + offset
+    return (lambda: values[where]) if view is None else view.copy

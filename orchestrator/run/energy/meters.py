@@ -1,0 +1,90 @@
+"""Energy meters on the power connections of a system, read beside the calls of the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hapticlink.orchestrator.run.energy.bonds import bond, reader
+from hapticlink.orchestrator.run.energy.meter import Energy, Mark, Meter
+from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.system.system import System
+
+Call = Callable[[int], object]
+
+
+class Meters:
+    """One meter for each connection that carries power, of the efforts that its target gets."""
+
+    def __init__(self, system: System, board: Board) -> None:
+        self._meters: dict[str, Meter] = {}
+        self._sources: dict[str, list[Meter]] = {}
+        self._targets: dict[str, list[Meter]] = {}
+        self._seconds = float(system.timeline.base)
+        self._shares = {name: 1.0 / parts for name, parts in system.substeps.items()}
+        for c in system.connections:
+            found = bond(c, system, board)
+            if found is None:
+                continue
+            source, held = (
+                reader(board, found.of(places), found.factor, found.offset)
+                for places in (board.sources(c), board.mean(c))
+            )
+            meter = Meter(source, held, reader(board, found.moved, found.scale))
+            self._meters[c.name] = meter
+            self._sources.setdefault(c.source, []).append(meter)
+            self._targets.setdefault(c.target, []).append(meter)
+
+    def start(self) -> None:
+        """Everything stands at 0, initialised."""
+        for meter in self._meters.values():
+            meter.sample(0)
+            meter.move(0)
+
+    def read(self, fmu: str, ahead: int, get: Callable[[], object]) -> Call:
+        """The call of a read, and what the meters learn from it."""
+        given = [m.sample for m in self._sources.get(fmu, [])]
+        moved = [m.move for m in self._targets.get(fmu, [])]
+        told = given + moved
+        if not told:
+            return lambda tick: get()
+        if len(told) == 1:
+            (only,) = told
+
+            def read_one(tick: int) -> None:
+                get()
+                only(tick + ahead)
+
+            return read_one
+
+        def read(tick: int) -> None:
+            get()
+            for tell in told:
+                tell(tick + ahead)
+
+        return read
+
+    def fed(self, fmu: str, set_inputs: Call) -> Call:
+        """The call of a set, and what the meters learn from it."""
+        held = [m.hold for m in self._targets.get(fmu, [])]
+        if not held:
+            return set_inputs
+        share = self._shares.get(fmu, 1.0)
+
+        def feed(tick: int) -> None:
+            set_inputs(tick)
+            for hold in held:
+                hold(share)
+
+        return feed
+
+    def mark(self, deep: bool = False) -> list[Mark]:
+        """Where `back` leads, when steps are taken again; other marks may stand on a deep one."""
+        room = 16 if deep else 4
+        return [meter.mark(room) for meter in self._meters.values()]
+
+    def back(self, marks: list[Mark]) -> None:
+        for meter, mark in zip(self._meters.values(), marks, strict=True):
+            meter.back(mark)
+
+    def energies(self) -> dict[str, Energy]:
+        return {name: meter.energy(self._seconds) for name, meter in self._meters.items()}

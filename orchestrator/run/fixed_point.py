@@ -1,0 +1,184 @@
+"""The operation Repeat carried out: plants step until their outputs are those that were guessed."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.plan.operations import Repeat
+from hapticlink.orchestrator.run import jacobians
+from hapticlink.orchestrator.run.jacobians import Through
+from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.run.simulation import Call, Live
+from hapticlink.orchestrator.run.solvers import SOLVERS, Found, Matrix, Newton, Vector
+from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.system import held_polynomials
+from hapticlink.orchestrator.system.ports import derivative
+from hapticlink.orchestrator.system.system import Connection, System
+
+
+@dataclass
+class Iterations:
+    """What a run's loops did: steps that were iterated, times that their plants stepped in all,
+    rollbacks, the most iterations of a step, Jacobians made by differences and taken from the FMUs,
+    steps that did not converge."""
+
+    steps: int = 0
+    iterations: int = 0
+    rollbacks: int = 0
+    most: int = 0
+    jacobians: int = 0
+    told_jacobians: int = 0
+    unconverged: int = 0
+
+
+def total(counts: Iterable[Iterations]) -> Iterations | None:
+    """Of all loops of a run; None where it has none."""
+    found = None
+    for c in counts:
+        found = found or Iterations()
+        for name, value in vars(c).items():
+            merged = max if name == "most" else operator.add
+            setattr(found, name, merged(getattr(found, name), value))
+    return found
+
+
+class Unconverged(Fault):
+    """Plants that do not agree; names the connection that differs most."""
+
+
+class Loop:
+    """One Repeat, its operations bound: `guess` hands the board to the holds, `body` steps, `again`
+    rolls back. `held` are those of the body that ask holds for what inputs take."""
+
+    def __init__(
+        self,
+        operation: Repeat,
+        live: Live,
+        calls: tuple[Sequence[Call], Sequence[Call], Sequence[Call]],
+        held: Sequence[Call],
+    ) -> None:
+        system, board = live.system, live.board
+        self._guess, self._body, self._again = calls
+        self._settings: Iteration = system.iteration
+        self._board, self._meters, self._dticks = board, live.meters, operation.dticks
+        self.counts = Iterations()
+        self._seconds = system.timeline.seconds
+        connections = [c for c in system.connections if c.name in operation.connections]
+        self._held = [(live.holds[c.name], board.sources(c)) for c in connections if c.hold]
+        self._places: list[int] = []
+        self._names: list[str] = []
+        for c in connections:
+            for place in _read(c, system, board):
+                if place not in self._places:
+                    self._places.append(place)
+                    self._names.append(c.name)
+        self._solver = SOLVERS[self._settings.method]()
+        self._ask, self._tick = held, 0
+        self._ways: list[Through] | None = None
+        if isinstance(self._solver, Newton) and all(_constant(c, system) for c in connections):
+            ways = jacobians.ways(system, board, live.instances, connections, self._places)
+            self._ways, self._solver.given = ways, self._jacobian
+
+    def __call__(self, tick: int) -> None:
+        values, places, counts = self._board.values, self._places, self.counts
+        self._tick = tick
+        began = False
+
+        def residual(point: Vector) -> Vector:
+            nonlocal began
+            if began:
+                counts.rollbacks += 1
+                for call in self._again:
+                    call(tick)
+                self._meters.back(mark)
+            began = True
+            values[places] = point
+            for calls in (self._guess, self._body):
+                for call in calls:
+                    call(tick)
+            return values[places] - point
+
+        for hold, sources in self._held:
+            values[sources] = hold.value(tick, self._dticks)[: len(sources)]
+        mark = self._meters.mark()
+        before = counts.rollbacks
+        settings = self._settings
+        start = values[places]
+        found = self._solver.solve(residual, start, settings.tolerance, settings.most)
+        counts.steps += 1
+        counts.iterations += 1 + counts.rollbacks - before
+        counts.most = max(counts.most, found.iterations)
+        if isinstance(self._solver, Newton):
+            counts.jacobians += self._solver.jacobians
+            counts.told_jacobians += self._solver.told
+            self._solver.jacobians = self._solver.told = 0
+        if not found.error <= settings.tolerance:
+            self._unconverged(found, tick)
+
+    def _jacobian(self) -> Matrix | None:
+        """Of the residual, by the FMUs' derivatives of a step by inputs held over it; what a guess
+        makes of these the holds show, which are linear in it."""
+        if self._ways is None:
+            return None
+        values, places = self._board.values, self._places
+        kept = values.copy()
+        shown = []
+        for moved in (None, *places):
+            values[:] = kept
+            if moved is not None:
+                values[moved] += 1.0
+            for call in (*self._guess, *self._ask):
+                call(self._tick)
+            shown.append(values.copy())
+        values[:] = kept
+        tangent = np.stack(shown[1:], axis=1) - shown[0][:, None]
+        found = np.zeros((len(values), len(places)))
+        for way in self._ways:
+            through = way.of(tangent)
+            if through is None:
+                self._ways = None
+                return None
+            found[list(way.rows)] = through
+        return found[places] - np.eye(len(places))
+
+    def _unconverged(self, found: Found, tick: int) -> None:
+        self.counts.unconverged += 1
+        if self._settings.unconverged == "accept" and np.isfinite(found.error):
+            return
+        shares = np.abs(found.residual) / (1.0 + np.abs(found.point))
+        worst = int(np.argmax(np.where(np.isnan(shares), np.inf, shares)))
+        other = "newton" if self._settings.method == "aitken" else "more iterations (most)"
+        raise Unconverged(
+            f"{self._names[worst]} does not converge at t = {self._seconds(tick):.6g} s: after "
+            f"{found.iterations} iterations ({self._settings.method}) its value at the end of the "
+            f"step is {found.point[worst]:.9g} where the FMUs give "
+            f"{found.point[worst] + found.residual[worst]:.9g}; take a higher rate, or in "
+            f"[iteration] {other} or a larger tolerance"
+        )
+
+
+def _constant(c: Connection, system: System) -> bool:
+    """Whether the target takes one constant over its step, in proportion to the guess, and its
+    outputs are those of the step."""
+    return (
+        system.substeps.get(c.target, 1) == 1
+        and held_polynomials.order(system, c) == 0
+        and c.target not in system.get_after_set
+        and c.latency is None
+        and c.kind is None
+    )
+
+
+def _read(c: Connection, system: System, board: Board) -> list[int]:
+    """What the target of `c` is made from: the source's outputs, and where its hold wants them
+    their derivatives."""
+    places = board.sources(c)
+    if c.hold and HOLDS[c.hold].needs == "derivative" and (name := derivative(c, system.unit)):
+        places = places + board.port(system.unit[c.source], name)
+    return places

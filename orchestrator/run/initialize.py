@@ -1,0 +1,157 @@
+"""Consistent start values: inputs set and outputs read in initialisation mode until they agree.
+
+Sweeps over all FMUs settle every chain and the feed-through loops that contract; what they do not
+settle is solved by Newton, with the values that still change as unknowns, on the directional
+derivatives of the FMUs where all give them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.run import jacobians
+from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.run.solvers import Matrix, Newton, Vector
+from hapticlink.orchestrator.system.system import System
+
+SWEEPS = 50
+TOLERANCE = 1e-12
+
+
+def initialize(system: System, instances: Mapping[str, Instance], board: Board) -> None:
+    """Leave every instance in step mode, and the outputs of t = 0 on the board.
+
+    Sweeps over all FMUs carry values through connections, parameters set from outputs among
+    them. Raises FmuFault where they don't agree to 1e-12 within 50 sweeps and 50 steps of Newton,
+    or aren't finite.
+    """
+    timeline = system.timeline
+    holds = [(board.hold(c.name), board.sources(c)) for c in system.connections if c.hold]
+    setters = []
+    for unit in system.units:
+        instance = instances[unit.name]
+        longest = timeline.clock(unit.clock).longest
+        instance.enter_initialization(timeline.seconds(timeline.end + longest))
+        incoming = [c for c in system.connections if c.target == unit.name]
+        if incoming:
+            scalars = [s for c in incoming for s in c.inputs]
+            places = [p for c in incoming for p in board.places(c)]
+            setters.append((instance, instance.connect(scalars, places)))
+    for instance in instances.values():
+        instance.read()
+    values = board.values
+
+    def sweep() -> None:
+        for instance, set_from in setters:
+            for held, sources in holds:
+                values[held] = values[sources]
+            set_from(values)
+            instance.read()
+
+    first = values.copy()
+    for _ in range(SWEEPS):
+        before = values.copy()
+        sweep()
+        agree = np.isclose(values, before, rtol=TOLERANCE, atol=TOLERANCE, equal_nan=True)
+        if agree.all():
+            break
+    else:
+        _solve(system, instances, board, agree & np.isfinite(values), first, sweep)
+    require_finite(instances)
+    for instance in instances.values():
+        instance.exit_initialization()
+
+
+def _solve(
+    system: System,
+    instances: Mapping[str, Instance],
+    board: Board,
+    settled: np.ndarray,
+    first: Vector,
+    sweep: Callable[[], None],
+) -> None:
+    """Newton on the outputs that have not settled, from their first values."""
+    values = board.values
+    sources = {p for c in system.connections for p in board.sources(c)}
+    places = sorted(p for p in sources if not settled[p])
+
+    def residual(point: Vector) -> Vector:
+        values[places] = point
+        sweep()
+        return values[places] - point
+
+    newton = Newton()
+    newton.given = _jacobian(system, instances, board, places)
+    found = newton.solve(residual, first[places], TOLERANCE, SWEEPS)
+    if not found.error <= TOLERANCE:
+        agree = np.ones(len(values), bool)
+        agree[places] = np.abs(found.residual) <= TOLERANCE * (1.0 + np.abs(found.point))
+        before = values.copy()
+        before[places] = found.point
+        _raise_unsettled(system, board, agree, before)
+
+
+def _jacobian(
+    system: System, instances: Mapping[str, Instance], board: Board, places: list[int]
+) -> Callable[[], Matrix | None]:
+    """The Jacobian of a sweep's residual by the FMUs' directional derivatives, where all on the way
+    give them: the unit changes of the places, carried from FMU to FMU as the sweep goes."""
+    moved = [c for c in system.connections if {*places} & {*board.sources(c)}]
+    found = jacobians.ways(system, board, instances, moved, places)
+    held = [(board.hold(c.name), board.sources(c)) for c in moved if c.hold]
+
+    def jacobian() -> Matrix | None:
+        if found is None:
+            return None
+        tangent = np.zeros((len(board.values), len(places)))
+        tangent[places] = np.eye(len(places))
+        for way in found:
+            for taken, sources in held:
+                tangent[taken] = tangent[sources]
+            through = way.of(tangent)
+            if through is None:
+                return None
+            tangent[list(way.rows)] = through
+        return tangent[places] - np.eye(len(places))
+
+    return jacobian
+
+
+def _raise_unsettled(system: System, board: Board, agree: np.ndarray, before: Vector) -> None:
+    for unit in system.units:
+        span = board.unit(unit.name)
+        for i, scalar in enumerate(unit.description.outputs, start=span.start):
+            if not agree[i]:
+                what = f"output {scalar.name} does not settle in initialisation, nor by Newton"
+                values = f"{before[i]!s} on its way round gives {board.values[i]!s}"
+                remedy = "its feed-through loop has no start values: take a connection out of it"
+                raise FmuFault(unit.name, f"{what}: {values}; {remedy}", 0.0)
+
+
+DEVICE = "haptic_device"
+
+
+def require_finite(instances: Mapping[str, Instance]) -> None:
+    """Raises FmuFault: of the device where its arms do not reach the handle's start pose (its
+    angles are NaN there, and all that is computed from them), else of the first output that is not
+    finite."""
+    device = instances.get(DEVICE)
+    if device is not None and not np.isfinite(device.outputs).all():
+        names = (s.name for s in device.description.outputs)
+        start = dict(zip(names, device.outputs.tolist(), strict=True))
+        margin = start.get("workspace_margin", 0.0)
+        if margin < 0:
+            pose = ", ".join(f"{start.get(f'x_true[{i}]', np.nan):.4g}" for i in (1, 2, 3))
+            raise FmuFault(
+                DEVICE,
+                f"the start pose (x m, y m, theta rad) = ({pose}) is outside the device's "
+                f"workspace by {-margin:.3g} m (move linkage.operational_point or linkage.start, "
+                "or change [device])",
+                0.0,
+            )
+    for instance in instances.values():
+        instance.require_finite()

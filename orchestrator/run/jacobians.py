@@ -1,0 +1,75 @@
+"""Jacobians of maps that go through FMUs, from the FMUs' directional derivatives.
+
+fmi2GetDirectionalDerivative gives dy = (dh/du) du of what the FMU computes in its mode, y = h(u)
+(FMI 2.0.5 section 2.1.9, FMI 3.0 section 2.2.11): in initialisation the outputs by inputs of the
+instant; in step mode h is the step, f_doStep of the table in section 4.1.2, so it is the outputs
+at its end by inputs that were held over it. Not every FMU reads the standard so, and none is
+taken at its word: `fixed_points.Newton` falls back to differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hapticlink.orchestrator.fmi.capabilities import gives_directional_derivatives
+from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
+from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.system.system import Connection, System
+
+
+@dataclass(frozen=True)
+class Through:
+    """The way through one FMU: from inputs that stand at `columns` of a board to outputs at
+    `rows`."""
+
+    instance: Instance
+    outputs: tuple[Scalar, ...]
+    rows: tuple[int, ...]
+    inputs: tuple[Scalar, ...]
+    columns: tuple[int, ...]
+
+    def of(self, tangent: Matrix) -> Matrix | None:
+        """(rows, n): what `tangent`, (board, n), becomes; None where the FMU does not tell."""
+        found = self.instance.jacobian(self.outputs, self.inputs)
+        if found is None:
+            return None
+        factors = np.array([s.conversion.factor for s in self.inputs])
+        through: Matrix = found @ (factors[:, None] * tangent[list(self.columns)])
+        return through
+
+
+def ways(
+    system: System,
+    board: Board,
+    instances: Mapping[str, Instance],
+    connections: Iterable[Connection],
+    places: Sequence[int],
+) -> list[Through] | None:
+    """The ways of `connections` to outputs at `places`, in the order of the system's FMUs; None
+    where an FMU on them gives no derivatives, or numbers that have none."""
+    found = []
+    connections = list(connections)
+    for unit in system.units:
+        incoming = [c for c in connections if c.target == unit.name]
+        span, outputs = board.unit(unit.name), unit.description.outputs
+        rows = tuple(p for p in places if span.start <= p < span.stop)
+        if not incoming or not rows:
+            continue
+        made = Through(
+            instances[unit.name],
+            tuple(outputs[p - span.start] for p in rows),
+            rows,
+            tuple(s for c in incoming for s in c.inputs),
+            tuple(p for c in incoming for p in board.places(c)),
+        )
+        if not gives_directional_derivatives(unit.description):
+            return None
+        if any(s.type not in ("Real", "Float64") for s in (*made.outputs, *made.inputs)):
+            return None
+        found.append(made)
+    return found

@@ -1,0 +1,106 @@
+"""From a connection to the hold that stands on it, with what it knows of its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.energy_tank import SetPoint
+from hapticlink.orchestrator.holds.hold import Hold, Vector
+from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.run.energy.bonds import bond, reader
+from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.scene.records import Spring
+from hapticlink.orchestrator.system.latency import Late, Link
+from hapticlink.orchestrator.system.ports import derivative, turns
+from hapticlink.orchestrator.system.springs import spring
+from hapticlink.orchestrator.system.system import Connection, System
+
+
+def make_holds(system: System, board: Board) -> tuple[dict[str, Hold], list[SetPoint]]:
+    """By connection; and the accounts of springs, each shared by those that set it."""
+    shared: dict[Spring, SetPoint] = {}
+    holds = {c.name: make_hold(c, system, board, shared) for c in system.connections if c.hold}
+    return holds, [*shared.values()]
+
+
+def make_hold(
+    connection: Connection, system: System, board: Board, shared: dict[Spring, SetPoint]
+) -> Hold:
+    """The hold of `connection`, its kind kept and behind its latency."""
+    assert connection.hold is not None
+    kind, size = HOLDS[connection.hold], len(connection.inputs)
+    site = _site(connection, system, board, shared)
+    hold = kind(site)
+    if connection.kind == "projector" and not kind.gives_samples:
+        hold = Projector(lambda: kind(site), size)
+    elif connection.kind == "semidefinite" and not kind.gives_samples:
+        hold = Semidefinite(lambda: kind(site), size)
+    elif connection.kind == "angle":
+        turned = turns(connection, system.unit)
+        hold = Unwrapped(lambda: kind(site), list(turned), list(turned.values()))
+    if connection.latency:
+        hold = Late(hold, Link(connection.latency, system.timeline.base))
+    if kind.needs == "derivative" and (name := derivative(connection, system.unit)):
+        slopes = board.port(system.unit[connection.source], name)
+        hold = _Beside(hold, _reader(board, slopes))
+    return hold
+
+
+class _Beside:
+    """Sends the derivative along with each sample, so that both are late together."""
+
+    def __init__(self, hold: Hold, derivative: Callable[[], Vector]) -> None:
+        self._hold, self._derivative, self.value = hold, derivative, hold.value
+        self.link: Link | None = getattr(hold, "link", None)
+
+    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
+        self._hold.push(stamp, np.concatenate([sample, self._derivative()]), arrival)
+
+
+def _site(
+    connection: Connection, system: System, board: Board, shared: dict[Spring, SetPoint]
+) -> Site:
+    """The displacement and the spring only where the hold keeps account of energy."""
+    size, moved, moving, set_point = len(connection.inputs), None, None, None
+    found = bond(connection, system, board)
+    if HOLDS[connection.hold or ""].needs == "power" and found:
+        # The hold's own samples are not converted yet: what converts them scales their motion.
+        entries, work, places = list(found.entries), np.zeros(size), np.zeros(size, np.intp)
+        work[entries], places[entries] = found.work, found.moved
+        moved = reader(board, places.tolist(), work)
+        if found.moving:
+            places[entries] = found.moving
+            moving = reader(board, places.tolist(), work)
+    if HOLDS[connection.hold or ""].needs == "spring":
+        of = spring(connection, system.springs)
+        assert of is not None
+        if of not in shared:
+            shared[of] = _set_point(of, system, board)
+        row = of.ports.index(f"{connection.target}.{connection.target_port}")
+        set_point = shared[of], row
+    return Site(size, system.timeline.seconds, moved, moving, set_point)
+
+
+def _set_point(of: Spring, system: System, board: Board) -> SetPoint:
+    fmu, _, name = of.position.partition(".")
+    unit = system.unit[fmu]
+    near = next((c for c in system.into(fmu) if c.target_port == name), None)
+    places = board.sources(near) if near else board.port(unit, name)
+    timeline = system.timeline
+    stiffness = np.array(of.stiffness)
+    return SetPoint(
+        stiffness,
+        np.array(of.damping) if of.damping else np.zeros_like(stiffness),
+        _reader(board, places),
+        timeline.seconds(timeline.clock(unit.clock).longest),
+        timeline.seconds,
+    )
+
+
+def _reader(board: Board, places: Sequence[int]) -> Callable[[], Vector]:
+    view = board.view(places)
+    return (lambda: view) if view is not None else lambda: board.values[list(places)]

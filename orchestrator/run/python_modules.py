@@ -1,0 +1,84 @@
+"""Python FMUs of one process share one interpreter, so of two modules with one name the first
+that is imported serves both FMUs, silently. Who would get another's module runs in a process of
+its own.
+
+pythonfmu and pythonfmu3 put an FMU's resources/ on sys.path; what can be imported from there
+are its top-level modules and packages. Two are the same where their files have equal CRC-32s.
+"""
+
+from __future__ import annotations
+
+import sys
+import zlib
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.archive import opened
+from hapticlink.orchestrator.system.system import Unit
+
+Modules = dict[str, dict[str, int]]
+"""By top-level name: CRC-32 by path in resources/."""
+
+_loaded: Modules = {}
+"""What FMUs of this process have brought; it stays imported when they are gone."""
+
+
+def bundled(path: Path) -> Modules:
+    """The modules in the resources/ of a Python FMU; {} for any other, and for one that cannot be
+    read, which loading it will tell."""
+    try:
+        with opened(path, "FMU") as archive:
+            crcs = {e.filename: e.CRC for e in archive.infolist()}
+    except InputFault:
+        return {}
+    found: Modules = {}
+    for file, crc in crcs.items() if "resources/slavemodule.txt" in crcs else ():
+        place = file.removeprefix("resources/")
+        if place != file and place.endswith(".py"):
+            found.setdefault(place.partition("/")[0].removesuffix(".py"), {})[place] = crc
+    return found
+
+
+def clashes(units: Iterable[Unit]) -> dict[str, str]:
+    """Why FMUs that are not isolated have to be: by name, with the module. The rest count as
+    loaded from now on."""
+    found = {}
+    for unit in units:
+        if unit.isolate:
+            continue
+        modules = bundled(unit.description.path)
+        other = next((n for n, files in modules.items() if not _is_mine(n, files)), None)
+        if other is None:
+            for name, files in modules.items():
+                _loaded.setdefault(name, files)
+        else:
+            found[unit.name] = f"another module {other!r} is loaded in this process"
+    return found
+
+
+def _is_mine(name: str, files: dict[str, int]) -> bool:
+    """Whether `import name` gives an FMU the module that it brings."""
+    known = _loaded.get(name)
+    if known is None:
+        module = sys.modules.get(name)
+        if module is None:
+            return True
+        known = _on_disk(name, getattr(module, "__file__", None) or "")
+    return all(known.get(path, crc) == crc for path, crc in files.items()) and bool(
+        known.keys() & files.keys()
+    )
+
+
+@cache
+def _on_disk(name: str, file: str) -> dict[str, int]:
+    """The files of a module of this process, by the path that they would have in resources/."""
+    path = Path(file)
+    if path.name != "__init__.py":
+        return {f"{name}.py": _crc(path)} if path.is_file() else {}
+    return {f"{name}/{p.name}": _crc(p) for p in path.parent.glob("*.py")}
+
+
+def _crc(path: Path) -> int:
+    return zlib.crc32(path.read_bytes())

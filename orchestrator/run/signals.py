@@ -1,0 +1,94 @@
+"""One vector with all outputs, clock by clock and FMU by FMU, and after them all held values, with
+the derivatives and the mean of those that vary within a step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.system import held_polynomials
+from hapticlink.orchestrator.system.system import Connection, System, Unit
+
+Vector = NDArray[np.float64]
+
+
+class Board:
+    """Where each signal of a system stands in `values`."""
+
+    def __init__(self, system: System) -> None:
+        self._of_unit: dict[str, slice] = {}
+        self._of_clock: dict[str, slice] = {}
+        self._of_hold: dict[str, slice] = {}
+        self._of_derivatives: dict[str, slice] = {}
+        self._of_scalar: dict[tuple[str, str], int] = {}
+        end = 0
+        for clock in system.timeline.clocks:
+            first = end
+            for unit in (u for u in system.units if u.clock == clock.name):
+                outputs = unit.description.outputs
+                self._of_unit[unit.name] = slice(end, end + len(outputs))
+                names = ((unit.name, s.name) for s in outputs)
+                self._of_scalar |= {name: end + i for i, name in enumerate(names)}
+                end += len(outputs)
+            self._of_clock[clock.name] = slice(first, end)
+        for connection in system.connections:
+            if connection.hold:
+                self._of_hold[connection.name] = slice(end, end + len(connection.inputs))
+                end += len(connection.inputs)
+                if order := held_polynomials.order(system, connection):
+                    span = slice(end, end + order * len(connection.inputs))
+                    self._of_derivatives[connection.name] = span
+                    end = span.stop + len(connection.inputs)
+        self.values = np.zeros(end)
+
+    def unit(self, name: str) -> slice:
+        return self._of_unit[name]
+
+    def clock(self, name: str) -> slice:
+        return self._of_clock[name]
+
+    def hold(self, connection: str) -> slice:
+        return self._of_hold[connection]
+
+    def derivatives(self, connection: str) -> slice:
+        """What is held, derived: all entries once, then all twice, ...; empty where it stands."""
+        return self._of_derivatives.get(connection, slice(0, 0))
+
+    def mean(self, connection: Connection) -> list[int]:
+        """The places of what the target takes in the mean of its step."""
+        span = self.derivatives(connection.name)
+        if span.stop:
+            return list(range(span.stop, span.stop + len(connection.inputs)))
+        return self.places(connection)
+
+    def scalar(self, fmu: str, variable: str) -> int:
+        return self._of_scalar[fmu, variable]
+
+    def port(self, unit: Unit, name: str) -> list[int]:
+        """The places of an output vector."""
+        return [self.scalar(unit.name, s.name) for s in unit.description.port(name, "output")]
+
+    def view(self, places: Sequence[int]) -> Vector | None:
+        """The values at `places` as a view, None where they do not stand side by side."""
+        if list(places) != list(range(places[0], places[-1] + 1)):
+            return None
+        return self.values[places[0] : places[-1] + 1]
+
+    def sources(self, connection: Connection) -> list[int]:
+        """The places of a connection's source."""
+        return [self.scalar(connection.source, s.name) for s in connection.outputs]
+
+    def places(self, connection: Connection) -> list[int]:
+        """The places that its target reads: the source's, or the held value's."""
+        if connection.hold:
+            held = self.hold(connection.name)
+            return list(range(held.start, held.stop))
+        return self.sources(connection)
+
+    def columns(self, clock: str) -> list[str]:
+        """`fmu.variable` of every output of a clock, in order."""
+        span = self.clock(clock)
+        inside = (k for k, i in self._of_scalar.items() if span.start <= i < span.stop)
+        return [f"{fmu}.{variable}" for fmu, variable in inside]

@@ -1,0 +1,125 @@
+"""The live side of a system: instances, board, holds, meters and recorders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from pathlib import Path
+
+from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.isolated import Isolated
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.results.files import Recorder
+from hapticlink.orchestrator.run.energy.meters import Meters
+from hapticlink.orchestrator.run.initialize import initialize
+from hapticlink.orchestrator.run.make_holds import make_holds
+from hapticlink.orchestrator.run.open_fmus import instance, isolated
+from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.system.system import Connection, System
+
+Call = Callable[[int], object]
+
+
+class Live:
+    """What `stack` closes again; rows go to `folder`.
+
+    setters, varying_setters and now_setters fill the inputs of an FMU from the board: as its
+    connections hold them, with derivatives beside, and as their sources stand now.
+    """
+
+    def __init__(self, system: System, folder: Path, stack: ExitStack) -> None:
+        self.system, self.board = system, Board(system)
+        self.seconds = system.timeline.seconds
+        values = self.board.values
+        self.recorders = {
+            c.name: stack.enter_context(
+                Recorder(
+                    folder / f"{c.name}.csv",
+                    self.board.columns(c.name),
+                    values[self.board.clock(c.name)],
+                )
+            )
+            for c in system.timeline.clocks
+        }
+        self.isolated = isolated(system.units)
+        self.instances: dict[str, Instance] = {}
+        for unit in system.units:
+            view = values[self.board.unit(unit.name)]
+            made = instance(unit, view, system.faults, unit.name in self.isolated)
+            self.instances[unit.name] = stack.enter_context(made)
+        stack.callback(self._dismiss)
+        self.holds, self.springs = make_holds(system, self.board)
+        self.meters = Meters(system, self.board)
+        self.setters: dict[str, Call] = {}
+        self.varying_setters: dict[str, Call] = {}
+        self.now_setters: dict[str, Call] = {}
+
+    def _dismiss(self) -> None:
+        for made in self.instances.values():
+            if isinstance(made, Isolated):
+                made.dismiss()
+
+    def start(self) -> None:
+        """Initialise; every hold gets its sample of t = 0, every FMU its way to set inputs."""
+        initialize(self.system, self.instances, self.board)
+        values = self.board.values
+        for c in self.system.connections:
+            if c.hold:
+                self.holds[c.name].push(0, values[self.board.sources(c)], 0)
+        self.meters.start()
+        for unit in self.system.units:
+            incoming = self.system.into(unit.name)
+            if not incoming:
+                continue
+            connect = self.instances[unit.name].connect
+            scalars = [s for c in incoming for s in c.inputs]
+            held = [p for c in incoming for p in self.board.places(c)]
+            set_held = connect(scalars, held)
+            self.setters[unit.name] = _from(set_held, self.board)
+            if derived := self._derived(incoming):
+                derive = self.instances[unit.name].connect_derivatives(*derived)
+                self.varying_setters[unit.name] = _from_both(set_held, derive, self.board)
+            if unit.name in self.system.get_after_set:
+                sources = [p for c in incoming for p in self.board.sources(c)]
+                self.now_setters[unit.name] = _from(connect(scalars, sources), self.board)
+
+    def _derived(
+        self, incoming: Iterable[Connection]
+    ) -> tuple[list[Scalar], list[int], list[int]] | None:
+        """(inputs, orders, places on the board) of what varies within the steps of an FMU, values
+        first."""
+        rows = []
+        for c in incoming:
+            span = self.board.derivatives(c.name)
+            places = [*self.board.places(c), *range(span.start, span.stop)] if span.stop else []
+            for i, place in enumerate(places):
+                order, entry = divmod(i, len(c.inputs))
+                rows.append((c.inputs[entry], order, place))
+        if not rows:
+            return None
+        rows.sort(key=lambda row: row[1])
+        return [r[0] for r in rows], [r[1] for r in rows], [r[2] for r in rows]
+
+    def links(self) -> dict[str, dict[str, int]]:
+        """What became of the samples of connections with a latency."""
+        links = {n: getattr(h, "link", None) for n, h in self.holds.items()}
+        return {
+            n: {"sent": k.sent, "lost": k.lost, "overtaken": k.overtaken}
+            for n, k in links.items()
+            if k
+        }
+
+
+def _from(set_from: Callable, board: Board) -> Call:
+    values = board.values
+    return lambda tick: set_from(values)
+
+
+def _from_both(first: Callable, second: Callable, board: Board) -> Call:
+    values = board.values
+
+    def set_both(tick: int) -> None:
+        first(values)
+        second(values)
+
+    return set_both

@@ -1,0 +1,225 @@
+"""The operation Advance carried out: the plants of a clock, step by step, to its next tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.plan.operations import Part
+from hapticlink.orchestrator.run.energy.bonds import bond
+from hapticlink.orchestrator.run.fixed_point import Unconverged
+from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.run.simulation import Call, Live
+from hapticlink.orchestrator.system.system import System
+
+SLOT = 1
+"""Of the saved states; slot 0 is the iteration's."""
+
+
+class Advancer:
+    """The steps of one clock. `calls` gives the bound operations of a step."""
+
+    def __init__(
+        self,
+        clock: str,
+        live: Live,
+        calls: Callable[[Part], Sequence[Call]],
+    ) -> None:
+        system, board = live.system, live.board
+        assert system.step_control is not None
+        self._settings = settings = system.step_control
+        self._clock, self._values, self._meters = clock, board.values, live.meters
+        self._calls, self._seconds = calls, system.timeline.seconds
+        base, longest = system.timeline.base, system.timeline.clock(clock).longest
+        self._least = max(int(exact(settings.min) / base), 1)
+        most = longest if settings.max is None else int(exact(settings.max) / base)
+        self._most = max(min(most, longest), self._least)
+        self._size = float(self._least)
+        self._before, self.steps = 0.0, Steps()
+        self._growth = 2.0  # of a step; less for a while where an FMU has failed
+        plants = [u.name for u in system.units if u.clock == clock and not u.sampled]
+        self._instances = [live.instances[n] for n in plants]
+        compared = _compared(system, board, plants)
+        self._outputs = [place for place, _ in compared]
+        self._nominal = np.array([nominal for _, nominal in compared])
+        between = [
+            c
+            for c in system.connections
+            if c.source in plants and c.target in plants and not c.initial
+        ]
+        self._order = min((ORDER.get(c.hold or "", 1) for c in between), default=1)
+        ours = [c for c in system.connections if c.hold and {c.source, c.target} & {*plants}]
+        self._holds = [*(live.holds[c.name] for c in ours), *live.springs]
+        self._bonds = []
+        for c in between:
+            if found := bond(c, system, board):
+                places = found.of(board.sources(c)), found.of(board.mean(c)), [*found.moved]
+                self._bonds.append((found.work, places))
+
+    def advance(self, tick: int, dticks: int) -> None:
+        take = self._double if self._settings.method == "doubling" else self._trust
+        at = 0
+        while at < dticks:
+            at += take(tick + at, self._fitting(dticks - at))
+
+    def _fitting(self, left: int) -> int:
+        """A step that divides what is left evenly, or nearly so."""
+        self._size = size = min(max(self._size, self._least), self._most)
+        parts = -int(-left // size)
+        return left if parts == 1 else min(max(rounded(left / parts), self._least), left)
+
+    def _aim(self, size: float, growth: float) -> None:
+        """The next step, at most `growth` times what was aimed at; a step that was cut short to
+        land on a tick does not count as aim."""
+        self._size = min(max(size, 0.2 * self._size), growth * self._size)
+
+    def _step(self, tick: int, dticks: int) -> None:
+        for call in self._calls(Part(self._clock, dticks)):
+            call(tick)
+
+    def _read(self, tick: int) -> None:
+        for call in self._calls(Part(self._clock, 0, ended=True)):
+            call(tick)
+
+    # --- doubling -------------------------------------------------------------------------
+
+    def _double(self, tick: int, size: int) -> int:
+        """Ticks that were taken: `size`, or 0 where the step was taken back."""
+        if size < 2:
+            self._step(tick, size)
+            self._read(tick + size)
+            self.steps.count(self._seconds(size), True)
+            self._size = 2.0
+            return size
+        saved = self._save()
+        try:
+            error = self._both(tick, size, saved)
+        except (FmuFault, Unconverged) as fault:
+            if size <= self._least or not (isinstance(fault, Unconverged) or fault.passing):
+                raise
+            self._restore(saved)
+            self.steps.failed += 1
+            self._size, self._growth = size / 2, 1.0
+            return 0
+        self._aim(size * integral(error, self._order), self._growth)
+        self._growth = min(1.1 * self._growth, 2.0)
+        if error > 1.0 and size > self._least:
+            self._restore(saved)
+            self.steps.rejected += 1
+            return 0
+        self.steps.count(self._seconds(size), error > 1.0)
+        return size
+
+    def _both(self, tick: int, size: int, saved: Any) -> float:
+        """The error of a step, in units of the tolerance; its two halves stand."""
+        self._step(tick, size)
+        self._read(tick + size)
+        whole = self._values[self._outputs]
+        self._restore(saved)
+        half = size // 2
+        for at, dticks in ((tick, half), (tick + half, size - half)):
+            self._step(at, dticks)
+            self._read(at + dticks)
+        halves = self._values[self._outputs]
+        share = np.abs(halves - whole) / (self._nominal + np.abs(halves)) / (2**self._order - 1)
+        return float(share.max(initial=0.0)) / self._seconds(size) / self._settings.tolerance
+
+    def _save(self) -> Any:
+        for instance in self._instances:
+            instance.save(SLOT)
+        # What never changes of a hold, where it stands and how ticks are told, are functions: not
+        # copied. A spring's account is shared, and goes back in its place.
+        holds = [deepcopy(vars(hold)) for hold in self._holds]
+        return self._values.copy(), holds, self._meters.mark(deep=True)
+
+    def _restore(self, saved: Any) -> None:
+        values, holds, mark = saved
+        for instance in self._instances:
+            instance.rollback(SLOT)
+        self._values[:] = values
+        for hold, kept in zip(self._holds, holds, strict=True):
+            vars(hold).update(deepcopy(kept))
+        self._meters.back(mark)
+
+    # --- ecco -----------------------------------------------------------------------------
+
+    def _trust(self, tick: int, size: int) -> int:
+        self._step(tick, size)
+        values = self._values
+        began = [[values[at] for at in places] for _, places in self._bonds]
+        self._read(tick + size)
+        error = 0.0
+        for (source, held, x), (work, places) in zip(began, self._bonds, strict=True):
+            sources, _, moved = places
+            residual = (work * (held - (source + values[sources]) / 2)) @ (values[moved] - x)
+            error = max(error, abs(float(residual)))
+        assert self._settings.energy is not None
+        error /= self._settings.tolerance * self._settings.energy
+        # Slowly: a residual energy passes through 0 twice in a period, where it says nothing.
+        self._aim(size * proportional_integral(error, self._before, self._order + 1), 1.2)
+        self._before = error
+        self.steps.count(self._seconds(size), error > 1.0 and size <= self._least)
+        return size
+
+
+def _compared(system: System, board: Board, plants: Sequence[str]) -> list[tuple[int, float]]:
+    """(place, nominal) of the outputs whose error counts: those that do not depend directly on an
+    input, which at the end of a step is still that of the step before; all where there are no
+    others."""
+    every = [
+        ((board.scalar(n, s.name), s.nominal), system.unit[n].description.follows(s))
+        for n in plants
+        for s in system.unit[n].description.outputs
+    ]
+    return [output for output, follows in every if not follows] or [output for output, _ in every]
+
+
+@dataclass
+class Steps:
+    """What step control did on a rate: steps taken, taken back for their error, given up because
+    an FMU failed in them, taken at `min` though the error was too large, the shortest and longest
+    (s). A step of doubling is its two halves."""
+
+    taken: int = 0
+    rejected: int = 0
+    failed: int = 0
+    forced: int = 0
+    shortest: float = 0.0
+    longest: float = 0.0
+
+    def count(self, size: float, forced: bool) -> None:
+        self.shortest = min(self.shortest, size) if self.taken else size
+        self.longest = max(self.longest, size)
+        self.taken += 1
+        self.forced += forced
+
+
+ORDER = {"lead": 2, "foh": 2, "foh-derivative": 2, "second-order": 3, "hermite": 4}
+"""Of the error over a run, by the hold between plants; 1 for any other, and for none."""
+
+
+def integral(error: float, order: int) -> float:
+    """The factor from the step taken to the next, where the error, in units of the tolerance, was
+    `error` and grows with the step to the power `order`."""
+    return 0.9 * error ** (-1 / order) if error else inf
+
+
+def proportional_integral(error: float, before: float, order: int) -> float:
+    """The same with the error of the step before (Gustafsson 1991: .3 and .4)."""
+    if not error or not before:
+        return integral(error, order)
+    return 0.9 * error ** (-0.3 / order) * (before / error) ** (0.4 / order)
+
+
+def rounded(ticks: float) -> int:
+    """Down to four significant bits, so that few sizes occur and each is bound once; at least 1."""
+    whole = max(int(ticks), 1)
+    shift = max(whole.bit_length() - 4, 0)
+    return whole >> shift << shift

@@ -1,0 +1,148 @@
+"""What run.json says of rates, holds, links and energies."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Any
+
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.plan import dependency_order
+from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.run.energy.meter import Energy
+from hapticlink.orchestrator.run.event_loop import Outcome
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.records import VariableRate
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system import held_polynomials
+from hapticlink.orchestrator.system.ports import carries_power
+from hapticlink.orchestrator.system.system import System
+
+
+def clocks(timeline: Timeline) -> dict[str, Any]:
+    """By clock, in s: its first step, and the shortest and longest after it."""
+    seconds = timeline.seconds
+    return {
+        c.name: {
+            "first": seconds(c.first),
+            "shortest": seconds(c.shortest),
+            "longest": seconds(c.longest),
+        }
+        for c in timeline.clocks
+    }
+
+
+def holds(system: System) -> dict[str, Any]:
+    """Every choice on a connection, and how plants take what varies within a step."""
+    held = [c for c in system.connections if c.hold]
+    return {
+        "holds": {c.name: c.hold for c in held},
+        "holds_that_did_not_fit": {
+            r.connection.name: {"hold": r.hold, "reason": r.reason} for r in system.refused
+        },
+        "held_as": {c.name: c.kind for c in held if c.kind},
+        "latencies": {c.name: asdict(c.latency) for c in held if c.latency},
+        "substeps": {u.name: system.substeps.get(u.name, 1) for u in system.units if not u.sampled},
+        "within_a_step": within_a_step(system),
+        "get_after_set": list(system.get_after_set),
+        "causal": system.coupling in CAUSAL,
+        "power_across_rates": power_across_rates(system),
+    }
+
+
+def within_a_step(system: System) -> dict[str, str]:
+    """By connection, what a plant makes of a hold that varies within its step."""
+    return {
+        c.name: _taken(held_polynomials.order(system, c), system.substeps.get(c.target, 1))
+        for c in system.connections
+        if held_polynomials.degree(system, c)
+    }
+
+
+def _taken(order: int, substeps: int) -> str:
+    if order:
+        renewed = f", renewed in {substeps} substeps" if substeps > 1 else ""
+        return f"derivatives to order {order}{renewed}"
+    if substeps > 1:
+        return f"constant in each of {substeps} substeps"
+    return "constant, the hold at the middle (half-step lead)"
+
+
+def power_across_rates(system: System) -> list[str]:
+    """The connections that cross rates and carry power, by name."""
+    return [
+        c.name
+        for c in system.connections
+        if carries_power(c, system.power)
+        and system.unit[c.source].clock != system.unit[c.target].clock
+    ]
+
+
+def energies(system: System, booked: Mapping[str, Energy]) -> dict[str, Any]:
+    """In J: `energies` of connections across rates, "none" where none carries power, and those of
+    connections within a rate, whose values stand over the target's step all the same."""
+    across = set(power_across_rates(system))
+    return {
+        "energies": {n: asdict(e) for n, e in booked.items() if n in across} or "none",
+        "energies_within_a_rate": {n: asdict(e) for n, e in booked.items() if n not in across},
+    }
+
+
+def _story(scene: Scene, system: System, options: Sequence[str]) -> dict[str, Any]:
+    base = system.timeline.base
+    return {
+        "scene": asdict(scene),
+        "options": list(options),
+        "versions": {name: version(name) for name in (*PACKAGES, *_compilers(scene))}
+        | {"python": platform.python_version()},
+        "seeds": _seeds(scene, system),
+        "files": ["run.json", *(f"{c.name}.csv" for c in system.timeline.clocks)],
+        "rates": [c.name for c in system.timeline.clocks],
+        "clocks": clocks(system.timeline),
+        "base": f"{base.numerator}/{base.denominator} s",
+        "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.units},
+        "coupling": system.coupling,
+        "loops": [asdict(loop) for loop in dependency_order.loops(system)],
+        "connections": [c.name for c in system.connections],
+    } | holds(system)
+
+
+def _compilers(scene: Scene) -> tuple[str, ...]:
+    return ("ziglang",) if scene.packaging == "native" and blocks(scene) else ()
+
+
+def _seeds(scene: Scene, system: System) -> dict[str, int]:
+    rates = {"graphics.rate": scene.graphics.rate} if scene.graphics else {}
+    rates |= {f"fmu.{fmu.name}.rate": fmu.rate for fmu in scene.fmu}
+    seeds = {name: r.seed for name, r in rates.items() if isinstance(r, VariableRate)}
+    return seeds | {c.name: c.latency.seed for c in system.connections if c.latency}
+
+
+def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
+    fault = outcome.fault
+    failed = fault and {
+        "kind": type(fault).__name__,
+        "time": getattr(fault, "time", None),
+        "message": str(fault),
+    }
+    return {
+        "end": {"reason": outcome.reason, "time": outcome.end_time},
+        "fault": failed,
+        "calls": outcome.calls,
+        "links": outcome.links,
+        "isolated": outcome.isolated,
+        "held_outputs": outcome.held,
+        "smaller_steps": outcome.smaller_steps,
+        "timings": {
+            "build": built,
+            "run": outcome.wall_time,
+            "steps": outcome.step_time,
+        },
+        "iterations": outcome.iterations and asdict(outcome.iterations),
+        "controlled_steps": {clock: asdict(steps) for clock, steps in outcome.steps.items()},
+    } | energies(system, outcome.energies)
+
+
+PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")

@@ -1,0 +1,1 @@
+"""A scene: what the user wrote, read from TOML, checked, as records."""

@@ -1,0 +1,108 @@
+"""From a scene to the FMUs of its blocks: which there are, of which settings, at which rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.specs.linkage import GraphicsCopy
+from hapticlink.orchestrator.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class BlockPlan:
+    """A block that the scene asks for: its settings and its rate, "haptics" or "graphics"."""
+
+    name: str
+    rate: str
+    settings: dict[str, Any]
+    kind: str = ""
+
+    @property
+    def made_by(self) -> str:
+        """The name of the block in `fmus.blocks`."""
+        return self.kind or self.name
+
+
+def blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
+    """The blocks of `scene`, in the order of the loop; skip=False with all that they can have."""
+    if not skip:
+        scene = unskipped(scene)
+    found = []
+    if scene.hand:
+        found.append(BlockPlan("hand", "haptics", {"hand": scene.hand}))
+    for name, hand in scene.hands.items():
+        found.append(BlockPlan(f"hand_{name}", "haptics", {"hand": hand}, "hand"))
+    if scene.controller:
+        parts = ("controller", "directions", "linkage")
+        settings = {part: getattr(scene, part) for part in parts}
+        found.append(BlockPlan("controller", "haptics", settings))
+    if scene.device:
+        found.append(BlockPlan("haptic_device", "haptics", {"device": scene.device}))
+    if scene.linkage:
+        settings = {"linkage": scene.linkage, "mechanism": scene.mechanism}
+        if scene.directions_from == "mechanism" or scene.mechanism.directions:
+            settings["directions"] = scene.directions
+        if scene.contacts:
+            settings |= {"contacts": scene.contacts, "length_scale": scene.directions.length_scale}
+        found.append(BlockPlan("virtual_mechanism", scene.mechanism_at, settings))
+    if scene.linkage and scene.graphics and (graphics_block(scene) or not skip):
+        names = (f.name for f in fields(GraphicsCopy))
+        copy = GraphicsCopy(**{name: getattr(scene.graphics, name) for name in names})
+        settings = {
+            "linkage": scene.linkage,
+            "graphics": copy,
+            "directions": (
+                scene.directions if directions_from_graphics(scene) or not skip else None
+            ),
+            "contacts": scene.contacts if contacts_from_graphics(scene) else None,
+            "mobility": mobility_from_graphics(scene) or not skip,
+            "local_model": scene.local_model,
+        }
+        found.append(BlockPlan("virtual_environment", "graphics", settings))
+    return tuple(found)
+
+
+def impedance(scene: Scene) -> bool:
+    return scene.controller is not None and scene.controller.impedance
+
+
+def topology(scene: Scene) -> bool:
+    return scene.controller is not None and scene.controller.topology is not False
+
+
+def mobility_from_graphics(scene: Scene) -> bool:
+    """Whether the virtual environment's Lambda_inv is used."""
+    return scene.directions_from == "graphics" and impedance(scene)
+
+
+def directions_from_graphics(scene: Scene) -> bool:
+    """Whether the virtual environment's P_c is used, or the scene asks to see directions."""
+    wanted = topology(scene) or (impedance(scene) and scene.mechanism.directions)
+    return scene.directions_from == "graphics" and wanted
+
+
+def contacts_from_graphics(scene: Scene) -> bool:
+    """Whether the mechanism's contact geometry comes from the virtual environment."""
+    if not scene.contacts or not scene.linkage or scene.contacts.detection != "graphics":
+        return False
+    return bool(near(scene.linkage, scene.contacts))
+
+
+def graphics_block(scene: Scene) -> list[str]:
+    """What the virtual environment is there for."""
+    reasons = {
+        "Lambda_inv": mobility_from_graphics(scene),
+        "P_c": directions_from_graphics(scene),
+        "contact geometry": contacts_from_graphics(scene),
+        "the local model": scene.local_model,
+    }
+    return [name for name, wanted in reasons.items() if wanted]
+
+
+def unskipped(scene: Scene) -> Scene:
+    """The scene whose mechanism puts out all that it can, with every pair of contacts."""
+    contacts = scene.contacts and replace(scene.contacts, broad_phase=False)
+    mechanism = replace(scene.mechanism, directions=True, diagnostics=True)
+    return replace(scene, mechanism=mechanism, contacts=contacts)

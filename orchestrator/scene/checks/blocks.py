@@ -1,0 +1,65 @@
+"""What further hands, the local model and `packaging` need; each yields (path, message)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from hapticlink.orchestrator.scene.blocks import (
+    blocks,
+    directions_from_graphics,
+    mobility_from_graphics,
+)
+from hapticlink.orchestrator.scene.checks.linkage import points
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+
+
+def check(scene: Scene) -> Iterator[Problem]:
+    yield from points(scene)
+    if scene.packaging == "native" and not blocks(scene):
+        message = (
+            "'native' compiles the scene's own blocks, and every FMU here is ready: take it out"
+        )
+        yield ("packaging",), message
+    if not scene.local_model:
+        return
+    here: Path = ("local_model",)
+    if not scene.linkage:
+        yield here, "there is no mechanism to model: add [linkage]"
+    if not scene.graphics:
+        yield here, "its matrices come at the graphics rate: add [graphics]"
+    if scene.mechanism_at == "graphics":
+        yield here, "the mechanism runs at the graphics rate itself: take mechanism_at out"
+
+    if scene.linkage and scene.linkage.loop and scene.mechanism.stabilization == "projection":
+        yield (
+            ("mechanism", "stabilization"),
+            "'projection' factors the mechanism's own matrices at every step, which the local "
+            "model is there to save: take 'baumgarte'",
+        )
+
+
+def missing(scene: Scene) -> Iterator[Problem]:
+    if not scene.linkage and not scene.device and not scene.fmu:
+        yield ("linkage",), "nothing to simulate: give a [linkage], a [device] or an [[fmu]]"
+    if not scene.linkage:
+        for table in ("graphics", "controller"):
+            if getattr(scene, table) and not (table == "graphics" and scene.fmu):
+                yield (table,), f"[{table}] needs a [linkage]: add one, or take [{table}] out"
+    if scene.controller and not scene.device:
+        yield ("controller",), "[controller] moves a device: add [device], or take it out"
+    if scene.hand and not scene.device and not scene.linkage:
+        yield ("hand",), "[hand] holds a device or a linkage: add one, or take it out"
+    if scene.sensing == "encoders" and not scene.device:
+        yield ("sensing",), "'encoders' are the device's: add [device], or take sensing out"
+    if not scene.graphics:
+        if scene.mechanism_at == "graphics":
+            yield ("mechanism_at",), "there is no graphics rate: add [graphics] with its rate"
+        if scene.directions_from == "graphics" and (
+            mobility_from_graphics(scene) or directions_from_graphics(scene)
+        ):
+            yield (
+                ("directions_from",),
+                "the controller needs Lambda_inv and P_c: add [graphics], or take "
+                "directions_from = 'mechanism'",
+            )

@@ -1,0 +1,103 @@
+"""Names and numbers of a linkage that its records cannot check: trees, loops, points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+
+
+def check(linkage: Linkage) -> Iterator[Problem]:
+    here: Path = ("linkage",)
+    bodies = [b.name for b in linkage.body]
+    frames = ["ground", *bodies]
+    for i, body in enumerate(linkage.body):
+        path: Path = (*here, "body", i)
+        if body.name in frames[: i + 1]:
+            yield (*path, "name"), f"{body.name!r} is taken: name each body once, none 'ground'"
+        if body.mass <= 0:
+            yield (*path, "mass"), f"{body.mass} kg: a mass is more than 0"
+        if body.inertia < 0:
+            yield (*path, "inertia"), f"{body.inertia} kg.m2: an inertia is 0 or more"
+    yield from _tree(linkage, frames)
+    for i, loop in enumerate(linkage.loop):
+        for k, name in enumerate(loop.bodies):
+            if name not in frames:
+                yield (*here, "loop", i, "bodies", k), unknown("body", name, frames)
+        if loop.bodies[0] == loop.bodies[1]:
+            yield (*here, "loop", i, "bodies"), "a loop joins two different bodies"
+    if linkage.operational_point.body not in bodies:
+        message = unknown("body", linkage.operational_point.body, bodies)
+        yield (*here, "operational_point", "body"), message
+    types = {j.name: j.type for j in linkage.joint}
+    for table in ("start", "start_velocity"):
+        for name, value in getattr(linkage, table).items():
+            if name not in types:
+                yield (*here, table, name), unknown("joint", name, types)
+            elif isinstance(value, tuple) != (types[name] == "free"):
+                wanted = "three numbers" if types[name] == "free" else "one number"
+                yield (*here, table, name), f"{value!r}: a {types[name]} joint takes {wanted}"
+            elif isinstance(value, float) and not math.isfinite(value):
+                yield (*here, table, name), f"{value!r} is not finite"
+
+
+def _tree(linkage: Linkage, frames: list[str]) -> Iterator[Problem]:
+    """Every body hangs on ground by exactly one joint of each body on the way."""
+    parents: dict[str, str] = {}
+    names: set[str] = set()
+    for i, joint in enumerate(linkage.joint):
+        path: Path = ("linkage", "joint", i)
+        if joint.name in names:
+            yield (*path, "name"), f"{joint.name!r} is taken: name each joint once"
+        names.add(joint.name)
+        for end in ("parent", "child"):
+            if getattr(joint, end) not in frames:
+                yield (*path, end), unknown("body", getattr(joint, end), frames)
+        if joint.child == "ground":
+            yield (*path, "child"), "ground cannot be a child: turn the joint around"
+        elif joint.child in parents:
+            yield (
+                (*path, "child"),
+                f"{joint.child!r} hangs on {parents[joint.child]!r} already: close loops "
+                "with [[linkage.loop]]",
+            )
+        else:
+            parents[joint.child] = joint.parent
+        if joint.type == "prismatic" and joint.axis is None:
+            yield (*path, "axis"), "a prismatic joint needs its direction (rad)"
+    for i, name in enumerate(frames[1:]):
+        seen: set[str] = set()
+        at = name
+        while at in parents and at not in seen:
+            seen.add(at)
+            at = parents[at]
+        if name not in parents:
+            yield ("linkage", "body", i), "no joint holds this body: give it one as child"
+        elif at in seen:
+            yield ("linkage", "body", i), "its joints run in a circle: start the tree at 'ground'"
+
+
+def points(scene: Scene) -> Iterator[Problem]:
+    points = scene.linkage.point if scene.linkage else ()
+    bodies = [b.name for b in scene.linkage.body] if scene.linkage else []
+    names: set[str] = {"operational_point"}
+    for i, point in enumerate(points):
+        path: Path = ("linkage", "point", i)
+        if point.name in names:
+            yield (*path, "name"), f"{point.name!r} is taken: name each point once"
+        if not point.name.isidentifier():
+            yield (*path, "name"), f"{point.name!r}: a name of letters, digits and _"
+        names.add(point.name)
+        if point.body not in bodies:
+            yield (*path, "body"), f"no body {point.body!r}; there are {', '.join(bodies)}"
+    for name in scene.hands:
+        if name not in names - {"operational_point"}:
+            known = ", ".join(sorted(names - {"operational_point"})) or "none"
+            yield (
+                ("hands", name),
+                f"no point {name!r}; there are {known}: add it as [[linkage.point]]",
+            )

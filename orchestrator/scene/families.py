@@ -1,0 +1,86 @@
+"""Linkages that repeat a pattern: `family` and `n` of [linkage] become its bodies, joints, loops.
+
+What the table says besides is laid over what the family gives.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable
+from typing import Any
+
+from hapticlink.orchestrator.scene.toml_keys import Path
+
+ARGUMENTS = ("family", "n")
+
+
+class FamilyError(ValueError):
+    """An argument of a family that cannot be used: its path in the file, and a message."""
+
+    def __init__(self, key: str, message: str) -> None:
+        self.path: Path = ("linkage", key)
+        self.message = message
+        super().__init__(message)
+
+
+def n_four_bar(n: int) -> dict[str, Any]:
+    """n square windows in a row: 2n + 1 uniform rods of 1 m and 1 kg, all parallel at the start,
+    the rockers upright with the tip of the first (B0) moving at 1 m/s in x.
+
+    Problem A02 of the IFToMM library of computational benchmark problems.
+    """
+    rod = {"mass": 1.0, "inertia": 1 / 12, "center": [0.5, 0.0]}
+    rockers = [{"name": f"rocker{i}", **rod} for i in range(n + 1)]
+    couplers = [{"name": f"coupler{i}", **rod} for i in range(n)]
+    pivots = [
+        {"name": f"pivot{i}", "child": f"rocker{i}", "at_parent": [float(i), 0.0]}
+        for i in range(n + 1)
+    ]
+    tips = [
+        {
+            "name": f"tip{i}",
+            "parent": f"rocker{i}",
+            "child": f"coupler{i}",
+            "at_parent": [1.0, 0.0],
+        }
+        for i in range(n)
+    ]
+    loops = [
+        {
+            "name": f"window{i}",
+            "bodies": [f"coupler{i}", f"rocker{i + 1}"],
+            "at": [[1.0, 0.0], [1.0, 0.0]],
+        }
+        for i in range(n)
+    ]
+    upright = {joint["name"]: math.pi / 2 for joint in pivots}
+    level = {joint["name"]: -math.pi / 2 for joint in tips}
+    return {
+        "body": rockers + couplers,
+        "joint": pivots + tips,
+        "loop": loops,
+        "operational_point": {"body": "rocker0", "at": [1.0, 0.0]},
+        "start": upright | level,
+        "start_velocity": dict.fromkeys(upright, -1.0) | dict.fromkeys(level, 1.0),
+    }
+
+
+FAMILIES: dict[str, Callable[[int], dict[str, Any]]] = {"n-four-bar": n_four_bar}
+
+
+def members(arguments: dict[str, Any]) -> dict[str, Any]:
+    """The tables of the linkage that `family` and `n` name. Raises FamilyError."""
+    family, n = arguments.get("family"), arguments.get("n")
+    if family not in FAMILIES:
+        near = difflib.get_close_matches(str(family), FAMILIES, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(FAMILIES)}"
+        raise FamilyError("family", f"no family {family!r}; {hint}")
+    if not isinstance(n, int) or isinstance(n, bool) or n < 1:
+        raise FamilyError("n", f"{n!r}: how many members? write a whole number of at least 1")
+    return FAMILIES[family](n)
+
+
+def is_argument(names: Path) -> bool:
+    """Whether a key of the scene says which linkage of which family it is."""
+    return len(names) == 2 and names[0] == "linkage" and names[1] in ARGUMENTS

@@ -1,0 +1,39 @@
+"""Where scenes are: files, and those that come with the package."""
+
+from __future__ import annotations
+
+import difflib
+import importlib.resources
+from pathlib import Path as FilePath
+from typing import Any
+
+from hapticlink.orchestrator.base.faults import InputFault
+
+
+def shipped() -> dict[str, Any]:
+    """The scenes that come with the package, by name."""
+    folder = importlib.resources.files("hapticlink.scenes")
+    names = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return {entry.name.removesuffix(".toml"): entry for entry in sorted(names, key=str)}
+
+
+def find(scene: str, folder: FilePath | None = None) -> tuple[str, str]:
+    """(name, text) of a scene: a path from `folder`, or the name of a shipped one. Raises
+    InputFault."""
+    path, known = (folder or FilePath()) / scene, shipped()
+    if path.is_file():
+        try:
+            return path.stem, path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputFault(f"{scene}: cannot be read as text: {error}") from error
+    if scene in known:
+        return scene, known[scene].read_text(encoding="utf-8")
+    near = difflib.get_close_matches(scene, known, 1)
+    hint = f"did you mean {near[0]}?" if near else f"shipped scenes: {', '.join(known)}"
+    raise InputFault(f"{scene}: neither a file nor a shipped scene; {hint}")
+
+
+def folder_of(scene: str, folder: FilePath | None = None) -> FilePath | None:
+    """Where the file of a scene lies, seen from `folder`; None for a shipped one."""
+    path = (folder or FilePath()) / scene
+    return path.parent if path.is_file() else None

@@ -1,0 +1,39 @@
+"""A recorded trace of frames: `graphics.rate = { trace = "frames.csv" }`.
+
+One time stamp (s) a line, the first column of a CSV, rising; a first line that is no number is a
+heading, and # starts a remark. Times count from the first stamp, where the run starts. The trace
+becomes the list of its times in the scene, so that run.json holds the frames themselves.
+"""
+
+from __future__ import annotations
+
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+from hapticlink.orchestrator.base.faults import InputFault
+
+
+def frame_times(path: Path) -> list[float]:
+    """The ends of the frames (s). Raises InputFault for what is no trace, naming the line."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputFault(f"{path}: cannot be read as a trace of frames: {error}") from error
+    stamps: list[Decimal] = []
+    for number, line in enumerate(lines, start=1):
+        field = line.partition("#")[0].split(",")[0].strip()
+        if not field:
+            continue
+        try:
+            stamp = Decimal(field)
+        except InvalidOperation:
+            if number == 1:
+                continue
+            raise InputFault(f"{path}: line {number}: {field!r} is no time in s") from None
+        if stamps and not stamp > stamps[-1]:
+            raise InputFault(f"{path}: line {number}: {field} s does not come after {stamps[-1]} s")
+        stamps.append(stamp)
+    if len(stamps) < 2:
+        raise InputFault(f"{path}: {len(stamps)} time stamps; a trace of frames has at least 2")
+    # In decimals: 1.7 - 1.6 is 0.1 here.
+    return [float(stamp - stamps[0]) for stamp in stamps[1:]]

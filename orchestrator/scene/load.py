@@ -1,0 +1,88 @@
+"""From a TOML file to a `Scene`: all faults at once, each with its place and a remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import pydantic
+from pydantic_core import to_json
+
+from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
+from hapticlink.orchestrator.scene import checks, families, overrides
+from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
+from hapticlink.orchestrator.scene.frame_trace import frame_times
+from hapticlink.orchestrator.scene.scene import Scene, adapter
+from hapticlink.orchestrator.scene.toml_keys import Path, Place, flat, flatten, place_of
+from hapticlink.orchestrator.scene.validation_errors import beyond, problems
+
+
+def read(
+    text: str, options: Sequence[str] = (), name: str = "scene", folder: FilePath | None = None
+) -> Scene:
+    """The scene that `text` writes, its relative paths from `folder`. Raises SceneFault with every
+    finding, InputFault for an option that cannot be applied."""
+    data, places = document(text, name, folder)
+    return from_tables(data, options, name, places)
+
+
+def from_tables(
+    data: dict[str, Any], options: Sequence[str], name: str, places: Mapping[Path, Place]
+) -> Scene:
+    """The scene of the tables `data`, whose keys stand at `places`; faults as of `read`."""
+    which = [o for o in options if families.is_argument(overrides.parse(o)[0])]
+    set_by = {overrides.apply(data, option): option for option in which}
+    data = with_family(data, name, places, set_by)
+    set_by |= {overrides.apply(data, o): o for o in options if o not in which}
+    flatten(data)
+    wrong: list[tuple[Path, str]] = []
+    for path, recorded in traced(data):
+        try:
+            recorded["rate"] = frame_times(FilePath(recorded["rate"]["trace"]))
+        except InputFault as fault:
+            wrong.append(((*path, "rate"), str(fault)))
+            del recorded["rate"]
+    for fmu in tables_of(data, "fmu"):
+        if isinstance(fmu.get("start"), dict):
+            fmu["start"] = dict(flat(fmu["start"]))
+
+    def place(path: Path, message: str) -> Finding:
+        key = _dotted(path, data)
+        for length in range(len(path), 0, -1):
+            if path[:length] in set_by:
+                return Finding(key, message, option=f"--set {set_by[path[:length]]}")
+        file, line = place_of(path, places)
+        return Finding(key, message, line or None, file=file)
+
+    try:
+        # As JSON, because strict JSON takes arrays for tuples and still refuses "1" for 1.
+        found = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
+    except pydantic.ValidationError as error:
+        wrong += problems(error.errors(include_url=False), data)
+    if wrong:
+        wrong += beyond(wrong, data)
+        raise SceneFault(name, [place(*problem) for problem in wrong])
+    if findings := [place(path, message) for path, message in checks.check(found)]:
+        raise SceneFault(name, findings)
+    if found.device and found.device.sensing != found.sensing:
+        found = replace(found, device=replace(found.device, sensing=found.sensing))
+    object.__setattr__(found, "_place", place)
+    return found
+
+
+def _dotted(path: Path, data: Any) -> str:
+    """`linkage.body[2] (link3).mass`: entries of arrays from 0, with their name."""
+    text, node = "", data
+    for part in path:
+        try:
+            node = node[part]
+        except (KeyError, IndexError, TypeError):
+            node = None
+        if isinstance(part, int):
+            name = node.get("name") if isinstance(node, dict) else None
+            text += f"[{part}]" + (f" ({name})" if name else "")
+        else:
+            text += f".{part}" if text else part
+    return text

@@ -1,0 +1,71 @@
+"""`--set key=value`: a scene's keys changed before it is checked."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.scene.toml_keys import ASSIGNMENT, Path, parts, whole
+
+
+def parse(option: str) -> tuple[tuple[str, ...], Any]:
+    """The names of the dotted key, and the value as TOML or else as text.
+
+    The key is one of TOML, names in quotes too: `holds."virtual_environment.P_c"=lead` is
+    `holds.virtual_environment.P_c=lead`. Raises InputFault where there is no `=` or no key.
+    """
+    names, equals, text = _key(option)
+    if not equals or not all(names):
+        raise InputFault(f"--set {option}: write key=value, e.g. --set graphics.rate=10")
+    try:
+        return names, tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return names, text.strip()
+
+
+def _key(option: str) -> tuple[tuple[str, ...], str, str]:
+    """(names of the key, "=" or nothing, text of the value)."""
+    if match := ASSIGNMENT.match(option):
+        try:
+            return parts(match[1].strip()), "=", option[match.end() :]
+        except tomllib.TOMLDecodeError:
+            pass  # such as a vector's entry, `fmu.plant.start.x[1]`
+    key, equals, text = option.partition("=")
+    return tuple(name.strip() for name in key.split(".")), equals, text
+
+
+def apply(data: dict[str, Any], option: str) -> Path:
+    """Set the key in `data`, and give the path of what is new: the key, or a table made for it.
+
+    Entries of an array of tables go by their name or by their place (from 0):
+    `linkage.body.link1.mass=2`. Raises InputFault where there is no such entry.
+    """
+    names, value = parse(option)
+    names = whole(names)
+    node: Any = data
+    path: Path = ()
+    new: Path | None = None
+    for name, last in zip(names, (*(False for _ in names[1:]), True), strict=True):
+        place: str | int = name
+        if isinstance(node, list):
+            place = _entry(node, name, option)
+        elif not isinstance(node, dict):
+            raise InputFault(f"--set {option}: {'.'.join(map(str, path))} is {node!r}, not a table")
+        path = (*path, place)
+        if last:
+            node[place] = value
+        elif isinstance(node, dict) and not isinstance(node.get(name), dict | list):
+            node[place] = {}
+            new = new or path
+        node = node[place]
+    return new or path
+
+
+def _entry(entries: list[Any], name: str, option: str) -> int:
+    if name.isdigit() and int(name) < len(entries):
+        return int(name)
+    known = [str(e.get("name", i)) for i, e in enumerate(entries) if isinstance(e, dict)]
+    if name in known:
+        return known.index(name)
+    raise InputFault(f"--set {option}: {unknown('entry', name, known)}")

@@ -1,0 +1,78 @@
+"""What a scene needs of the blocks, and what is left out of them because nothing uses it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from hapticlink.components.contact.broad_phase import near, out_of_reach
+from hapticlink.orchestrator.scene.blocks import graphics_block, impedance, topology
+from hapticlink.orchestrator.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Need:
+    """A part of the equations, whether the scene has it, and why."""
+
+    part: str
+    needed: bool
+    why: str
+
+
+def needs(scene: Scene) -> Iterator[Need]:
+    """Every part that a scene may leave out."""
+    if scene.linkage is None:
+        return
+    loops = len(scene.linkage.loop)
+    yield Need(
+        "loop closures",
+        loops > 0,
+        f"{2 * loops} multipliers" if loops else "no loop: no multiplier, no projection",
+    )
+    yield from _forces(scene)
+    yield from _contacts(scene)
+    yield Need(
+        "Lambda_inv",
+        impedance(scene),
+        f"from {scene.directions_from}" if impedance(scene) else "no impedance controller",
+    )
+    yield Need(
+        "resisted directions",
+        topology(scene) or scene.mechanism.directions,
+        f"from {scene.directions_from}" if topology(scene) else "no topology controller",
+    )
+    reasons = graphics_block(scene)
+    yield Need(
+        "virtual_environment",
+        bool(reasons and scene.graphics),
+        f"for {', '.join(reasons)}" if reasons else "nothing depends on it",
+    )
+    text = "D, W, w, J_h held from graphics" if scene.local_model else "own matrices at every step"
+    yield Need("local model", scene.local_model, text)
+
+
+def _forces(scene: Scene) -> Iterator[Need]:
+    assert scene.linkage is not None
+    joints = scene.linkage.joint
+    given = {
+        "gravity": scene.linkage.gravity is not None,
+        "springs and dampers": bool(scene.linkage.spring)
+        or any(j.stiffness is not None or j.damping is not None for j in joints),
+        "friction": any(j.friction is not None for j in joints),
+        "drives": any(j.drive is not None for j in joints),
+    }
+    for part, needed in given.items():
+        yield Need(part, needed, "in [linkage]" if needed else "not mentioned: no term")
+
+
+def _contacts(scene: Scene) -> Iterator[Need]:
+    assert scene.linkage is not None
+    if scene.contacts is None:
+        yield Need("contacts", False, "no [contacts]: no contact port, no detection")
+        return
+    found = near(scene.linkage, scene.contacts)
+    places = sum(pair.places for pair in found)
+    text = f"{len(found)} pairs, {places} places, detected by {scene.contacts.detection}"
+    yield Need("contacts", bool(found), text)
+    for pair in out_of_reach(scene.linkage, scene.contacts):
+        yield Need(f"{pair.body} on {pair.obstacle}", False, "out of reach: no narrow phase")

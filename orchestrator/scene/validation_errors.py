@@ -1,0 +1,143 @@
+"""pydantic's findings as faults of the file: path, what is wrong, what to do."""
+
+from __future__ import annotations
+
+import copy
+import typing
+from collections.abc import Sequence
+from typing import Any
+
+import pydantic
+from pydantic_core import to_json
+
+from hapticlink.orchestrator.base.faults import near, unknown
+from hapticlink.orchestrator.scene import checks, schema
+from hapticlink.orchestrator.scene.scene import adapter
+from hapticlink.orchestrator.scene.toml_keys import Path
+
+
+def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
+    """pydantic's errors as (path in the file, message), unions folded into one each."""
+    by_path: dict[Path, list[Any]] = {}
+    for error in errors:
+        path = _path(error, data)
+        if path is not None:
+            by_path.setdefault(path, []).append(error)
+    found = []
+    for at, group in by_path.items():
+        deeper = any(len(other) > len(at) and other[: len(at)] == at for other in by_path)
+        if deeper and all(e["type"].endswith(("_type", "literal_error")) for e in group):
+            continue  # the other branches of a union whose right branch says more below
+        unlimited = [e for e in group if e["type"] == "finite_number"]
+        told = (_message(e, at, data) for e in unlimited or group)
+        found.append((at, " or ".join(dict.fromkeys(told))))
+    return found
+
+
+def _path(error: Any, data: Any) -> Path | None:
+    """Where in the file an error is; None for one of a branch that the table's `type` is not."""
+    path: Path = ()
+    node = data
+    for i, part in enumerate(error["loc"]):
+        inside = isinstance(node, dict) and part in node
+        inside |= isinstance(node, list) and isinstance(part, int) and part < len(node)
+        if inside:
+            node = node[part]
+            path = (*path, part)
+        elif error["type"] == "missing" and i == len(error["loc"]) - 1:
+            path = (*path, part)
+        else:
+            kinds = schema.at(path)
+            names = {k.__name__ for k in schema.chosen(kinds, node)}
+            if part in {k.__name__ for k in kinds} - names:
+                return None
+    return (*path, "type") if error["type"] == "union_tag_invalid" else path
+
+
+def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str]]:
+    """What the later checks find once every faulty value is taken out, or has a stand-in where
+    one is needed; nothing where that makes no scene, or where a name is missing by which other
+    tables speak of this one."""
+    whole, told = copy.deepcopy(data), {path for path, _ in known}
+    # A table that is of no known kind is wrong as a whole.
+    untyped = [path for path, _ in known if path[-1:] == ("type",) and _is_kind(path[:-1])]
+    wrong = [path[:-1] if path in untyped else path for path, _ in known if path]
+    for path in wrong:
+        node = _at(whole, path[:-1])
+        if isinstance(node, dict):
+            node.pop(path[-1], None)
+    for path in wrong:
+        node, filled = _at(whole, path[:-1]), _stand_in(path)
+        if isinstance(node, list):
+            place = typing.cast("int", path[-1])
+            node += [filled] * (place + 1 - len(node))  # too short a vector
+            node[place] = filled
+        elif isinstance(node, dict) and ((*path, "type") in untyped or schema.is_needed(path)):
+            node[path[-1]] = filled
+    try:
+        document = to_json(whole, inf_nan_mode="constants")
+        found = checks.check(adapter().validate_json(document))
+    except pydantic.ValidationError:
+        return []
+    return [problem for problem in found if problem[0] not in told]
+
+
+def _is_kind(path: Path) -> bool:
+    """Whether the record at `path` is one of several, by its `type`."""
+    return sum(bool(schema.types(kind)) for kind in schema.at(path)) > 1
+
+
+def _stand_in(path: Path) -> Any:
+    """A value of the right kind that makes no fault elsewhere, None where there is none."""
+    kinds = schema.at(path)
+    if float in kinds or int in kinds:
+        return 1
+    if str in kinds:
+        return "" if path[-1] not in ("name", "child") else None
+    for kind in kinds:
+        if schema.types(kind):
+            needed = ((*path, key) for key in schema.keys([kind]))
+            return {p[-1]: _stand_in(p) for p in needed if schema.is_needed(p, kind)}
+        if typing.get_origin(kind) is tuple and Ellipsis not in typing.get_args(kind):
+            return [_stand_in((*path, 0)) for _ in typing.get_args(kind)]
+    return None
+
+
+def _at(data: Any, path: Path) -> Any:
+    """What stands at `path`, None where nothing does (any more)."""
+    for part in path:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return data
+
+
+def _message(error: Any, path: Path, data: Any) -> str:
+    kind, value = error["type"], error["input"]
+    if kind == "missing":
+        return "is missing"
+    if kind == "unexpected_keyword_argument":
+        return _unknown_key(path, error["loc"], data)
+    if kind == "union_tag_invalid":
+        known = [t for k in schema.at(path[:-1]) for t in schema.types(k)]
+        return unknown("type", error["ctx"]["tag"], known)
+    if kind == "finite_number":
+        return f"{value!r}: give a finite number"
+    if kind in ("tuple_type", "too_long") and (wanted := schema.vector(path)):
+        return f"{value!r} should be {wanted}"
+    message = error["msg"].removeprefix("Input should be ").replace("an object", "a table")
+    return f"{value!r} should be {message}" if message != error["msg"] else f"{value!r}: {message}"
+
+
+def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
+    """That a table has no such key, or that only one of another type has."""
+    kinds, table, key = schema.at(path[:-1]), _at(data, path[:-1]), str(path[-1])
+    types = {name: k for k in kinds for name in schema.types(k)}
+    branch = loc[-2] if len(loc) > 1 else None  # where the table has no type: the default's
+    this = table.get("type", branch) if isinstance(table, dict) else branch
+    owners = [repr(name) for name, k in types.items() if key in schema.keys([k])]
+    if this in types and owners:
+        return f"`{key}` belongs to type {' or '.join(owners)}, not {this!r}"
+    known = schema.keys([types[this]] if this in types else kinds)
+    return f"unknown key; {near(key, sorted(known))}"

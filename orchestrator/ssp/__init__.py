@@ -1,0 +1,1 @@
+"""System Structure and Parameterization: SSPs read and written."""

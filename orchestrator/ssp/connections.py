@@ -1,0 +1,164 @@
+"""Connections through the borders of systems, resolved to connections from FMU to FMU.
+
+A connector of a system passes on what it gets, so an input of an FMU has one chain of connections
+behind it, y_0 -> y_1 -> ... -> y_k, each with y_i = a_i C_i(y_{i-1}) + b_i, where C_i converts the
+units (SSP 1.0, section 5.4.2). The chain is one linear function of y_0. A connector that declares
+no unit has that of the connectors inside its system.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
+from hapticlink.orchestrator.ssp.tree import Line, Node, Part, Place, dotted
+
+TAKES = ("input", "parameter")
+Row = tuple[Node, Node, dict[str, Any]]
+"""From an output to an input, and the keys of the [[connection]] that say what is done between."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """A variable that a value at a connector of a system, in `unit`, comes to as `linear` of it."""
+
+    component: Place
+    variable: str
+    unit: Unit | None
+    linear: Linear
+    relative: bool
+
+
+@dataclass
+class Wires:
+    """The connections of `root`. Raises InputFault for what joins no output to an input.
+
+    rows: from FMU to FMU, by their inputs in the order of the file, inner systems first. reach: by
+    a connector of a system, what it feeds; one that nothing feeds, as an input of the root, has
+    no row. variables: of all FMUs.
+    """
+
+    path: Path
+    root: Part
+    described: Mapping[Place, Description]
+    units: Mapping[str, Unit]
+    rows: list[Row] = field(default_factory=list)
+    reach: dict[Node, list[Reach]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._systems = {p.place: p for p in self.root if p.source is None}
+        self._connectors = {(p.place, n): c for p in self.root for n, c in p.connectors.items()}
+        self.variables = {
+            (place, s.name): s
+            for place, d in self.described.items()
+            for s in (*d.scalars, *d.strings)
+        }
+        fed: dict[Node, tuple[Node, Line]] = {}
+        for system in self._systems.values():
+            for line in system.lines:
+                source, sink = self._directed(system, line)
+                if sink in fed:
+                    names = f"{dotted(*fed[sink][0])} and by {dotted(*source)}"
+                    raise InputFault(f"{self.path}: {dotted(*sink)} is fed by {names}; keep one")
+                fed[sink] = source, line
+        for sink in fed:
+            if sink[0] in self.described:
+                self._follow(sink, fed)
+
+    def _directed(self, system: Part, line: Line) -> tuple[Node, Node]:
+        """(the end that gives, the end that takes), as seen inside `system`."""
+        first, second = (self._gives(end, system.place) for end in line.ends)
+        if first == second:
+            what = "give" if first else "take"
+            names = " and ".join(dotted(*end) for end in line.ends)
+            raise InputFault(f"{self.path}: {names} are connected, and both {what} a value")
+        return line.ends if first else (line.ends[1], line.ends[0])
+
+    def _gives(self, node: Node, inside: Place) -> bool:
+        place, _ = node
+        variable = self.variables.get(node)
+        if variable and variable.type != "String":
+            return variable.causality not in TAKES
+        if place in self._systems and (connector := self._connectors.get(node)):
+            # A system's own input gives to what is inside it.
+            return (connector.kind in TAKES) == (place == inside)
+        why = "is text, which is set at the start only" if variable else "is not there"
+        raise InputFault(f"{self.path}: a connection names {dotted(*node)}, which {why}")
+
+    def _follow(self, sink: Node, fed: Mapping[Node, tuple[Node, Line]]) -> None:
+        """Books the chain that ends at an FMU's input."""
+        nodes: list[Node] = [sink]
+        lines: list[Line] = []
+        while nodes[0] in fed:
+            source, line = fed[nodes[0]]
+            if source in nodes:
+                names = " -> ".join(dotted(*n) for n in (source, *nodes))
+                raise InputFault(
+                    f"{self.path}: connections run in a circle without an FMU: {names}"
+                )
+            nodes.insert(0, source)
+            lines.insert(0, line)
+        units = self._units_along(nodes)
+        relative = any(s.relative for n in nodes if (s := self.variables.get(n)))
+        around = zip(lines, nodes, nodes[1:], units, units[1:], strict=False)
+        steps = [self._step(relative, *each) for each in around]
+        for i, node in enumerate(nodes):
+            if node[0] in self._systems:
+                found = Reach(*sink, units[i], _all(steps[i:]), relative)
+                self.reach.setdefault(node, []).append(found)
+        if nodes[0][0] in self.described:
+            own = len(lines) == 1 and all(self._unit_is_of_fmu(n) for n in nodes)
+            linear = lines[0].linear if own else _all(steps)
+            how: dict[str, Any] = {} if own and lines[0].convert else {"convert": False}
+            if linear != SAME:
+                how |= {"factor": linear.factor, "offset": linear.offset}
+            self.rows.append((nodes[0], sink, how))
+
+    def _step(
+        self, relative: bool, line: Line, a: Node, b: Node, u: Unit | None, v: Unit | None
+    ) -> Linear:
+        if not line.convert:
+            return line.linear
+        try:
+            return line.linear.after(conversion(u, v, relative))
+        except ValueError as error:
+            names = f"{dotted(*a)} and {dotted(*b)}"
+            raise InputFault(
+                f"{self.path}: the units of {names} do not fit: {error}; connect signals of one "
+                "kind, or say suppressUnitConversion"
+            ) from None
+
+    def _units_along(self, nodes: list[Node]) -> list[Unit | None]:
+        """Units along a chain; where a system's connector declares none, an output has that of its
+        source and an input that of what it feeds."""
+        units = [self.unit(n) for n in nodes]
+        takes = [n[0] in self._systems and self._connectors[n].kind in TAKES for n in nodes]
+        for i, node in enumerate(nodes):
+            if i and units[i] is None and node[0] in self._systems and not takes[i]:
+                units[i] = units[i - 1]
+        for i in reversed(range(len(nodes) - 1)):
+            if units[i] is None and takes[i]:
+                units[i] = units[i + 1]
+        return units
+
+    def unit(self, node: Node) -> Unit | None:
+        """The FMU's own unit goes before that of its connector."""
+        variable, connector = self.variables.get(node), self._connectors.get(node)
+        if variable and variable.unit is not None:
+            return self.described[node[0]].unit(variable)
+        name = connector and connector.unit
+        return self.units.get(name, Unit(name)) if name else None
+
+    def _unit_is_of_fmu(self, node: Node) -> bool:
+        connector = self._connectors.get(node)
+        return self.variables[node].unit is not None or connector is None or connector.unit is None
+
+
+def _all(steps: Sequence[Linear]) -> Linear:
+    return reduce(lambda done, step: step.after(done), steps, SAME)

@@ -1,0 +1,161 @@
+"""Parameter values of an SSP as start values of its FMUs (SSP 1.0, sections 5.3.3, 6 and 7).
+
+A binding applies a set of values to an element: by the names in the set behind its `prefix`, or,
+where it has a mapping, by the names that the mapping gives them. In a system, `connector` is its
+own connector and `element.name` what `name` is in that element. Later bindings go before earlier
+ones, those of a system before those of its parts. A value in a unit is converted to that of its
+target, and transformed after that.
+"""
+
+from __future__ import annotations
+
+import logging
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from urllib.parse import unquote
+from xml.etree.ElementTree import Element, tostring
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.archive import read_xml
+from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
+from hapticlink.orchestrator.ssp.connections import Reach, Wires
+from hapticlink.orchestrator.ssp.names import SSD, SSM, SSV
+from hapticlink.orchestrator.ssp.tree import (
+    Part,
+    Place,
+    checked,
+    converts,
+    dotted,
+    transformation,
+    units,
+)
+
+Value = bool | int | float | str
+READ: dict[str, Callable[[str], Value]] = {
+    "Real": float,
+    "Integer": int,
+    "Boolean": lambda text: text in ("true", "1"),
+    "String": str,
+    "Enumeration": str,
+}
+SETS = ("application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping")
+
+
+@dataclass(frozen=True)
+class Given:
+    """A value by the name that it is applied under; `linear` comes after the units, which are
+    converted where `convert`."""
+
+    name: str
+    value: Value
+    unit: Unit | None
+    linear: Linear = SAME
+    convert: bool = True
+
+
+@dataclass
+class Parameters:
+    """Reads the bindings of the elements of `wires`."""
+
+    path: Path
+    archive: zipfile.ZipFile
+    wires: Wires
+    unused: list[str] = field(default_factory=list)
+
+    def starts(self) -> dict[Place, dict[str, Value]]:
+        """Start values by component and variable. Values whose names match nothing are passed
+        over, as SSP 1.0 says, and logged. Raises InputFault for what cannot be read."""
+        found: dict[Place, dict[str, Value]] = {place: {} for place in self.wires.described}
+        for part in self.wires.root:
+            for given in self._given(part):
+                targets = [*self._targets(part, given.name)]
+                for target in targets:
+                    value = self._converted(part, given, target)
+                    found[target.component][target.variable] = value
+                if not targets:
+                    self.unused.append(dotted(part.place, given.name))
+        if self.unused:
+            message = "%s: parameters that match nothing are passed over: %s"
+            logging.getLogger(__name__).warning(message, self.path, ", ".join(self.unused))
+        return found
+
+    def _given(self, part: Part) -> Iterator[Given]:
+        for binding in part.bindings:
+            where = f"parameters of {dotted(part.place)}"
+            set_ = self._content(binding, where, "ParameterSet", SSV)
+            given = [*self._values(set_, binding.get("prefix", ""))]
+            mapping = binding.find(f"{{{SSD}}}ParameterMapping")
+            if mapping is not None:
+                entries = self._content(mapping, where, "ParameterMapping", SSM)
+                given = [*self._mapped(entries, {g.name: g for g in given}, part)]
+            yield from given
+
+    def _content(self, element: Element, where: str, kind: str, space: str) -> Element:
+        """The set or mapping that stands in `element`, or in the file that it names."""
+        if element.get("type", SETS[0]) not in SETS:
+            raise InputFault(f"{self.path}: {where}: type {element.get('type')} is not read")
+        if element.get("sourceBase") == "component":
+            raise InputFault(
+                f"{self.path}: {where}: {element.get('source')} stands inside an FMU, where it is "
+                "not read; put it beside the .ssd"
+            )
+        entry, schema = element.get("source"), f"SystemStructure{kind.replace('Set', 'Values')}"
+        if entry:
+            entry = unquote(entry).removeprefix("./")
+            return checked(self.path, entry, read_xml(self.archive, entry), schema)
+        inside = next(element.iter(f"{{{space}}}{kind}"), None)
+        if inside is None:
+            raise InputFault(f"{self.path}: {where}: a {kind} has neither source nor content")
+        inside.attrib.setdefault("version", "1.0")  # OMSimulator writes none in the .ssd
+        return checked(self.path, where, tostring(inside), schema)
+
+    def _values(self, set_: Element, prefix: str) -> Iterator[Given]:
+        known = {**self.wires.units, **units(set_, SSV)}
+        for parameter in set_.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
+            name, value = f"{prefix}{parameter.get('name')}", parameter[0]
+            kind, unit = value.tag.removeprefix(f"{{{SSV}}}"), value.get("unit")
+            if kind not in READ:
+                raise InputFault(f"{self.path}: parameter {name}: type {kind} is not read")
+            of = known.get(unit, Unit(unit)) if unit else None
+            yield Given(name, READ[kind](value.get("value", "")), of)
+
+    def _mapped(self, mapping: Element, given: Mapping[str, Given], part: Part) -> Iterator[Given]:
+        targets = set()
+        for entry in mapping.iterfind(f"{{{SSM}}}MappingEntry"):
+            source, target = entry.get("source", ""), entry.get("target", "")
+            if target in targets:
+                name = dotted(part.place, target)
+                raise InputFault(f"{self.path}: two parameters are mapped to {name}; keep one")
+            targets.add(target)
+            if source not in given:
+                self.unused.append(dotted(part.place, source))
+            else:
+                linear = transformation(self.path, f"the mapping of {source}", entry)
+                yield replace(given[source], name=target, linear=linear, convert=converts(entry))
+
+    def _targets(self, part: Part, name: str) -> Iterator[Reach]:
+        """The variables that `name` is in `part`."""
+        node = part.place, name
+        if variable := self.wires.variables.get(node):
+            yield Reach(part.place, name, self.wires.unit(node), SAME, variable.relative)
+        yield from self.wires.reach.get(node, ())
+        for inner in part.parts:
+            if name.startswith(f"{inner.place[-1]}."):
+                yield from self._targets(inner, name.removeprefix(f"{inner.place[-1]}."))
+
+    def _converted(self, part: Part, given: Given, target: Reach) -> Value:
+        value, where = given.value, f"{self.path}: parameter {dotted(part.place, given.name)}"
+        try:
+            first = SAME
+            if given.convert:
+                first = conversion(given.unit, target.unit, target.relative)
+        except ValueError as error:
+            raise InputFault(f"{where} does not fit: {error}; give it in another unit") from None
+        linear = target.linear.after(given.linear.after(first))
+        if linear == SAME:
+            return value
+        if isinstance(value, bool | str):
+            raise InputFault(f"{where}: {value!r} is no number, so it cannot be scaled")
+        return linear.factor * value + linear.offset

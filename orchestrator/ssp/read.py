@@ -1,0 +1,144 @@
+"""An SSP as the tables of a scene: ours to the bit, anyone's with a rate.
+
+Components become [[fmu]], those of inner systems by their whole names (`outer_inner`); connections
+become [[connection]] (entries that make up whole vectors in one), parameter values `start`.
+Connections to the outside of the system have no counterpart in a scene and are left out. What
+cannot be read is refused, never ignored.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import json
+import re
+import shutil
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+from hapticlink.fmus import cache
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.ssp.connections import Row, Wires
+from hapticlink.orchestrator.ssp.names import ANNOTATION, RUN, SSC, SSD, STRUCTURE
+from hapticlink.orchestrator.ssp.parameters import Parameters
+from hapticlink.orchestrator.ssp.tree import Part, Place, checked, dotted, tree, units
+
+_ENTRY = re.compile(r"\[[\d, ]+\]$")
+
+
+def tables(path: Path) -> dict[str, Any]:
+    """The tables of a scene. Raises InputFault, naming file and element, for what is malformed or
+    not supported; the FMUs land in the cache."""
+    with opened(path, "SSP") as archive:
+        text = read_xml(archive, STRUCTURE)
+        root = checked(path, STRUCTURE, text, "SystemStructureDescription")
+        element = root.find(f"{{{SSD}}}System")
+        assert element is not None  # the schema says so
+        system, defined = tree(path, element), units(root)
+        names = _names(part.place for part in system if part.source is not None)
+        files = {
+            part.place: _fmu(path, archive, part, names[part.place])
+            for part in system
+            if part.source is not None
+        }
+        described = {place: describe(file) for place, file in files.items()}
+        wires = Wires(path, system, described, defined)
+        starts = Parameters(path, archive, wires).starts()
+    rest = _annotation(path, root)
+    found: dict[str, Any] = {"title": root.get("name") or path.stem, **rest}
+    about = rest.get("fmu", {})
+    found["fmu"] = [
+        {"path": str(file), "start": starts[place], "name": names[place]}
+        | about.get(dotted(place), {})
+        for place, file in files.items()
+    ]
+    found["connection"] = [
+        {"from": f"{names[a]}.{p}", "to": f"{names[b]}.{q}", **how}
+        for (a, p), (b, q), how in _grouped(wires.rows, described)
+    ] + rest.get("connection", [])
+    _experiment(path, found, root, described.values())
+    return found
+
+
+def _experiment(
+    path: Path, found: dict[str, Any], root: Element, described: Iterable[Description]
+) -> None:
+    """Duration and rate where there is no annotation: those of the default experiments, the rate
+    of the FMU with the shortest step. Where they don't say, `scene_file` asks for them."""
+    experiment = root.find(f"{{{SSD}}}DefaultExperiment")
+    if "duration" not in found and experiment is not None and experiment.get("stopTime"):
+        if float(experiment.get("startTime", "0")):
+            raise InputFault(f"{path}: starts at {experiment.get('startTime')} s; runs start at 0")
+        found["duration"] = float(experiment.get("stopTime", ""))
+    steps = [exact(d.step_size) for d in described if d.step_size]
+    if "haptics" not in found and steps:
+        found["haptics"] = {"rate": str(1 / min(steps))}
+
+
+def _names(places: Iterable[Place]) -> dict[Place, str]:
+    """A name for [[fmu]] of each component, which is its own where it is the only one."""
+    found: dict[Place, str] = {}
+    for place in places:
+        name = wanted = re.sub(r"\W", "_", "_".join(place))
+        count = 1
+        while name in found.values():
+            count += 1
+            name = f"{wanted}_{count}"
+        found[place] = name
+    return found
+
+
+def _fmu(path: Path, archive: zipfile.ZipFile, part: Part, name: str) -> Path:
+    """The FMU of a component, unpacked into the cache."""
+    if part.source not in archive.NameToInfo:
+        held = ", ".join(n for n in archive.namelist() if n.endswith(".fmu")) or "none"
+        where = f"{path}: {dotted(part.place)}"
+        raise InputFault(f"{where}: there is no {part.source!r} in it; FMUs in it: {held}")
+    content, file = archive.read(part.source), f"{name}.fmu"
+
+    def unpack(room: Path) -> Path:
+        (room / file).write_bytes(content)
+        return room / file
+
+    kept = cache.cached({"ssp": hashlib.sha256(content).hexdigest(), "file": file}, unpack)
+    if cache.folder() is None:
+        atexit.register(shutil.rmtree, kept.parent, ignore_errors=True)
+    return kept
+
+
+def _grouped(rows: list[Row], described: Mapping[Place, Description]) -> Iterator[Row]:
+    """Rows that join two vectors entry by entry, in order, as one."""
+    i = 0
+    while i < len(rows):
+        (a, p), (b, q), how = rows[i]
+        whole = (_ENTRY.sub("", p), _ENTRY.sub("", q))
+        outputs = described[a].port(whole[0], "output")
+        inputs = described[b].port(whole[1], "input")
+        pairs = zip(outputs, inputs, strict=False)
+        wanted = [((a, s.name), (b, t.name), how) for s, t in pairs]
+        n = len(wanted)
+        if n > 1 and len(outputs) == len(inputs) and rows[i : i + n] == wanted:
+            yield (a, whole[0]), (b, whole[1]), how
+            i += n
+        else:
+            yield rows[i]
+            i += 1
+
+
+def _annotation(path: Path, root: Element) -> dict[str, Any]:
+    for annotation in root.iterfind(f"{{{SSD}}}Annotations/{{{SSC}}}Annotation"):
+        if annotation.get("type") == ANNOTATION:
+            try:
+                found = json.loads(annotation.findtext(f"{{{RUN}}}Scene") or "")
+            except json.JSONDecodeError as error:
+                raise InputFault(f"{path}: annotation {ANNOTATION}: {error}") from error
+            if not isinstance(found, dict):
+                raise InputFault(f"{path}: annotation {ANNOTATION} holds no table")
+            return found
+    return {}

@@ -1,0 +1,154 @@
+"""The elements of a SystemStructure.ssd as records: systems in systems, components, connectors and
+connections (SSP 1.0, chapter 5). What is not read is refused here, never ignored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote
+from xml.etree.ElementTree import Element, fromstring
+
+from fmpy.ssp.ssd import validate_tree
+from lxml import etree
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.units import BASES, SAME, Linear, Unit
+from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD
+
+Place = tuple[str, ...]
+"""The names of the elements on the way down from the root system, which is ()."""
+Node = tuple[Place, str]
+"""A connector or variable: its element, and its name there."""
+
+
+@dataclass(frozen=True)
+class Connector:
+    """kind is "input", "output", "parameter" or "calculatedParameter"."""
+
+    kind: str
+    unit: str | None
+
+
+@dataclass(frozen=True)
+class Line:
+    """A connection as it is written, which does not say the end that gives. The end that takes
+    gets `linear` of the value, whose unit is converted before where `convert`."""
+
+    ends: tuple[Node, Node]
+    linear: Linear
+    convert: bool
+
+
+@dataclass(frozen=True)
+class Part:
+    """A component, whose `source` is the entry of its FMU in the archive, or a system, which has
+    none but `parts` and `lines` between its own connectors and those of its parts."""
+
+    place: Place
+    connectors: Mapping[str, Connector]
+    bindings: tuple[Element, ...]
+    source: str | None = None
+    parts: tuple[Part, ...] = ()
+    lines: tuple[Line, ...] = ()
+
+    def __iter__(self) -> Iterator[Part]:
+        """All parts, each after those inside it; this one comes last."""
+        for part in self.parts:
+            yield from part
+        yield self
+
+
+def dotted(place: Place, *names: str) -> str:
+    """The hierarchical name, as SSP 1.0 forms it for parameters."""
+    return ".".join((*place, *names)) or "the root system"
+
+
+def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
+    """The tree of `text`, which follows one of the schemas of SSP 1.0. Raises InputFault."""
+    try:
+        validate_tree(etree.fromstring(text), f"{schema}.xsd")
+    except Exception as error:  # FMPy raises bare Exception
+        said = str(error).removeprefix("Failed to validate SystemStructure.ssd:").strip()
+        raise InputFault(f"{path}: {entry} is no SSP 1.0 ({schema}): {said}") from error
+    return fromstring(text)
+
+
+def units(root: Element, space: str = SSD) -> dict[str, Unit]:
+    """The units that a file defines, by name."""
+    found = {}
+    for unit in root.iterfind(f"{{{space}}}Units/{{{SSC}}}Unit"):
+        base = unit.find(f"{{{SSC}}}BaseUnit")
+        assert base is not None  # the schema says so
+        powers = tuple(int(base.get(b, "0")) for b in BASES)
+        factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+        found[unit.get("name", "")] = Unit(unit.get("name", ""), powers, factor, offset)
+    return found
+
+
+def tree(path: Path, element: Element, place: Place = ()) -> Part:
+    """The part of a System or Component element and all that is inside it. Raises InputFault."""
+    kind, where = element.tag.removeprefix(f"{{{SSD}}}"), dotted(place)
+    connectors = {
+        c.get("name", ""): _connector(path, place, c)
+        for c in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
+    }
+    bindings = (*element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"),)
+    if kind == "Component":
+        type_, how = element.get("type", FMU), element.get("implementation")
+        if type_ == FMU and how != "ModelExchange":
+            entry = unquote(element.get("source", "")).removeprefix("./")
+            return Part(place, connectors, bindings, entry)
+        kind += " for model exchange" if type_ == FMU else f" of type {type_}"
+    if kind != "System":
+        raise InputFault(
+            f"{path}: {where} is a {kind}; read are systems, and components that are FMUs for "
+            "co-simulation: put the system of another file into this one, and connect signals one "
+            "by one"
+        )
+    names = [e.get("name", "") for e in element.iterfind(f"{{{SSD}}}Elements/*")]
+    if twice := {n for n in names if names.count(n) > 1}:
+        raise InputFault(f"{path}: {where} has two elements named {min(twice)!r}: name each once")
+    parts = (
+        tree(path, e, (*place, name))
+        for e, name in zip(element.iterfind(f"{{{SSD}}}Elements/*"), names, strict=True)
+    )
+    lines = (
+        _line(path, place, c) for c in element.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection")
+    )
+    return Part(place, connectors, bindings, parts=tuple(parts), lines=tuple(lines))
+
+
+def _connector(path: Path, place: Place, element: Element) -> Connector:
+    kind, real = element.get("kind", ""), element.find(f"{{{SSC}}}Real")
+    if kind == "inout":
+        name = dotted(place, element.get("name", ""))
+        raise InputFault(f"{path}: {name} is inout; give its kind as input or output")
+    return Connector(kind, real.get("unit") if real is not None else None)
+
+
+def _line(path: Path, place: Place, element: Element) -> Line:
+    def node(end: str) -> Node:
+        inside = element.get(f"{end}Element")
+        return (*place, inside) if inside else place, element.get(f"{end}Connector", "")
+
+    ends = (node("start"), node("end"))
+    names = " and ".join(dotted(*end) for end in ends)
+    linear = transformation(path, f"the connection of {names}", element)
+    return Line(ends, linear, converts(element))
+
+
+def transformation(path: Path, where: str, element: Element) -> Linear:
+    """What a connection or mapping does to a value. Raises InputFault for tables of values."""
+    for child in element:
+        if child.tag == f"{{{SSC}}}LinearTransformation":
+            return Linear(float(child.get("factor", "1")), float(child.get("offset", "0")))
+        if child.tag.endswith("MappingTransformation"):
+            name = child.tag.removeprefix(f"{{{SSC}}}")
+            raise InputFault(f"{path}: {where}: {name} is not read; put its table into an FMU")
+    return SAME
+
+
+def converts(element: Element) -> bool:
+    """Whether the units of a connection or mapping are converted."""
+    return element.get("suppressUnitConversion") not in ("true", "1")

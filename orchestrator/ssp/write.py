@@ -1,0 +1,171 @@
+"""A scene as an SSP: SystemStructure.ssd and the FMUs, for this and other tools.
+
+Connections stand one by one, scalar to scalar. Rates, holds and connections to parameters, which
+the standard does not know, stand in an annotation as JSON with the keys of a scene.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import uuid
+import zipfile
+from dataclasses import asdict, fields
+from functools import partial
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
+
+import pydantic
+
+from hapticlink.orchestrator.fmi.units import BASES
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.records import AnyRate
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.ssp.names import (
+    ANNOTATION,
+    FMU,
+    NOT_IN_ANNOTATION,
+    RUN,
+    SSC,
+    SSD,
+    SSV,
+    STRUCTURE,
+    type_of,
+)
+from hapticlink.orchestrator.system.system import Connection, System, Unit
+
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
+
+
+def write(scene: Scene, system: System, target: Path) -> Path:
+    """Write `target`, whole or not at all; the same scene gives the same bytes."""
+    folders.made(target.parent)
+    unfinished = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
+    try:
+        with zipfile.ZipFile(unfinished, "w") as archive:
+            _add(archive, STRUCTURE, structure(scene, system))
+            for unit in system.units:
+                _add(archive, f"resources/{unit.name}.fmu", unit.description.path.read_bytes())
+        os.replace(unfinished, target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return target
+
+
+def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
+    info = zipfile.ZipInfo(name, EPOCH)
+    info.create_system, info.external_attr = 3, 0o644 << 16
+    archive.writestr(info, content, zipfile.ZIP_DEFLATED)
+
+
+def structure(scene: Scene, system: System) -> bytes:
+    """The text of SystemStructure.ssd."""
+    for prefix, space in (("ssd", SSD), ("ssc", SSC), ("ssv", SSV), ("hapticlink", RUN)):
+        register_namespace(prefix, space)
+    root = Element(f"{{{SSD}}}SystemStructureDescription", version="1.0", name=scene.title)
+    top = SubElement(root, f"{{{SSD}}}System", name="system")
+    elements = SubElement(top, f"{{{SSD}}}Elements")
+    for unit in system.units:
+        _component(elements, unit)
+    wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
+    lines = [c for c in system.connections if not c.initial]
+    if lines:
+        connections = SubElement(top, f"{{{SSD}}}Connections")
+    for c in lines:
+        for a, b in zip(c.outputs, c.inputs, strict=True):
+            ends = {"startElement": c.source, "startConnector": a.name}
+            ends |= {"endElement": c.target, "endConnector": b.name}
+            wire = wires.get(c.name)
+            if wire and not wire.convert:
+                ends["suppressUnitConversion"] = "true"
+            line = SubElement(connections, f"{{{SSD}}}Connection", ends)
+            if wire and (wire.factor, wire.offset) != (1.0, 0.0):
+                linear = {"factor": repr(wire.factor), "offset": repr(wire.offset)}
+                SubElement(line, f"{{{SSC}}}LinearTransformation", linear)
+    _units(root, system)
+    SubElement(root, f"{{{SSD}}}DefaultExperiment", startTime="0.0", stopTime=repr(scene.duration))
+    annotations = SubElement(root, f"{{{SSD}}}Annotations")
+    annotation = SubElement(annotations, f"{{{SSC}}}Annotation", type=ANNOTATION)
+    SubElement(annotation, f"{{{RUN}}}Scene").text = json.dumps(_rest(scene, system), indent=1)
+    indent(root)
+    return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def _component(elements: Element, unit: Unit) -> None:
+    about = {"name": unit.name, "type": FMU, "source": f"resources/{unit.name}.fmu"}
+    component = SubElement(elements, f"{{{SSD}}}Component", about, implementation="CoSimulation")
+    shown = [s for s in unit.description.scalars if s.causality in ("input", "output", "parameter")]
+    if shown:
+        connectors = SubElement(component, f"{{{SSD}}}Connectors")
+    for s in shown:
+        connector = SubElement(
+            connectors, f"{{{SSD}}}Connector", {"name": s.name, "kind": s.causality}
+        )
+        unit_of = {"unit": s.unit} if s.unit and unit.description.units.get(s.unit) else {}
+        SubElement(connector, f"{{{SSC}}}{type_of(s.type)}", unit_of)
+    if unit.starts:
+        bindings = SubElement(component, f"{{{SSD}}}ParameterBindings")
+        binding = SubElement(bindings, f"{{{SSD}}}ParameterBinding")
+        values = SubElement(binding, f"{{{SSD}}}ParameterValues")
+        made = SubElement(values, f"{{{SSV}}}ParameterSet", version="1.0", name="start")
+        parameters = SubElement(made, f"{{{SSV}}}Parameters")
+        for scalar, value in unit.starts:
+            parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=scalar.name)
+            SubElement(parameter, f"{{{SSV}}}{type_of(scalar.type)}", value=_text(scalar, value))
+
+
+def _text(scalar: Scalar, value: bool | int | float | str) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(float(value)) if type_of(scalar.type) == "Real" else str(value)
+
+
+def _units(root: Element, system: System) -> None:
+    """The units that connectors name; a name that two FMUs define otherwise stays with the first:
+    each FMU keeps its own definitions."""
+    named = {u.name: u for unit in system.units for u in unit.description.units.values()}
+    if not named:
+        return
+    units = SubElement(root, f"{{{SSD}}}Units")
+    for name in sorted(named):
+        one = SubElement(units, f"{{{SSC}}}Unit", name=name)
+        unit = named[name]
+        powers = zip(BASES, unit.base or (0,) * len(BASES), strict=True)
+        base = {b: str(n) for b, n in powers if n}
+        base |= {"factor": repr(unit.factor)} if unit.factor != 1 else {}
+        base |= {"offset": repr(unit.offset)} if unit.offset else {}
+        SubElement(one, f"{{{SSC}}}BaseUnit", base)
+
+
+def _rest(scene: Scene, system: System) -> dict[str, Any]:
+    """What the annotation holds, by the keys of a scene."""
+    keys = {f.name for f in fields(Scene)} - NOT_IN_ANNOTATION
+    found = pydantic.TypeAdapter(Scene).dump_python(
+        scene, mode="json", by_alias=True, exclude_none=True, include=keys
+    )
+    found["stop_when"] = scene.ends_when
+    own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
+    found["holds"] = {**scene.holds, **own}
+    found["spring"] = [asdict(spring) for spring in system.springs]
+    rates: dict[str, AnyRate] = {b.name: b.rate for b in blocks(scene)}
+    rates |= {f.name: f.rate for f in scene.fmu}
+    if scene.graphics and "graphics" in rates.values():
+        graphics = pydantic.TypeAdapter(type(scene.graphics))
+        found["graphics"] = graphics.dump_python(
+            scene.graphics, mode="json", exclude_none=True, include={"rate", "align", "phase"}
+        )
+    as_json = partial(pydantic.TypeAdapter(AnyRate).dump_python, mode="json")
+    found["fmu"] = {
+        u.name: {"rate": as_json(rates[u.name]), "timing": u.description.timing}
+        | ({"isolate": True} if u.isolate else {})
+        for u in system.units
+    }
+    found["connection"] = [_row(c) for c in system.connections if c.initial]
+    return found
+
+
+def _row(c: Connection) -> dict[str, str]:
+    return {"from": f"{c.source}.{c.source_port}", "to": f"{c.target}.{c.target_port}"}

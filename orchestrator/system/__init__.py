@@ -1,0 +1,1 @@
+"""FMUs, connections, clocks and holds: what is simulated."""

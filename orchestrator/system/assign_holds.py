@@ -1,0 +1,158 @@
+"""Which hold stands on which connection, and why a default does not.
+
+[holds], [delays] and [kinds] speak of a connection as `source -> target`, by its target's port
+or by its source's port (all connections from there), the most precise first. Without a word of
+its own, a connection from a slower clock takes the scene's `hold`, one from a faster clock its
+`downsampling`, and one between clocks that only a phase parts `zoh`: the newest sample, of which
+nothing is missing; one within a rate holds nothing unless it is named or late. A hold that keeps
+account of energy goes, as a default, to every connection across clocks that carries power.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.scene.records import INTERPOLATING, Latency, PowerPort, Spring
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system import haptic_loop, springs
+from hapticlink.orchestrator.system.haptic_loop import DERIVATIVES, KINDS, UNMIXED
+from hapticlink.orchestrator.system.ports import carries_power, derivative, names
+from hapticlink.orchestrator.system.system import Connection, Refused, Unit
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a scene says of its connections."""
+
+    hold: str = "zoh"
+    downsampling: str = "latest"
+    holds: Mapping[str, str] = field(default_factory=dict)
+    delays: Mapping[str, Latency] = field(default_factory=dict)
+    kinds: Mapping[str, str] = field(default_factory=dict)
+    power: tuple[PowerPort, ...] = ()
+    between_plants: str | None = None
+    """The hold within a rate between plants that are iterated; None where they are not."""
+    springs: tuple[Spring, ...] = ()
+
+
+def assign(
+    units: Iterable[Unit], connections: Iterable[Connection], timeline: Timeline, rules: Rules
+) -> tuple[tuple[Connection, ...], tuple[Refused, ...]]:
+    """The connections with their holds, latencies and kinds, and the holds that were refused."""
+    by_name = {u.name: u for u in units}
+    refused: list[Refused] = []
+    assigned = tuple(_assign(connections, by_name, timeline, rules, refused))
+    assigned = tuple(_with_springs(assigned, by_name, rules, refused))
+    if rules.hold not in {c.hold for c in assigned}:
+        # A default that fits nowhere is a mistake where it needs something that is nowhere.
+        refused = [replace(r, key=r.key or "hold") for r in refused]
+    return assigned, tuple(refused)
+
+
+def _assign(
+    connections: Iterable[Connection],
+    units: Mapping[str, Unit],
+    timeline: Timeline,
+    rules: Rules,
+    refused: list[Refused],
+) -> Iterator[Connection]:
+    for c in connections:
+        if c.initial:
+            yield c
+            continue
+        source, target = (units[n].clock for n in (c.source, c.target))
+        key = next((k for k in names(c) if k in rules.holds), None)
+        latency = next((rules.delays[k] for k in names(c) if k in rules.delays), None)
+        hold = rules.holds[key] if key else c.hold
+        if not key and source != target:
+            longest, other = (timeline.clock(name).longest for name in (source, target))
+            if longest > other or HOLDS[rules.hold].needs == "power":
+                hold = rules.hold
+            else:
+                hold = rules.downsampling if longest < other else "zoh"
+        elif latency and not hold:
+            hold = "zoh"
+        iterated = rules.between_plants if _between_plants(c, units) else None
+        hold = hold or iterated
+        reason = hold and _misfit(hold, c, units, rules.power, iterated is not None)
+        if hold and reason:
+            refused.append(Refused(key, c, hold, reason))
+            hold = "foh" if iterated else "zoh"
+        named = (k for k in names(c) if k in rules.kinds)
+        kind = next((rules.kinds[k] for k in named), KINDS.get(c.source_port))
+        if kind in ("projector", "semidefinite") and round(len(c.inputs) ** 0.5) ** 2 != len(
+            c.inputs
+        ):
+            kind = None
+        yield replace(c, hold=hold, latency=latency, kind=kind if hold else None)
+
+
+def _with_springs(
+    connections: Sequence[Connection],
+    units: Mapping[str, Unit],
+    rules: Rules,
+    refused: list[Refused],
+) -> Iterator[Connection]:
+    """The connections, a hold that needs a spring refused where there is none for it."""
+    for c in connections:
+        needs = HOLDS[c.hold].needs if c.hold else None
+        reason = springs.misfit(c, rules.springs, connections, units) if needs == "spring" else None
+        if c.hold and reason:
+            key = next((k for k in names(c) if k in rules.holds), None)
+            refused.append(Refused(key, c, c.hold, reason))
+            c = replace(c, hold="zoh")
+        yield c
+
+
+def _between_plants(c: Connection, units: Mapping[str, Unit]) -> bool:
+    """Whether two plants of a rate are connected."""
+    source, target = units[c.source], units[c.target]
+    return source.clock == target.clock and not source.sampled and not target.sampled
+
+
+def _misfit(
+    hold: str,
+    c: Connection,
+    units: Mapping[str, Unit],
+    power: Iterable[PowerPort],
+    iterated: bool,
+) -> str | None:
+    """Why a hold cannot stand on a connection."""
+    needs = HOLDS[hold].needs
+    if iterated and hold not in INTERPOLATING:
+        return f"coupling = 'iterated' interpolates here; take one of {', '.join(INTERPOLATING)}"
+    if c.source_port in UNMIXED and not HOLDS[hold].gives_samples:
+        return f"rows of {c.source_port} name bodies, points and normals: between two there is none"
+    if needs == "derivative" and derivative(c, units) is None:
+        known = DERIVATIVES.get(c.source_port, f"der({c.source_port})")
+        return (
+            f"{c.source} does not put out the derivative of {c.source_port} ({known}); "
+            "take 'foh', which makes it from two samples"
+        )
+    if needs == "power" and not carries_power(c, power):
+        return (
+            f"it carries no power that is known: write a [[power]] that pairs the effort "
+            f"{c.target}.{c.target_port} with a displacement (docs/holds.md, Energy), or take "
+            "another hold"
+        )
+    return None
+
+
+def rules_of(scene: Scene, own: Mapping[str, str]) -> Rules:
+    """The rules of `scene`; `own` are holds that a [[connection]] asks for itself, by name."""
+    delays = {
+        key: d if isinstance(d, Latency) else Latency(min=d) for key, d in scene.delays.items()
+    }
+    return Rules(
+        scene.hold,
+        scene.downsampling,
+        {**scene.holds, **own},
+        delays,
+        scene.kinds,
+        (*scene.power, *haptic_loop.BLOCKS),
+        scene.iteration.interpolation if scene.coupling == "iterated" else None,
+        haptic_loop.springs_of(scene),
+    )

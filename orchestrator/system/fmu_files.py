@@ -1,0 +1,47 @@
+"""The FMU files of a scene's blocks, from the cache or built."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hapticlink.fmus.blocks import build_block
+from hapticlink.fmus.errors import FmuError
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.scene.blocks import BlockPlan, blocks
+from hapticlink.orchestrator.scene.scene import Scene
+
+
+def settled(scene: Scene, block: BlockPlan, timeline: Timeline) -> dict[str, Any]:
+    """The settings of a block, with what the timeline says."""
+    if not scene.local_model or block.name != "virtual_mechanism":
+        return block.settings
+    frame = timeline.clock(timeline.of["virtual_environment"])
+    return {**block.settings, "frame_s": timeline.seconds(frame.longest)}
+
+
+def fmu_files(
+    scene: Scene, timeline: Timeline, room: Path, platforms: Sequence[str] = ()
+) -> dict[str, Path]:
+    """Block name -> FMU file, from the cache, or made in `room` where the cache is off.
+
+    platforms are those of native FMUs, this machine's where none is named. Raises InputFault where
+    the settings give no FMU (a loop that does not close).
+    """
+    files = {}
+    for block in blocks(scene):
+        try:
+            files[block.name] = build_block(
+                block.made_by,
+                settled(scene, block, timeline),
+                room / block.name,  # two hands are two files of one name
+                stop_time=scene.duration,
+                step_size=timeline.seconds(timeline.clock(timeline.of[block.name]).longest),
+                packaging=scene.packaging,
+                platforms=platforms,
+            )
+        except FmuError as error:
+            raise InputFault(str(error)) from error
+    return files

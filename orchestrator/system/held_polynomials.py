@@ -1,0 +1,56 @@
+"""Inputs that vary within a step, for an FMU that can interpolate them.
+
+Within a step of width H a hold of degree k is a polynomial, u(t + r H) = sum_j c_j r^j, known from
+its values at k + 1 instants. The FMU gets u(t) by fmi2SetReal and beside it j! c_j / H^j for
+j = 1..k by fmi2SetRealInputDerivatives, both of the beginning of the step (FMI 2.0.5 section
+4.2.1). Accounts of energy take the mean, sum_j c_j / (j + 1). FMI 3.0 has no such call.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from math import factorial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.fmi.capabilities import takes_input_derivatives
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.system.system import Connection, System
+
+Vector = NDArray[np.float64]
+
+
+def degree(system: System, connection: Connection) -> int:
+    """Of what is held for a plant within its step; 0 for a constant, and for matrices that are
+    kept what they are, which is no polynomial."""
+    if not connection.hold or connection.initial or system.unit[connection.target].sampled:
+        return 0
+    if connection.kind in ("projector", "semidefinite"):
+        return 0
+    return HOLDS[connection.hold].degree
+
+
+def order(system: System, connection: Connection) -> int:
+    """The highest derivative that the target of a connection gets with its inputs; 0 for none,
+    as for inputs that are not continuous Reals."""
+    continuous = all(s.type == "Real" and s.variability == "continuous" for s in connection.inputs)
+    taken = continuous and takes_input_derivatives(system.unit[connection.target].description)
+    return degree(system, connection) if taken else 0
+
+
+@cache
+def coefficients(order: int) -> Vector:
+    """(order + 1, order + 1): takes the values at r = 0, 1/order, ..., 1 to c_0, c_1, ..."""
+    instants = np.linspace(0.0, 1.0, order + 1)
+    return np.linalg.inv(np.vander(instants, increasing=True)).astype(np.float64)
+
+
+def split(values: Vector, width: float) -> tuple[Vector, Vector]:
+    """(derivatives, mean): (order, n) of j! c_j / H^j, H = `width` (s), and (n,), from the values
+    (order + 1, n) at equidistant instants of a step, its beginning and end among them."""
+    found = coefficients(len(values) - 1) @ values
+    orders = range(1, len(values))
+    scales = [factorial(j) / width**j for j in orders]
+    shares = [1 / (1 + j) for j in (0, *orders)]
+    return found[1:] * np.array(scales)[:, None], np.array(shares) @ found

@@ -1,0 +1,82 @@
+"""Which connections set a spring-damper within a block, so that a hold may keep its energy in
+check."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+
+from hapticlink.orchestrator.base.faults import Finding
+from hapticlink.orchestrator.fmi.units import SAME
+from hapticlink.orchestrator.scene.records import Spring
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import Connection, Unit
+
+
+def spring(c: Connection, springs: Iterable[Spring]) -> Spring | None:
+    """The spring that a connection sets."""
+    return next((s for s in springs if _end(c) in s.ports), None)
+
+
+def misfit(
+    c: Connection,
+    springs: Iterable[Spring],
+    connections: Collection[Connection],
+    units: Mapping[str, Unit],
+) -> str | None:
+    """Why what a connection sets cannot be kept in check."""
+    found = spring(c, springs)
+    if found is None:
+        return (
+            f"it sets no spring whose energy is known: write a [[spring]] with {_end(c)} as its "
+            "set_position or set_velocity (docs/holds.md, pspm), or take another hold"
+        )
+    fmu, _, name = found.position.partition(".")
+    near = next((k for k in connections if _end(k) == found.position and not k.initial), None)
+    if near is None and not units[fmu].description.port(name, "output"):
+        return f"the near end of its spring, {found.position}, is connected to nothing"
+    if near and (near.hold or units[near.source].clock != units[near.target].clock):
+        return f"{found.position} is held too: the near end of its spring has to be at hand"
+    if any(s.conversion != SAME for k in (c, near) if k for s in k.inputs):
+        return f"a connection to its spring converts units: give them in those of {fmu}"
+    for other in connections:
+        if _end(other) in found.ports and not other.initial and other.hold != c.hold:
+            held = f"held by {other.hold!r}" if other.hold else "not held"
+            return f"{_end(other)} sets the same spring and is {held}: give both {c.hold!r}"
+    return None
+
+
+def unfit(scene: Scene, units: Mapping[str, Unit]) -> Iterator[Finding]:
+    """What [[spring]] says of ports that are not there, or that do not fit together."""
+    for i, s in enumerate(scene.spring):
+        fmu = s.set_position.partition(".")[0]
+        size = _size(s.set_position, units, "input")
+        for end in ("set_position", "position", "set_velocity"):
+            port = getattr(s, end)
+            kinds = ("input", "output") if end == "position" else ("input",)
+            if not port and end == "set_velocity":
+                continue
+            if not (entries := _size(port, units, *kinds)):
+                yield scene.place(("spring", i, end), f"there is no {' or '.join(kinds)} {port}")
+            elif port.partition(".")[0] != fmu:
+                message = f"{port} is not of {fmu}: the ends of a spring are ports of one FMU"
+                yield scene.place(("spring", i, end), message)
+            elif size and entries != size:
+                message = f"{port} has {entries} entries, {s.set_position} {size}"
+                yield scene.place(("spring", i, end), message)
+        for gain in ("stiffness", "damping"):
+            values = getattr(s, gain)
+            if size and len(values) != size and (values or gain == "stiffness"):
+                message = f"{len(values)} gains for the {size} of {s.set_position}"
+                yield scene.place(("spring", i, gain), message)
+            if any(v < 0 for v in values):
+                message = f"{list(values)}: a gain below 0 stores or takes no energy; 0 or more"
+                yield scene.place(("spring", i, gain), message)
+
+
+def _end(c: Connection) -> str:
+    return f"{c.target}.{c.target_port}"
+
+
+def _size(end: str, units: Mapping[str, Unit], *causalities: str) -> int:
+    fmu, _, name = end.partition(".")
+    return len(units[fmu].description.port(name, *causalities)) if fmu in units else 0

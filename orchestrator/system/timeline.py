@@ -1,0 +1,136 @@
+"""The exact timeline of a scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.ticks import (
+    Clock,
+    Timeline,
+    aligned,
+    common_base,
+    exact,
+    listed,
+    periodic,
+    variable,
+)
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.records import AnyRate, VariableRate
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Path
+
+
+def timeline(scene: Scene) -> Timeline:
+    """The clocks that FMUs run at, and `haptics`; the end is the last haptic tick at or before the
+    duration. Raises SceneFault where a rate gives no steps."""
+    haptic = 1 / exact(scene.haptics.rate)
+    steps = math.floor(exact(scene.duration) / haptic)
+    given = clocks(scene)
+    exactly = [p for p in given.paces.values() if not p.on_ticks]
+    spans = [span for p in exactly for span in (_period(p), p.first or _period(p))]
+    base = common_base([*spans, *([exact(scene.step_control.min)] if scene.step_control else [])])
+    a_tick = int(haptic / base)
+    found = []
+    for name, pace in given.paces.items():
+        if not pace.on_ticks:
+            starts = periodic(_period(pace), base, steps * a_tick, pace.first)
+        else:
+            try:
+                starts = tuple(start * a_tick for start in _on_ticks(pace, haptic, steps))
+            except ValueError as error:
+                raise SceneFault(scene.title, [scene.place(pace.path, str(error))]) from error
+        found.append(Clock(name, starts))
+    return Timeline(base, steps * a_tick, tuple(found), given.of)
+
+
+def _period(pace: Pace) -> Fraction:
+    assert isinstance(pace.rate, Fraction)
+    return 1 / pace.rate
+
+
+def _on_ticks(pace: Pace, haptic: Fraction, steps: int) -> Sequence[int]:
+    """Starts of steps on haptic ticks, in those."""
+    if isinstance(pace.rate, VariableRate):
+        low, high, seed = exact(pace.rate.min), exact(pace.rate.max), pace.rate.seed
+        return variable(low, high, seed, haptic, steps)
+    if isinstance(pace.rate, tuple):
+        starts = listed([exact(time) for time in pace.rate], haptic)
+        # A last time that is the end of the run has a row, too.
+        return (*starts, 2 * starts[-1] - starts[-2])
+    return aligned(_period(pace), haptic, steps, pace.first)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """rate: Hz, bounds, or the times (s) at which steps end. first: the end of the first step (s),
+    None where a rate varies. on_ticks: steps end on haptic ticks. path: where the scene says so."""
+
+    rate: Fraction | VariableRate | tuple[float, ...]
+    first: Fraction | None
+    on_ticks: bool
+    path: Path
+
+
+@dataclass(frozen=True)
+class Clocks:
+    """of: the clock of each FMU; paces: of each clock, the haptic one first."""
+
+    of: Mapping[str, str]
+    paces: Mapping[str, Pace]
+
+
+def clocks(scene: Scene) -> Clocks:
+    """The clocks of `scene`: `graphics` and others only where an FMU runs at them."""
+    rates: dict[str, tuple[AnyRate, Path]] = {b.name: (b.rate, ()) for b in blocks(scene)}
+    rates |= {fmu.name: (fmu.rate, ("fmu", i, "rate")) for i, fmu in enumerate(scene.fmu)}
+    found = {fmu: _of(fmu, rate, path, scene) for fmu, (rate, path) in rates.items()}
+    paces = {"haptics": _pace("haptics", (), scene)}
+    for name, pace in sorted(found.values(), key=lambda clock: clock[0] != "graphics"):
+        paces.setdefault(name, pace)
+    return Clocks({fmu: name for fmu, (name, _) in found.items()}, paces)
+
+
+def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> tuple[str, Pace]:
+    """The clock of an FMU and its pace."""
+    name, pace = _name(rate, scene), _pace(rate, path, scene)
+    if fmu not in scene.phases or exact(scene.phases[fmu]) == pace.first:
+        return name, pace
+    first = exact(scene.phases[fmu])
+    return f"{name}_at_{_text(first)}s", replace(pace, first=first, path=("phases", fmu))
+
+
+def _pace(rate: AnyRate, path: Path, scene: Scene) -> Pace:
+    if rate == "haptics":
+        return _pace(scene.haptics.rate, ("haptics", "rate"), scene)
+    if rate == "graphics":
+        assert scene.graphics is not None
+        pace = _pace(scene.graphics.rate, ("graphics", "rate"), scene)
+        phase = scene.graphics.phase
+        first = pace.first if phase is None else exact(phase)
+        return replace(pace, first=first, on_ticks=pace.on_ticks or scene.graphics.align == "tick")
+    if isinstance(rate, VariableRate | tuple):
+        return Pace(rate, None, True, path)
+    return Pace(exact(rate), 1 / exact(rate), False, path)
+
+
+def _name(rate: AnyRate, scene: Scene) -> str:
+    if isinstance(rate, VariableRate):
+        low, high = _text(exact(rate.min)), _text(exact(rate.max))
+        return f"{low}to{high}hz_seed{rate.seed}"
+    if isinstance(rate, tuple):
+        return "times_of_" + next(fmu.name for fmu in scene.fmu if fmu.rate == rate)
+    if rate in ("haptics", "graphics"):
+        return str(rate)
+    if exact(rate) == exact(scene.haptics.rate):
+        return "haptics"
+    return f"{_text(exact(rate))}hz"
+
+
+def _text(number: Fraction) -> str:
+    """One text for each number, fit for a file's name: 0.0005, 30000_1001."""
+    short = f"{float(number):.12g}"
+    return short if exact(short) == number else f"{number.numerator}_{number.denominator}"
