@@ -11,7 +11,7 @@ lost to rounding in a mechanism far from the origin):
     D a            A_i = X_i A_parent + S_i a_i, then leaf to root  f_parent += X_i' f_i,
                    f_i += I_i A_i,  b_i = S_i' f_i
 
-    D^-1 = outward d^-1 inward, and outward is the transpose of inward
+    D^-1 = outward diag(d)^-1 inward, and outward is the transpose of inward
 
 The same D as (2.10): a serial chain of n links costs O(n), where D itself has n^2 entries.
 """
@@ -23,7 +23,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from hapticlink.components.dynamics.light_bodies import added_inertia
 from hapticlink.components.linkage.model import LinkageModel
+
+FLOOR = 1e-20  # of what a light coordinate gets beside it, for one that is massless
 
 
 @dataclass(frozen=True)
@@ -90,24 +93,25 @@ class TreeInertia:
         self.n = model.q.numel()
         self._tree = _coordinates(model, extra or {})
         articulated = [c.inertia for c in self._tree]
-        # U/d, and 1/d in the order of q.
+        self.k = added_inertia(model, model.W)
+        # U/d, and d in the order of q; what is massless has no U either.
         self._gain: list[ca.SX] = [ca.SX(3, 1)] * self.n
-        d_inv: list[ca.SX] = [ca.SX(0)] * self.n
+        d = [FLOOR * self.k[i] for i in range(self.n)]
         for i in reversed(range(self.n)):
             c = self._tree[i]
             U = articulated[i] @ c.S
-            d_inv[c.index] = 1 / ca.dot(c.S, U)
-            self._gain[i] = U * d_inv[c.index]
+            d[c.index] += ca.dot(c.S, U)
+            self._gain[i] = U / d[c.index]
             if c.parent is not None:
                 rest = _across(c.S, symmetric(articulated[i] - self._gain[i] @ U.T))
                 rest = _across(c.S, rest.T)
                 articulated[c.parent] += symmetric(c.X.T @ rest @ c.X)
-        self.d_inv = ca.vertcat(*d_inv)
+        self.d = ca.vertcat(*d)
 
     def solve(self, b: ca.SX) -> ca.SX:
         """a with D a = b."""
         u = self.inward(b)
-        return self.outward(u * ca.repmat(self.d_inv, 1, b.shape[1]))
+        return self.outward(ca.diag(1 / self.d) @ u)
 
     def inward(self, b: ca.SX) -> ca.SX:
         """Efforts left at each coordinate when those farther out move freely, n x r."""

@@ -37,10 +37,13 @@ PROXIMAL_STEPS = 2
 
 
 class Inertia(Protocol):
-    """D as an operator on n x r columns, D^-1 = outward d_inv inward with outward = inward'."""
+    """D as an operator on n x r columns, D^-1 = outward diag(d)^-1 inward with outward = inward'.
+
+    k (n x 1) is added to d in the metric of the closures; it has entries for light bodies alone."""
 
     n: int
-    d_inv: ca.SX
+    d: ca.SX
+    k: ca.SX
 
     def inward(self, b: ca.SX) -> ca.SX: ...
 
@@ -52,7 +55,7 @@ class UnitInertia:
 
     def __init__(self, n: int) -> None:
         self.n = n
-        self.d_inv = ca.SX.ones(n)
+        self.d, self.k = ca.SX.ones(n), ca.SX(n, 1)
 
     def inward(self, b: ca.SX) -> ca.SX:
         return b
@@ -70,15 +73,22 @@ def loop_scale(S: ca.SX) -> ca.SX:
     return ca.vertcat(*(ca.repmat(scale, pair.numel()) for pair, scale in scales))
 
 
-class Regularised:
+class Factored:
+    """L diag(d) L' of a symmetric matrix, without pivoting."""
+
+    def __init__(self, A: ca.SX) -> None:
+        self.d, self.upper, self.order = ca.ldl(ca.sparsify(A), False)
+
+    def solve(self, b: ca.SX) -> ca.SX:
+        return ca.ldl_solve(b, self.d, self.upper, self.order)
+
+
+class Regularised(Factored):
     """S + diag(shift) for a symmetric, positive semi-definite S."""
 
     def __init__(self, S: ca.SX, shift: ca.SX) -> None:
         self.shift = ca.diag(shift)
-        self.d, self.upper, self.order = ca.ldl(ca.sparsify(S + self.shift), False)
-
-    def solve(self, b: ca.SX) -> ca.SX:
-        return ca.ldl_solve(b, self.d, self.upper, self.order)
+        super().__init__(S + self.shift)
 
     def proximal(self, b: ca.SX) -> ca.SX:
         """S y = b with mu taken out: S_mu y_{k+1} = b + mu y_k (Parikh & Boyd, Proximal
@@ -93,17 +103,36 @@ class ClosedLoopSolver:
     """Factors of D and W (m x n); m = 0 leaves D^-1 alone."""
 
     def __init__(self, inertia: Inertia, W: ca.SX, mu: float = MU) -> None:
-        self.inertia, self.W = inertia, W
-        self.m = W.shape[0]
+        self.inertia, self.W, self.m = inertia, W, W.shape[0]
+        self._d_inv = ca.diag(1 / (inertia.d + inertia.k))
+        self._light = inertia.k.sparsity().row()
         if self.m:
             self._Z = inertia.inward(W.T)
-            self._Y = ca.diag(inertia.d_inv) @ self._Z
+            self._Y = self._d_inv @ self._Z
             self.S = symmetric(self._Z.T @ self._Y)
             self._sharp = Regularised(self.S, mu * loop_scale(self.S))
 
     @cached_property
     def _following(self) -> Regularised:
         return Regularised(self.S, MU_FOLLOWING * loop_scale(self.S))
+
+    @cached_property
+    def _left_free(self) -> Factored:
+        """Inertia of the light coordinates with the loops closed."""
+        d, k, Z = (v[self._light, :] for v in (self.inertia.d, self.inertia.k, self._Z))
+        return Factored(symmetric(ca.diag(d * (d + k) / k) + Z @ self._sharp.solve(Z.T)))
+
+    def _closed(self, beta: ca.SX, c: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """(v, lambda) with d u - Z lambda = beta and Z' u = c for u = v + Y lambda."""
+        light, Z = self._light, self._Z
+        v = self._d_inv @ beta
+        y = self._sharp.solve(c - Z.T @ v)
+        if light:
+            w = ca.SX(*beta.shape)
+            w[light, :] = self._left_free.solve(beta[light, :] + Z[light, :] @ y)
+            v += w
+            y = self._sharp.solve(c - Z.T @ v)
+        return v, y
 
     def _shortest(self, multipliers: ca.SX) -> ca.SX:
         """Their part in the range of W, which columns of unit length leave free of units and
@@ -115,26 +144,27 @@ class ClosedLoopSolver:
 
     def solve(self, b: ca.SX, c: ca.SX) -> tuple[ca.SX, ca.SX]:
         """(a, lambda), lambda of least norm, for right-hand sides b (n x r) and c (m x r)."""
-        free = self._free(b)
+        inertia, beta = self.inertia, self.inertia.inward(b)
         if not self.m:
-            return self.inertia.outward(free), ca.SX(0, b.shape[1])
-        first = self._sharp.solve(c - self._Z.T @ free)
-        a = self.inertia.outward(free + self._Y @ first)
-        left = self._sharp.solve(c - self.W @ a)
-        return a + self.inertia.outward(self._Y @ left), self._shortest(first + left)
+            return inertia.outward(self._d_inv @ beta), ca.SX(0, b.shape[1])
+        v, first = self._closed(beta, c)
+        u = v + self._Y @ first
+        a, rest = inertia.outward(u), ca.SX(*beta.shape)
+        for i in self._light:
+            rest[i, :] = beta[i, :] + self._Z[i, :] @ first - inertia.d[i] * u[i, :]
+        v, second = self._closed(rest, c - self.W @ a)
+        return a + inertia.outward(v + self._Y @ second), self._shortest(first + second)
 
     def follow(self, b: ca.SX, c: ca.SX) -> ca.SX:
         """a as in `solve`, unrefined, for rates that are near the branch: n x r."""
-        free = self._free(b)
-        if self.m:
-            taken = self._sharp.solve(-(self._Z.T @ free))
-            free = free + self._Y @ (taken + self._following.proximal(c))
-        return self.inertia.outward(free)
+        inertia, beta = self.inertia, self.inertia.inward(b)
+        if not self.m:
+            return inertia.outward(self._d_inv @ beta)
+        particular = self._following.proximal(c)
+        v, taken = self._closed(beta + ca.diag(inertia.k) @ (self._Y @ particular), ca.SX(*c.shape))
+        return inertia.outward(v + self._Y @ (taken + particular))
 
     def constrain(self, c: ca.SX) -> ca.SX:
-        """The least change a (in the metric D) with W a = c, unrefined: for iterations that
-        correct themselves."""
+        """The least change a, in the metric of d + k, with W a = c, unrefined: for iterations
+        that correct themselves."""
         return self.inertia.outward(self._Y @ self._sharp.solve(c))
-
-    def _free(self, b: ca.SX) -> ca.SX:
-        return ca.diag(self.inertia.d_inv) @ self.inertia.inward(b)

@@ -16,7 +16,9 @@ import casadi as ca
 
 from hapticlink.components import forces
 from hapticlink.components.component import Signals, Variable
+from hapticlink.components.dynamics.articulated_body import FLOOR
 from hapticlink.components.dynamics.assembly import assemble
+from hapticlink.components.dynamics.light_bodies import added_inertia
 from hapticlink.components.dynamics.operational_space import Terms
 from hapticlink.components.dynamics.variables import parameters, start_parameters
 from hapticlink.components.integrators.base import Baumgarte
@@ -71,36 +73,38 @@ def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
 
 
 class DenseInertia:
-    """D from its entries: D = L d L', so D^-1 = L'^-1 d^-1 L^-1."""
+    """D from its entries, eliminated in an order (leaf to root, as in articulated_body.py):
+    D = L diag(d) L', so D^-1 = L'^-1 diag(d)^-1 L^-1. k: n x 1 (light_bodies.py)."""
 
-    def __init__(self, D: ca.SX) -> None:
-        self.n = D.shape[0]
-        d, upper, _ = ca.ldl(D, False)
-        self.d_inv = 1 / d
+    def __init__(self, D: ca.SX, k: ca.SX, order: list[int]) -> None:
+        self.n, self.k, self._order = D.shape[0], k, order
+        d, upper, _ = ca.ldl((D + FLOOR * ca.diag(k))[order, order], False)
+        self._back = sorted(range(self.n), key=order.__getitem__)
+        self.d = ca.vec(d)[self._back]
         self._L = upper.T + ca.SX.eye(self.n)
 
     def inward(self, b: ca.SX) -> ca.SX:
         rows: list[ca.SX] = []
-        for i in range(self.n):
-            rows.append(
-                b[i, :] - sum((self._L[i, j] * rows[j] for j in range(i)), start=0 * b[i, :])
-            )
-        return ca.vertcat(*rows)
+        for i, given in enumerate(self._order):
+            known = sum((self._L[i, j] * rows[j] for j in range(i)), start=0 * b[given, :])
+            rows.append(b[given, :] - known)
+        return ca.vertcat(*rows)[self._back, :]
 
     def outward(self, u: ca.SX) -> ca.SX:
-        rows = [u[i, :] for i in range(self.n)]
+        rows = [u[given, :] for given in self._order]
         for i in reversed(range(self.n)):
             for j in range(i + 1, self.n):
                 rows[i] = rows[i] - self._L[j, i] * rows[j]
-        return ca.vertcat(*rows)
+        return ca.vertcat(*rows)[self._back, :]
 
 
 def held(model: LinkageModel, u: Mapping[str, ca.SX]) -> Terms:
     """The terms of (B.15) from the ports `u`."""
     n, loop = model.q.numel(), bool(model.linkage.loop)
+    W = u["W"] if loop else ca.SX(0, n)
     return Terms(
-        inertia=DenseInertia(u["D"]),
-        W=u["W"] if loop else ca.SX(0, n),
+        inertia=DenseInertia(u["D"], added_inertia(model, W), model.leaf_to_root),
+        W=W,
         w=u["w"] if loop else ca.SX(0, 1),
         J_h=u["J_h"],
         Jdot_qd=ca.SX(3, 1),

@@ -63,10 +63,10 @@ class OperationalSpace:
 
     @cached_property
     def open_mobility(self) -> ca.SX:
-        """J_h D^-1 J_h' of the linkage with its loops open, 3 x 3."""
+        """J_h D^-1 J_h' of the linkage with its loops open and no body light, 3 x 3."""
         inertia = self.terms.inertia
         passed = inertia.inward(self.terms.J_h.T)
-        return passed.T @ ca.diag(inertia.d_inv) @ passed
+        return passed.T @ ca.diag(1 / (inertia.d + inertia.k)) @ passed
 
     @cached_property
     def a_bias(self) -> ca.SX:

@@ -82,6 +82,14 @@ class LinkageModel:
         return order
 
     @cached_property
+    def leaf_to_root(self) -> list[int]:
+        """The coordinates, each after those of the joints that stand on it."""
+        outward = [
+            self.coordinate(j.name) + k for j in self.outward for k in range(COORDINATES[j.type])
+        ]
+        return outward[::-1]
+
+    @cached_property
     def frames(self) -> dict[str, Frame]:
         """World frame of every body, from the ground outward."""
         frames = {"ground": Frame.at(ca.SX(2, 1), ca.SX(0))}

@@ -13,7 +13,7 @@ class DenseInertia:
     """D as a matrix, D^-1 = L^-T L^-1 by Cholesky."""
 
     def __init__(self, D):
-        self.n, self.d_inv = D.shape[0], ca.SX.ones(D.shape[0])
+        self.n, self.d, self.k = D.shape[0], ca.SX.ones(D.shape[0]), ca.SX(D.shape[0], 1)
         self.L_inv = ca.inv(ca.chol(D).T)
 
     def inward(self, b):

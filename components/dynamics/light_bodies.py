@@ -1,0 +1,75 @@
+"""Bodies far lighter than those that their loops link them to, down to zero mass.
+
+A light body that its loops leave no freedom follows the others, and its mass hardly matters; yet in
+S = W D^-1 W' there is nothing else to be seen. In the metric that closures are solved in
+(closed_loop_solver.py) a coordinate whose own body has next to no inertia therefore gets more,
+
+    k = M  (sliding)  or  M a^2  (turning),     M = mean m + mean I / a^2
+
+means over the bodies that its loops move, a^2 that of the turning columns of W, the loops' arms.
+Linkages that share no loop do not feel each other. Which coordinates are light is settled by the
+scene's masses; how light, by the FMU's.
+"""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import UNITS, mean_link_length
+from hapticlink.components.specs.linkage import Body, Joint, Linkage
+
+LIGHT = 1e-2  # of the mean
+
+
+def groups(linkage: Linkage) -> list[list[Joint]]:
+    """The joints of loops that share any; each joint of a loop is in one group."""
+    found: list[set[str]] = []
+    for loop in linkage.loop:
+        cycle = _way(linkage, loop.bodies[0]) ^ _way(linkage, loop.bodies[1])
+        shared = [group for group in found if group & cycle]
+        found = [group for group in found if not group & cycle] + [cycle.union(*shared)]
+    return [[j for j in linkage.joint if j.name in group] for group in found]
+
+
+def _way(linkage: Linkage, body: str) -> set[str]:
+    """Joints from the ground to a body."""
+    joints = {j.child: j for j in linkage.joint}
+    way: set[str] = set()
+    while body != "ground":
+        way.add(joints[body].name)
+        body = joints[body].parent
+    return way
+
+
+def _own(joint: Joint, body: Body) -> list[float]:
+    """The least inertia that a body leaves at each coordinate of its joint, kg or kg.m2."""
+    arm = math.dist(body.center or (0.0, 0.0), joint.at_child or (0.0, 0.0))
+    turning = body.inertia + body.mass * arm**2
+    if joint.type == "free":
+        sliding = body.mass * body.inertia / turning if turning else 0.0
+        return [sliding, sliding, turning]
+    return [turning if joint.type == "revolute" else body.mass]
+
+
+def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
+    """k, n x 1, with an entry for each light coordinate alone; kg or kg.m2."""
+    linkage, p, k = model.linkage, model.p, ca.SX(W.shape[1], 1)
+    bodies, length = {b.name: b for b in linkage.body}, mean_link_length(linkage)
+    for group in groups(linkage):
+        names = {j.name for j in group}
+        moved = [b for b in linkage.body if names & _way(linkage, b.name)]
+        mean = sum(b.mass + b.inertia / length**2 for b in moved) / len(moved)
+        turning, light = [], []
+        for joint in group:
+            for i, own in enumerate(_own(joint, bodies[joint.child])):
+                index, turns = model.coordinate(joint.name) + i, UNITS[joint.type][i] == "rad"
+                turning += [index] if turns else []
+                light += [index] if own < LIGHT * mean * (length**2 if turns else 1) else []
+        arm = ca.sumsqr(W[:, turning]) / len(turning) if turning else ca.SX(1)
+        M = sum(p[f"{b.name}.mass"] + p[f"{b.name}.inertia"] / arm for b in moved) / len(moved)
+        for index in light:
+            k[index] = M * arm if index in turning else M
+    return k
