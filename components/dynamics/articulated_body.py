@@ -26,7 +26,7 @@ import casadi as ca
 from hapticlink.components.dynamics.light_bodies import added_inertia
 from hapticlink.components.linkage.model import LinkageModel
 
-FLOOR = 1e-20  # of what a light coordinate gets beside it, for one that is massless
+FLOOR = 1e-40  # of what a light coordinate gets beside it: massless, it has a D^-1 too
 
 
 @dataclass(frozen=True)

@@ -147,13 +147,20 @@ class ClosedLoopSolver:
         inertia, beta = self.inertia, self.inertia.inward(b)
         if not self.m:
             return inertia.outward(self._d_inv @ beta), ca.SX(0, b.shape[1])
-        v, first = self._closed(beta, c)
-        u = v + self._Y @ first
-        a, rest = inertia.outward(u), ca.SX(*beta.shape)
-        for i in self._light:
-            rest[i, :] = beta[i, :] + self._Z[i, :] @ first - inertia.d[i] * u[i, :]
-        v, second = self._closed(rest, c - self.W @ a)
-        return a + inertia.outward(v + self._Y @ second), self._shortest(first + second)
+        v, y = self._closed(beta, c)
+        u = v + self._Y @ y
+        a = inertia.outward(u)
+        # What the closures miss, then what the light coordinates' efforts miss, is solved again.
+        none = ca.SX(*beta.shape)
+        v, also = self._closed(none, c - self.W @ a)
+        more, y = v + self._Y @ also, y + also
+        if self._light:
+            u, missed = u + more, none
+            for i in self._light:
+                missed[i, :] = beta[i, :] + self._Z[i, :] @ y - inertia.d[i] * u[i, :]
+            v, also = self._closed(missed, ca.SX(*c.shape))
+            more, y = more + v + self._Y @ also, y + also
+        return a + inertia.outward(more), self._shortest(y)
 
     def follow(self, b: ca.SX, c: ca.SX) -> ca.SX:
         """a as in `solve`, unrefined, for rates that are near the branch: n x r."""
@@ -161,8 +168,9 @@ class ClosedLoopSolver:
         if not self.m:
             return inertia.outward(self._d_inv @ beta)
         particular = self._following.proximal(c)
-        v, taken = self._closed(beta + ca.diag(inertia.k) @ (self._Y @ particular), ca.SX(*c.shape))
-        return inertia.outward(v + self._Y @ (taken + particular))
+        taken_back = ca.diag(inertia.k) @ (self._Y @ particular)
+        v, y = self._closed(beta + taken_back, ca.SX(*c.shape))
+        return inertia.outward(v + self._Y @ (y + particular))
 
     def constrain(self, c: ca.SX) -> ca.SX:
         """The least change a, in the metric of d + k, with W a = c, unrefined: for iterations
