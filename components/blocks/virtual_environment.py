@@ -25,6 +25,7 @@ from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_closed
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.constrained_directions import resisted_directions
+from hapticlink.components.dynamics.massless_bodies import require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.projection import MU, projection
 from hapticlink.components.dynamics.variables import (
@@ -55,7 +56,7 @@ def virtual_environment(
     """The FMU `virtual_environment`, of what is asked: `mobility` is Lambda_inv, `directions` P_c
     and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h (B.15).
 
-    Raises AssemblyError where a loop does not close.
+    Raises AssemblyError where a loop does not close, MasslessError where a massless body is free.
     """
     joint_sync = copy.sync == "joint"
     if contacts and not contact_forces.places(linkage, contacts):
@@ -120,6 +121,7 @@ def virtual_environment(
         documentation=__doc__ or "",
     )
     require_closed(component, model)
+    require_inertia(component, model)
     return component
 
 

@@ -22,6 +22,7 @@ from hapticlink.components.dynamics import closure_diagnostics, further_points, 
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_closed
 from hapticlink.components.dynamics.constrained_directions import resisted_directions
+from hapticlink.components.dynamics.massless_bodies import require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.dynamics.variables import (
@@ -56,7 +57,8 @@ def virtual_mechanism(
 
     step_s (s), the communication step, sets the default Baumgarte alpha; length_scale (m) makes
     rotations comparable where `directions` does not say so. Raises AssemblyError where a loop
-    does not close, ValueError for an unknown method, and for a formulation that does not fit.
+    does not close, MasslessError where a massless body is free, ValueError for an unknown method,
+    and for a formulation that does not fit.
     """
     method = integrators.METHODS.get(mechanism.integrator)
     if method is None:
@@ -124,6 +126,7 @@ def virtual_mechanism(
         shared=not frame_s,
     )
     require_closed(component, model)
+    require_inertia(component, model)
     return component
 
 

@@ -94,13 +94,13 @@ class TreeInertia:
         self._tree = _coordinates(model, extra or {})
         articulated = [c.inertia for c in self._tree]
         self.k = added_inertia(model, model.W)
-        # U/d, and d in the order of q; what is massless has no U either.
+        # U/d, and d in the order of q.
         self._gain: list[ca.SX] = [ca.SX(3, 1)] * self.n
-        d = [FLOOR * self.k[i] for i in range(self.n)]
+        d: list[ca.SX] = [ca.SX(0)] * self.n
         for i in reversed(range(self.n)):
             c = self._tree[i]
-            U = articulated[i] @ c.S
-            d[c.index] += ca.dot(c.S, U)
+            U = articulated[i] @ c.S + FLOOR * self.k[c.index] * c.S
+            d[c.index] = ca.dot(c.S, U)
             self._gain[i] = U / d[c.index]
             if c.parent is not None:
                 rest = _across(c.S, symmetric(articulated[i] - self._gain[i] @ U.T))

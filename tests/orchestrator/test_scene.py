@@ -69,7 +69,7 @@ def test_all_faults_at_once_with_line_and_remedy() -> None:
     [
         ('body = "bar", at', 'body = "rod", at', "linkage.operational_point.body", "no body 'rod'"),
         ("start.pivot", "start.pvot", "linkage.start.pvot", "did you mean 'pivot'"),
-        ("mass = 1.0", "mass = -1.0", "linkage.body[0] (bar).mass", "more than 0"),
+        ("mass = 1.0", "mass = -1.0", "linkage.body[0] (bar).mass", "0 or more"),
         ("mass = 1.0", "mass = inf", "linkage.body[0] (bar).mass", "finite"),
         ("[device]\n", "", "controller", "add [device]"),
         ("[graphics]\nrate = 30\n", "", "directions_from", "add [graphics]"),

@@ -19,8 +19,8 @@ def check(linkage: Linkage) -> Iterator[Problem]:
         path: Path = (*here, "body", i)
         if body.name in frames[: i + 1]:
             yield (*path, "name"), f"{body.name!r} is taken: name each body once, none 'ground'"
-        if body.mass <= 0:
-            yield (*path, "mass"), f"{body.mass} kg: a mass is more than 0"
+        if body.mass < 0:
+            yield (*path, "mass"), f"{body.mass} kg: a mass is 0 or more"
         if body.inertia < 0:
             yield (*path, "inertia"), f"{body.inertia} kg.m2: an inertia is 0 or more"
     yield from _tree(linkage, frames)
