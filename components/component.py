@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -132,7 +132,8 @@ def pack(variables: Iterable[Variable], values: Mapping[str, ca.SX]) -> ca.SX:
 
 @dataclass(frozen=True)
 class Component:
-    """An immutable block. `step` is called `substeps` times for each communication step."""
+    """An immutable block. `step` is called `substeps` times for each communication step;
+    state_notes say, by its name, what a state that is not finite means."""
 
     name: str
     description: str
@@ -146,6 +147,14 @@ class Component:
     output: ca.Function
     substeps: int = 1
     documentation: str = ""
+    state_notes: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def state_texts(self) -> tuple[str, ...]:
+        """Names of the states, with what it means where one is not finite."""
+        names = (name for v in self.states for name in v.names)
+        notes = self.state_notes
+        return tuple(f"{name} ({notes[name]})" if name in notes else name for name in names)
 
     @cached_property
     def start_parameters(self) -> tuple[float, ...]:
@@ -191,6 +200,7 @@ class Block:
         output: Mapping[str, ca.SX],
         substeps: int = 1,
         documentation: str = "",
+        state_notes: Mapping[str, str] | None = None,
         shared: bool = False,
     ) -> Component:
         """step and output are expressions in this block's symbols; initial in u and p only.
@@ -225,4 +235,5 @@ class Block:
             ),
             substeps=substeps,
             documentation=documentation,
+            state_notes=state_notes or {},
         )

@@ -139,7 +139,7 @@ def _about(component: Component) -> dict[str, object]:
         "names": _names((*component.inputs, *component.parameters, *component.outputs)),
         "starts": [*component.start_inputs, *component.start_parameters],
         "fixed": [vr for vr, kind in enumerate(variability) if kind == "fixed"],
-        "states": _names(component.states),
+        "states": component.state_texts,
         "n_inputs": len(component.start_inputs),
         "n_parameters": len(component.start_parameters),
         "n_outputs": sum(v.size for v in component.outputs),

@@ -22,7 +22,7 @@ from hapticlink.components.dynamics import closure_diagnostics, further_points, 
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_closed
 from hapticlink.components.dynamics.constrained_directions import resisted_directions
-from hapticlink.components.dynamics.massless_bodies import require_inertia
+from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.dynamics.variables import (
@@ -107,9 +107,9 @@ def virtual_mechanism(
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
-    stepped = _step(block, model, mechanism, applied, space)
+    q1, qd1 = ca.vertsplit(_step(block, model, mechanism, applied, space), model.q.numel())
+    stepped = ca.vertcat(carried(model, q1, qd1, block.h), qd1)
     if directions:
-        q1 = stepped[: model.q.numel()]
         resisted = resisted_directions(block, space, q0, q1)
         initial["n_resisted"] = resisted.first
         stepped = ca.vertcat(stepped, resisted.after)
@@ -122,6 +122,7 @@ def virtual_mechanism(
         step=stepped,
         output=output,
         substeps=mechanism.substeps,
+        state_notes=notes(model),
         documentation=__doc__ or "",
         shared=not frame_s,
     )
@@ -210,6 +211,5 @@ def _step(
     if mechanism.stabilization == "projection":
         own = space.terms.inertia
         project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))
-        q1, qd1 = project(after[:n], after[n:], p)
-        after = ca.vertcat(q1, qd1)
+        after = ca.vertcat(*project(after[:n], after[n:], p))
     return after

@@ -44,7 +44,7 @@ def _way(linkage: Linkage, body: str) -> set[str]:
     return way
 
 
-def _own(joint: Joint, body: Body) -> list[float]:
+def own_inertia(joint: Joint, body: Body) -> list[float]:
     """The least inertia that a body leaves at each coordinate of its joint, kg or kg.m2."""
     arm = math.dist(body.center or (0.0, 0.0), joint.at_child or (0.0, 0.0))
     turning = body.inertia + body.mass * arm**2
@@ -64,7 +64,7 @@ def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
         mean = sum(b.mass + b.inertia / length**2 for b in moved) / len(moved)
         turning, light = [], []
         for joint in group:
-            for i, own in enumerate(_own(joint, bodies[joint.child])):
+            for i, own in enumerate(own_inertia(joint, bodies[joint.child])):
                 index, turns = model.coordinate(joint.name) + i, UNITS[joint.type][i] == "rad"
                 turning += [index] if turns else []
                 light += [index] if own < LIGHT * mean * (length**2 if turns else 1) else []

@@ -1,8 +1,11 @@
-"""Massless bodies: refused where they could move with nothing that has mass.
+"""Massless bodies: refused at a start pose where one can move and nothing that has mass with it,
+and told where the loops lead to such a pose.
 
 With M^ the masses and inertias of the scene, each of one size or zero, J of all bodies and N a
 basis of null(W), N' J' M^ J N is singular where D is on the closed loops, and nowhere else: how
-light the others are does not matter.
+light the others are does not matter. Near such a pose rates grow without bound (a massless crank
+whose rocker has come to its end), so no step can pass it: a massless coordinate that turns by more
+than 1 rad in a step, or slides by more than the mean link length, ends the run.
 """
 
 from __future__ import annotations
@@ -12,8 +15,9 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 
 from hapticlink.components.component import Component
+from hapticlink.components.dynamics.light_bodies import groups, own_inertia
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.linkage.parameters import UNITS, mean_link_length
 
 SINGULAR = 1e-10  # of the same with mass and inertia everywhere
 
@@ -46,3 +50,34 @@ def require_inertia(component: Component, model: LinkageModel) -> None:
             f"body `{body.name}` has {what} 0, and from the start pose it can move without moving "
             f"anything that has: give it {what}, or loops that leave it no freedom of its own"
         )
+
+
+def massless_coordinates(model: LinkageModel) -> dict[int, tuple[str, float]]:
+    """Of loops, by index in q: the body, and the most that one step may move it, rad or m."""
+    bodies = {b.name: b for b in model.linkage.body}
+    most = {"rad": 1.0, "m": mean_link_length(model.linkage)}
+    return {
+        model.coordinate(joint.name) + i: (joint.child, most[unit])
+        for group in groups(model.linkage)
+        for joint in group
+        for i, (unit, own) in enumerate(
+            zip(UNITS[joint.type], own_inertia(joint, bodies[joint.child]), strict=True)
+        )
+        if own == 0
+    }
+
+
+def carried(model: LinkageModel, q: ca.SX, qd: ca.SX, h: ca.SX) -> ca.SX:
+    """q, with no finite value where a massless coordinate moves too far in h."""
+    q = ca.SX(q)
+    for i, (_, most) in massless_coordinates(model).items():
+        q[i] = q[i] / (ca.fabs(h * qd[i]) < most)
+    return q
+
+
+def notes(model: LinkageModel) -> dict[str, str]:
+    """What a state that is not finite means, by its name."""
+    return {
+        f"q[{i + 1}]": f"massless body `{body}`, which its loops no longer carry"
+        for i, (body, _) in massless_coordinates(model).items()
+    }

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 import casadi as ca
 
-from hapticlink.components.component import Component, Variable
+from hapticlink.components.component import Component
 
 
 def component_header(component: Component) -> str:
@@ -21,6 +21,7 @@ def component_header(component: Component) -> str:
     fixed = [False] * len(component.start_inputs)
     fixed += [v.variability == "fixed" for v in component.parameters for _ in v.names]
     starts = (*component.start_inputs, *component.start_parameters)
+    names = (name for v in (*settable, *component.outputs) for name in v.names)
     sizes = {
         "N_U": len(component.start_inputs),
         "N_P": len(component.start_parameters),
@@ -32,8 +33,11 @@ def component_header(component: Component) -> str:
     return "\n".join(
         [
             *(f"#define {name} {value}" for name, value in sizes.items()),
-            _table("char *const names", _texts((*settable, *component.outputs))),
-            _table("char *const state_names", _texts(component.states)),
+            _table(
+                "char *const names",
+                _texts(names),
+            ),
+            _table("char *const state_names", _texts(component.state_texts)),
             _table("double starts", map(_number, starts)),
             _table("char is_fixed", (str(int(flag)) for flag in fixed)),
             functions((component.initialize, component.step, component.output)),
@@ -46,9 +50,9 @@ def _table(declared: str, entries: Iterable[str]) -> str:
     return f"static const {declared}[] = {{{', '.join([*entries, '0'])}}};"
 
 
-def _texts(variables: Iterable[Variable]) -> Iterable[str]:
+def _texts(names: Iterable[str]) -> Iterable[str]:
     """A percent sign is doubled: FMI's logger takes a message for a format (section 2.1.5)."""
-    return (json.dumps(name.replace("%", "%%")) for v in variables for name in v.names)
+    return (json.dumps(name.replace("%", "%%")) for name in names)
 
 
 def _number(value: float) -> str:
