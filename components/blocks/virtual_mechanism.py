@@ -211,5 +211,6 @@ def _step(
     if mechanism.stabilization == "projection":
         own = space.terms.inertia
         project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))
-        after = ca.vertcat(*project(after[:n], after[n:], p))
+        q1, qd1 = project(after[:n], after[n:], p)
+        after = ca.vertcat(q1, qd1)
     return after
