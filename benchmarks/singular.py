@@ -2,7 +2,8 @@
 
 N-four-bar (IFToMM A02) of two windows, its ground line turned off the axes of the frame, under
 projection: the tip after 10 s against the closed form, at every seventh rate from 400 to 2400 Hz,
-with one mu for all right-hand sides and with each its own (`components/dynamics/closed_loop_solver.py`).
+with one mu for all right-hand sides and with each its own
+(`components/dynamics/closed_loop_solver.py`).
 """
 
 from __future__ import annotations

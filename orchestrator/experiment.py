@@ -67,7 +67,7 @@ def simulate(
         folders.clear(folders.made(folder))
         story = _story(read, system, options) | {"delays": {k: asdict(v) for k, v in ages.items()}}
         write_json(folder / "run.json", story | {"end": {"reason": "running"}}, ROOM)
-        alone = isolated(system.units)
+        alone = isolated(system.fmus)
         risky = any(fmu.name not in alone for fmu in read.fmu)
         with crash_monitor.beside(folder) if risky else nullcontext():
             outcome = run(plan, folder, progress)

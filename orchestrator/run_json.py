@@ -44,7 +44,7 @@ def holds(system: System) -> dict[str, Any]:
         },
         "held_as": {c.name: c.kind for c in held if c.kind},
         "latencies": {c.name: asdict(c.latency) for c in held if c.latency},
-        "substeps": {u.name: system.substeps.get(u.name, 1) for u in system.units if not u.sampled},
+        "substeps": {u.name: system.substeps.get(u.name, 1) for u in system.fmus if not u.sampled},
         "within_a_step": within_a_step(system),
         "get_after_set": list(system.get_after_set),
         "causal": system.coupling in CAUSAL,
@@ -76,7 +76,7 @@ def power_across_rates(system: System) -> list[str]:
         c.name
         for c in system.connections
         if carries_power(c, system.power)
-        and system.unit[c.source].clock != system.unit[c.target].clock
+        and system.fmu[c.source].clock != system.fmu[c.target].clock
     ]
 
 
@@ -102,7 +102,7 @@ def _story(scene: Scene, system: System, options: Sequence[str]) -> dict[str, An
         "rates": [c.name for c in system.timeline.clocks],
         "clocks": clocks(system.timeline),
         "base": f"{base.numerator}/{base.denominator} s",
-        "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.units},
+        "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.fmus},
         "coupling": system.coupling,
         "loops": [asdict(loop) for loop in dependency_order.loops(system)],
         "connections": [c.name for c in system.connections],

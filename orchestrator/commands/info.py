@@ -40,9 +40,9 @@ def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
     print(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
     for line in summary.moved(asdict(read.linkage), start) if read.linkage and start else ():
         print(f"  {line}")
-    for unit in made.units:
-        timing = unit.description.timing
-        print(f"  {unit.name}: {timing}, at {unit.clock}, {len(unit.description.outputs)} outputs")
+    for fmu in made.fmus:
+        timing = fmu.description.timing
+        print(f"  {fmu.name}: {timing}, at {fmu.clock}, {len(fmu.description.outputs)} outputs")
     print("\nconnections (age of the newest sample when it is used, ms)")
     ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(made)).items()}
     for connection in made.connections:
@@ -86,15 +86,15 @@ _PER_TICK = ("operations", "signals")
 
 def at_start(system: System) -> list[float]:
     """q of the mechanism alone, as its FMU assembles it in initialisation; none without one."""
-    unit = system.unit.get(MECHANISM)
-    if unit is None:
+    fmu = system.fmu.get(MECHANISM)
+    if fmu is None:
         return []
-    outputs = np.zeros(len(unit.description.outputs))
-    made = KINDS[unit.description.fmi](MECHANISM, unit.description, outputs, unit.starts)
+    outputs = np.zeros(len(fmu.description.outputs))
+    made = KINDS[fmu.description.fmi](MECHANISM, fmu.description, outputs, fmu.starts)
     with made as instance:
         instance.enter_initialization(1.0)
         instance.read()
-    return coordinates(dict(zip((s.name for s in unit.description.outputs), outputs, strict=True)))
+    return coordinates(dict(zip((s.name for s in fmu.description.outputs), outputs, strict=True)))
 
 
 def coordinates(values: dict[str, float]) -> list[float]:

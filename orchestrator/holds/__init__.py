@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.delayed import Delayed
 from hapticlink.orchestrator.holds.first_order import FirstOrder
 from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDerivative
@@ -35,7 +35,7 @@ class HoldType(Protocol):
     @property
     def degree(self) -> int: ...
 
-    def __call__(self, site: Site) -> Hold: ...
+    def __call__(self, context: HoldContext) -> Hold: ...
 
 
 HOLDS: dict[str, HoldType] = {

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from hapticlink.orchestrator.holds.energy_tank import SetPoint
+    from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 
 Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Site:
+class HoldContext:
     """size entries; `seconds` turns ticks into s.
 
     displacement reads the target's displacement along the signal, so that
     signal . d(displacement) is the power into the target (J); its sign is in it. velocity reads
-    its derivative, where the target puts it out. set_point is
+    its derivative, where the target puts it out. tank is
     the spring that the signal sets, with 0 for its set position, 1 for its set velocity.
     """
 
@@ -29,4 +29,4 @@ class Site:
     seconds: Callable[[float], float] = float
     displacement: Callable[[], Vector] | None = None
     velocity: Callable[[], Vector] | None = None
-    set_point: tuple[SetPoint, int] | None = None
+    tank: tuple[EnergyTank, int] | None = None

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
 
 
@@ -21,10 +21,10 @@ class Delayed:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 1
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, context: HoldContext) -> None:
         self._samples = History(2)
         self._arrival = 0
-        self._from = np.zeros(site.size)
+        self._from = np.zeros(context.size)
 
     def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
         self._from = self.value(arrival) if len(self._samples) else sample.copy()

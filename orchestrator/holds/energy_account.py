@@ -19,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 
 Vector = NDArray[np.float64]
 
@@ -48,22 +48,22 @@ class Account:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 0
 
-    def __init__(self, site: Site) -> None:
-        assert site.displacement is not None
-        self._displacement, self._velocity = site.displacement, site.velocity
-        self._seconds = site.seconds
+    def __init__(self, context: HoldContext) -> None:
+        assert context.displacement is not None
+        self._displacement, self._velocity = context.displacement, context.velocity
+        self._seconds = context.seconds
         self._new: list[tuple[int, Vector]] = []
         self._stamp, self._tick = 0, -1
-        self.sample = self._held = np.zeros(site.size)
-        self._x = self._x_stamp = np.zeros(site.size)
+        self.sample = self._held = np.zeros(context.size)
+        self._x = self._x_stamp = np.zeros(context.size)
         self._path: deque[tuple[int, Vector]] = deque()  # from the newest stamp on
         self._acted: deque[tuple[int, Vector]] = deque()  # until when a sample was the newest
         self._late = False
-        self._work, self._ideal = np.zeros(site.size), np.zeros(site.size)
-        self.motion = self.straight = self.ahead = np.zeros(site.size)
-        self._v = self._gain = np.zeros(site.size)
+        self._work, self._ideal = np.zeros(context.size), np.zeros(context.size)
+        self.motion = self.straight = self.ahead = np.zeros(context.size)
+        self._v = self._gain = np.zeros(context.size)
         self._steps = 0
-        self.largest, self.swing = np.zeros(site.size), np.zeros(site.size)
+        self.largest, self.swing = np.zeros(context.size), np.zeros(context.size)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._new.append((stamp, sample.copy()))

@@ -12,7 +12,7 @@ import numpy as np
 from hapticlink.orchestrator.holds.hold import Vector
 
 
-class SetPoint:
+class EnergyTank:
     """The account of one spring-damper, shared by the holds of its set position (row 0) and set
     velocity (row 1). stiffness and damping by entry, `position` reads x, `period` is T (s)."""
 
@@ -31,7 +31,7 @@ class SetPoint:
         self._x = np.zeros(len(stiffness))
         self._tick, self.available = -1, 0.0
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> SetPoint:
+    def __deepcopy__(self, memo: dict[int, Any]) -> EnergyTank:
         """Itself, since holds share it: who takes steps back keeps its `vars` beside theirs."""
         return self
 

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 
 
 class FirstOrderDerivative:
@@ -20,10 +20,10 @@ class FirstOrderDerivative:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 1
 
-    def __init__(self, site: Site) -> None:
-        self._size, self._seconds = site.size, site.seconds
+    def __init__(self, context: HoldContext) -> None:
+        self._size, self._seconds = context.size, context.seconds
         self._stamp = 0
-        self._newest, self._slope = np.zeros(site.size), np.zeros(site.size)
+        self._newest, self._slope = np.zeros(context.size), np.zeros(context.size)
 
     def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
         self._stamp = stamp

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
 
 
@@ -22,8 +22,8 @@ class Hermite:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 3
 
-    def __init__(self, site: Site) -> None:
-        self._size, self._seconds = site.size, site.seconds
+    def __init__(self, context: HoldContext) -> None:
+        self._size, self._seconds = context.size, context.seconds
         self._samples = History(2)
 
     def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
 
 
@@ -20,7 +20,7 @@ class Lead:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 0
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, context: HoldContext) -> None:
         self._samples = History(2)
 
     def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:

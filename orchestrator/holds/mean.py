@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 
 Vector = NDArray[np.float64]
 
@@ -24,10 +24,10 @@ class Mean:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 0
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, context: HoldContext) -> None:
         self._stamp: int | None = None
-        self._newest, self._held = np.zeros(site.size), np.zeros(site.size)
-        self._sum, self._span = np.zeros(site.size), 0
+        self._newest, self._held = np.zeros(context.size), np.zeros(context.size)
+        self._sum, self._span = np.zeros(context.size), 0
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         if self._stamp is None:

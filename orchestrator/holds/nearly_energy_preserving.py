@@ -9,13 +9,13 @@ Hofer (5th Int. Conf. on Computational Methods for Coupled Problems, 2013).
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account, Vector, repayment
 
 
 class NearlyEnergyPreserving(Account):
-    def __init__(self, site: Site) -> None:
-        super().__init__(site)
+    def __init__(self, context: HoldContext) -> None:
+        super().__init__(context)
         self._last = self._x
         self._given = self._last * 0.0
 

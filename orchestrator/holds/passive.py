@@ -33,15 +33,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account, Vector
 
 
 class Passive(Account):
-    def __init__(self, site: Site) -> None:
-        super().__init__(site)
-        self.beta = np.ones(site.size)
-        self._foreseen = np.zeros(site.size)
+    def __init__(self, context: HoldContext) -> None:
+        super().__init__(context)
+        self.beta = np.ones(context.size)
+        self._foreseen = np.zeros(context.size)
 
     def correction(self, fresh: bool) -> Vector:
         turned = self.motion * self._foreseen < 0.0

@@ -31,7 +31,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 
 Vector = NDArray[np.float64]
 
@@ -41,9 +41,9 @@ class PassiveSetPosition:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 0
 
-    def __init__(self, site: Site) -> None:
-        assert site.set_point is not None
-        self._set_point, self._row = site.set_point
+    def __init__(self, context: HoldContext) -> None:
+        assert context.tank is not None
+        self._set_point, self._row = context.tank
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._set_point.newest[self._row] = sample

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
 
 
@@ -22,7 +22,7 @@ class SecondOrder:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 2
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, context: HoldContext) -> None:
         self._samples = History(3)
 
     def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
 
 Vector = NDArray[np.float64]
@@ -27,10 +27,10 @@ class Smooth:
     gives_samples: ClassVar[bool] = False
     degree: ClassVar[int] = 3
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, context: HoldContext) -> None:
         self._samples = History(2)
         self._arrival = 0
-        self._from = self._slope = np.zeros(site.size)
+        self._from = self._slope = np.zeros(context.size)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         if len(self._samples):

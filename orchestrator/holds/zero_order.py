@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 
 
 class ZeroOrder:
@@ -15,8 +15,8 @@ class ZeroOrder:
     gives_samples: ClassVar[bool] = True
     degree: ClassVar[int] = 0
 
-    def __init__(self, site: Site) -> None:
-        self._newest = np.zeros(site.size)
+    def __init__(self, context: HoldContext) -> None:
+        self._newest = np.zeros(context.size)
 
     def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
         self._newest[:] = sample

@@ -17,13 +17,13 @@ from hapticlink.orchestrator.plan.operations import (
     StopWhen,
 )
 from hapticlink.orchestrator.system import held_polynomials
-from hapticlink.orchestrator.system.system import System, Unit
+from hapticlink.orchestrator.system.system import Fmu, System
 
 
-def firing(system: System, event: Event) -> tuple[list[Unit], list[Unit]]:
+def firing(system: System, event: Event) -> tuple[list[Fmu], list[Fmu]]:
     """(sampled, continuous) FMUs whose clocks fire."""
     clocks = {f.clock for f in event.firings}
-    due = [u for u in system.units if u.clock in clocks]
+    due = [u for u in system.fmus if u.clock in clocks]
     return [u for u in due if u.sampled], [u for u in due if not u.sampled]
 
 
@@ -35,42 +35,42 @@ def without_steps(event: Event, clocks: Container[str] | None = None) -> Event:
     return event._replace(firings=tuple(firings))
 
 
-def starting(event: Event, continuous: list[Unit]) -> list[Unit]:
+def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:
     """The plants that start a step; a step past the end of the run is not started."""
     started = {f.clock for f in event.firings if not f.final}
     return [u for u in continuous if u.clock in started]
 
 
-def publish(system: System, unit: Unit, ahead: int = 0) -> Iterator[Operation]:
+def publish(system: System, fmu: Fmu, ahead: int = 0) -> Iterator[Operation]:
     """Read the outputs, and hand them to the holds behind them."""
-    yield Get(unit.name, ahead)
-    for connection in system.out_of(unit.name):
+    yield Get(fmu.name, ahead)
+    for connection in system.out_of(fmu.name):
         if connection.hold:
             yield Push(connection.name, ahead)
 
 
-def publish_ended(system: System, event: Event, continuous: list[Unit]) -> Iterator[Operation]:
+def publish_ended(system: System, event: Event, continuous: list[Fmu]) -> Iterator[Operation]:
     """The outputs of the plants whose steps end here; initialisation has read the first.
 
     Those that may be read after new inputs are set show their feed-through of this tick.
     """
     if not event.first:
-        for unit in continuous:
-            yield from publish(system, unit)
-        for unit in continuous:
-            if unit.name in system.get_after_set and system.into(unit.name):
-                yield Set(unit.name, now=True)
-                yield from publish(system, unit)
+        for fmu in continuous:
+            yield from publish(system, fmu)
+        for fmu in continuous:
+            if fmu.name in system.get_after_set and system.into(fmu.name):
+                yield Set(fmu.name, now=True)
+                yield from publish(system, fmu)
 
 
-def feed(system: System, event: Event, unit: Unit, part: int = 0) -> Iterator[Operation]:
+def feed(system: System, event: Event, fmu: Fmu, part: int = 0) -> Iterator[Operation]:
     """Set the inputs. A plant takes them over its whole step or substep, so it gets what a hold
     gives for the middle of it, or for its beginning with the derivatives there; a sampled block
     what it gives for this tick."""
-    incoming = system.into(unit.name)
+    incoming = system.into(fmu.name)
     width = Fraction(0)
-    if not unit.sampled:
-        width = Fraction(dticks(event, unit), system.substeps.get(unit.name, 1))
+    if not fmu.sampled:
+        width = Fraction(dticks(event, fmu), system.substeps.get(fmu.name, 1))
     orders = {c.name: held_polynomials.order(system, c) for c in incoming if c.hold}
     for name, order in orders.items():
         if order:
@@ -78,20 +78,20 @@ def feed(system: System, event: Event, unit: Unit, part: int = 0) -> Iterator[Op
         else:
             yield Evaluate(name, part * width + width / 2)
     if incoming:
-        yield Set(unit.name, derivatives=any(orders.values()))
+        yield Set(fmu.name, derivatives=any(orders.values()))
 
 
-def dticks(event: Event, unit: Unit) -> int:
-    return next(f.dticks for f in event.firings if f.clock == unit.clock)
+def dticks(event: Event, fmu: Fmu) -> int:
+    return next(f.dticks for f in event.firings if f.clock == fmu.clock)
 
 
-def step(system: System, event: Event, unit: Unit) -> Iterator[Operation]:
+def step(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
     """The step of an FMU that has been fed, with the substeps that a plant is asked to take."""
-    parts = 1 if unit.sampled else system.substeps.get(unit.name, 1)
+    parts = 1 if fmu.sampled else system.substeps.get(fmu.name, 1)
     for part in range(parts):
         if part:
-            yield from feed(system, event, unit, part)
-        yield Step(unit.name, dticks(event, unit), part, parts)
+            yield from feed(system, event, fmu, part)
+        yield Step(fmu.name, dticks(event, fmu), part, parts)
 
 
 def record(system: System, event: Event) -> Iterator[Operation]:
@@ -99,5 +99,5 @@ def record(system: System, event: Event) -> Iterator[Operation]:
     for f in event.firings:
         yield Record(f.clock)
     condition = system.ends_when
-    if condition and any(f.clock == system.unit[condition.fmu].clock for f in event.firings):
+    if condition and any(f.clock == system.fmu[condition.fmu].clock for f in event.firings):
         yield StopWhen()

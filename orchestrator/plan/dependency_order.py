@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from hapticlink.orchestrator.system.system import System, Unit
+from hapticlink.orchestrator.system.system import Fmu, System
 
 
 @dataclass(frozen=True)
-class Loop:
+class AlgebraicLoop:
     """FMUs that feed each other, in the order that they step in, and a way round among them."""
 
     fmus: tuple[str, ...]
     ring: str
 
 
-def groups(system: System, units: Iterable[Unit]) -> list[list[Unit]]:
+def groups(system: System, units: Iterable[Fmu]) -> list[list[Fmu]]:
     """`units`, each group after those that feed it; a group of more than one is a loop."""
     names = {u.name for u in units}
     feeds = {u.name: [c.source for c in system.into(u.name) if c.source in names] for u in units}
-    return [[system.unit[n] for n in group] for group in components(feeds)]
+    return [[system.fmu[n] for n in group] for group in components(feeds)]
 
 
-def direct(system: System, units: Iterable[Unit]) -> dict[str, set[str]]:
+def direct(system: System, units: Iterable[Fmu]) -> dict[str, set[str]]:
     """By unit: those of `units` that one of its outputs depends on directly (ModelStructure, FMI
     2.0.5 section 2.2.8)."""
     names = {u.name for u in units}
@@ -38,19 +38,19 @@ def direct(system: System, units: Iterable[Unit]) -> dict[str, set[str]]:
     }
 
 
-def plants(system: System, units: Iterable[Unit]) -> Iterator[list[Unit]]:
+def plants(system: System, units: Iterable[Fmu]) -> Iterator[list[Fmu]]:
     """The groups in order; in a loop direct dependencies order, and what they leave the system's
     order."""
     for group in groups(system, units):
         parts = components(direct(system, group))
-        yield [system.unit[name] for part in parts for name in part]
+        yield [system.fmu[name] for part in parts for name in part]
 
 
-def loops(system: System) -> Iterator[Loop]:
+def loops(system: System) -> Iterator[AlgebraicLoop]:
     """Among the FMUs that the coupling puts in an order: sampled blocks, and plants that read the
     end of each other's steps."""
-    ordered = [[u for u in system.units if u.sampled]]
-    continuous = [u for u in system.units if not u.sampled]
+    ordered = [[u for u in system.fmus if u.sampled]]
+    continuous = [u for u in system.fmus if not u.sampled]
     if system.coupling == "jacobi":
         return
     if system.coupling == "gauss-seidel-plants":
@@ -63,7 +63,7 @@ def loops(system: System) -> Iterator[Loop]:
             names = tuple(u.name for u in group)
             feeds = {n: [c.source for c in system.into(n) if c.source in names] for n in names}
             if len(names) > 1:
-                yield Loop(names, ring(feeds, names))
+                yield AlgebraicLoop(names, ring(feeds, names))
 
 
 def components(feeds: Mapping[str, Collection[str]]) -> list[list[str]]:

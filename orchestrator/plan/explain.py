@@ -35,7 +35,7 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
     for clock in timeline.clocks:
         units = ", ".join(
             u.name + (" (sampled)" if u.sampled else "")
-            for u in system.units
+            for u in system.fmus
             if u.clock == clock.name
         )
         yield f"  {clock.name}: {_steps(clock)}: {units}"

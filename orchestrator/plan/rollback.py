@@ -11,9 +11,9 @@ from hapticlink.orchestrator.system.system import System
 
 def require(system: System, names: Iterable[str], what: str) -> None:
     """Raises InputFault naming the FMUs that cannot roll back."""
-    unable = [n for n in names if not restores_state(system.unit[n].description)]
+    unable = [n for n in names if not restores_state(system.fmu[n].description)]
     if unable:
-        flags = {STATE[system.unit[n].description.fmi] for n in unable}
+        flags = {STATE[system.fmu[n].description.fmi] for n in unable}
         raise InputFault(
             f"{what} takes steps back, and {', '.join(unable)} cannot save and restore its state "
             f"({' or '.join(sorted(flags))} is not true); take coupling = 'gauss-seidel' or "

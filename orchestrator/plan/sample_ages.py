@@ -23,8 +23,8 @@ def uses(plan: Plan, until: int | None = None) -> Iterator[Use]:
     """Every value given to every input over the whole run, or up to a tick, in order."""
     system = plan.system
     connections = {c.name: c for c in system.connections}
-    incoming = {u.name: system.into(u.name) for u in system.units}
-    got = dict.fromkeys(system.unit, 0)
+    incoming = {u.name: system.into(u.name) for u in system.fmus}
+    got = dict.fromkeys(system.fmu, 0)
     pushed = dict.fromkeys(connections, 0)
     held = dict.fromkeys(connections, 0)
     base = system.timeline.base

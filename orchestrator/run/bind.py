@@ -25,8 +25,8 @@ from hapticlink.orchestrator.plan.operations import (
     StopWhen,
 )
 from hapticlink.orchestrator.run import parallel_steps
-from hapticlink.orchestrator.run.fixed_point import Loop
-from hapticlink.orchestrator.run.simulation import Call, Live
+from hapticlink.orchestrator.run.fixed_point import FixedPoint
+from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.step_control import Advancer
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system import held_polynomials
@@ -39,10 +39,10 @@ class Stop(Exception):
 class Binder:
     """One way to bind each operation. `calls` gives the bound operations of a part of a plan."""
 
-    def __init__(self, live: Live, calls: Callable[[Part], Sequence[Call]]) -> None:
-        self._live, self._calls = live, calls
-        self._isolated = {n: i for n, i in live.instances.items() if isinstance(i, Isolated)}
-        self.loops: dict[Repeat, Loop] = {}
+    def __init__(self, simulation: Simulation, calls: Callable[[Part], Sequence[Call]]) -> None:
+        self._simulation, self._calls = simulation, calls
+        self._isolated = {n: i for n, i in simulation.instances.items() if isinstance(i, Isolated)}
+        self.loops: dict[Repeat, FixedPoint] = {}
         self.advancers: dict[str, Advancer] = {}
 
     def bind_all(
@@ -51,15 +51,15 @@ class Binder:
         return parallel_steps.bound(operations, bind or self.bind, self._isolated)
 
     def bind(self, operation: Operation) -> Call:
-        live = self._live
+        simulation = self._simulation
         match operation:
             case Get(fmu, ahead):
-                return live.meters.read(fmu, ahead, live.instances[fmu].get)
+                return simulation.meters.read(fmu, ahead, simulation.instances[fmu].get)
             case Set(fmu, now, derivatives):
                 if now:
-                    return live.now_setters[fmu]
-                setters = live.varying_setters if derivatives else live.setters
-                return live.meters.fed(fmu, setters[fmu])
+                    return simulation.now_setters[fmu]
+                setters = simulation.varying_setters if derivatives else simulation.setters
+                return simulation.meters.fed(fmu, setters[fmu])
             case Step(fmu, dticks, part, parts):
                 return self._step(fmu, dticks, part, parts)
             case Push(connection, ahead):
@@ -71,10 +71,10 @@ class Binder:
             case Blend(connection, points):
                 return self._blend(connection, points)
             case Save(fmu):
-                save = live.instances[fmu].save
+                save = simulation.instances[fmu].save
                 return lambda tick: save()
             case Rollback(fmu):
-                rollback = live.instances[fmu].rollback
+                rollback = simulation.instances[fmu].rollback
                 return lambda tick: rollback()
             case Advance(clock, dticks):
                 advance = self._advancer(clock).advance
@@ -82,19 +82,19 @@ class Binder:
             case Repeat():
                 return self._repeat(operation)
             case Record(clock):
-                row, seconds = live.recorders[clock].row, live.seconds
+                row, seconds = simulation.recorders[clock].row, simulation.seconds
                 return lambda tick: row(seconds(tick))
             case StopWhen():
                 return self._stop_when()
 
     def _step(self, fmu: str, dticks: int, part: int, parts: int) -> Call:
-        live = self._live
-        step, seconds = live.instances[fmu].step, live.seconds
+        simulation = self._simulation
+        step, seconds = simulation.instances[fmu].step, simulation.seconds
         size = seconds(dticks)
         # A sampled output is stamped at the start of its step.
-        valid = 0 if live.system.unit[fmu].sampled else dticks
+        valid = 0 if simulation.system.fmu[fmu].sampled else dticks
         if parts > 1:
-            base = live.system.timeline.base / parts
+            base = simulation.system.timeline.base / parts
             begin, size = part * dticks, float(dticks * base)
 
             def substep(tick: int) -> None:
@@ -105,17 +105,20 @@ class Binder:
         return lambda tick: step(seconds(tick), seconds(tick + valid), size)
 
     def _push(self, connection: str, ahead: int) -> Call:
-        live = self._live
-        hold, values = live.holds[connection], live.board.values
-        sources = live.board.sources(live.system.connection[connection])
-        view = live.board.view(sources)
+        simulation = self._simulation
+        hold, values = simulation.holds[connection], simulation.signals.values
+        sources = simulation.signals.sources(simulation.system.connection[connection])
+        view = simulation.signals.view(sources)
         if view is not None:
             return lambda tick: hold.push(tick + ahead, view, tick)
         return lambda tick: hold.push(tick + ahead, values[sources], tick)
 
     def _evaluate(self, connection: str, ahead: float) -> Call:
-        live = self._live
-        hold, view = live.holds[connection], live.board.values[live.board.hold(connection)]
+        simulation = self._simulation
+        hold, view = (
+            simulation.holds[connection],
+            simulation.signals.values[simulation.signals.hold(connection)],
+        )
 
         def evaluate(tick: int) -> None:
             view[:] = hold.value(tick, ahead)
@@ -123,12 +126,16 @@ class Binder:
         return evaluate
 
     def _derive(self, connection: str, ahead: float, order: int, width: float) -> Call:
-        live = self._live
-        hold, values, board = live.holds[connection], live.board.values, live.board
-        view, span = values[board.hold(connection)], board.derivatives(connection)
+        simulation = self._simulation
+        hold, values, signals = (
+            simulation.holds[connection],
+            simulation.signals.values,
+            simulation.signals,
+        )
+        view, span = values[signals.hold(connection)], signals.derivatives(connection)
         derived, mean = values[span], values[span.stop : span.stop + len(view)]
         instants = [ahead + i * width / order for i in range(order + 1)]
-        seconds = live.seconds(width)
+        seconds = simulation.seconds(width)
 
         def derive(tick: int) -> None:
             found = np.stack([hold.value(tick, at) for at in instants])
@@ -140,12 +147,15 @@ class Binder:
 
     def _advancer(self, clock: str) -> Advancer:
         if clock not in self.advancers:
-            self.advancers[clock] = Advancer(clock, self._live, self._calls)
+            self.advancers[clock] = Advancer(clock, self._simulation, self._calls)
         return self.advancers[clock]
 
     def _blend(self, connection: str, points: tuple[tuple[float, Fraction], ...]) -> Call:
-        live = self._live
-        hold, view = live.holds[connection], live.board.values[live.board.hold(connection)]
+        simulation = self._simulation
+        hold, view = (
+            simulation.holds[connection],
+            simulation.signals.values[simulation.signals.hold(connection)],
+        )
         pairs = [(weight, float(ahead)) for weight, ahead in points]
 
         def blend(tick: int) -> None:
@@ -153,30 +163,30 @@ class Binder:
 
         return blend
 
-    def _repeat(self, operation: Repeat) -> Loop:
+    def _repeat(self, operation: Repeat) -> FixedPoint:
         """The loop of a Repeat; events share it, and what its solver has learned."""
-        live = self._live
+        simulation = self._simulation
         if operation in self.loops:
             return self.loops[operation]
 
         def bind(op: Operation) -> Call:  # finite or not: an iteration comes back from infinity
             if isinstance(op, Get):
-                return live.meters.read(op.fmu, op.ahead, live.instances[op.fmu].read)
+                return simulation.meters.read(op.fmu, op.ahead, simulation.instances[op.fmu].read)
             return self.bind(op)
 
         body = self.bind_all(operation.body, bind)
         calls = (self.bind_all(operation.guess), body, self.bind_all(operation.again))
         held = [self.bind(op) for op in operation.body if isinstance(op, Blend)]
-        loop = Loop(operation, self._live, calls, held)
+        loop = FixedPoint(operation, self._simulation, calls, held)
         self.loops[operation] = loop
         return loop
 
     def _stop_when(self) -> Call:
-        live = self._live
-        condition = live.system.ends_when
+        simulation = self._simulation
+        condition = simulation.system.ends_when
         assert condition is not None
-        place = live.board.scalar(condition.fmu, condition.variable)
-        holds, values = COMPARISONS[condition.comparison], live.board.values
+        place = simulation.signals.scalar(condition.fmu, condition.variable)
+        holds, values = COMPARISONS[condition.comparison], simulation.signals.values
         limit = condition.value
 
         def stop_when(tick: int) -> None:

@@ -27,7 +27,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.bind import Binder, Stop
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.fixed_point import Iterations, total
-from hapticlink.orchestrator.run.simulation import Call, Live
+from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.step_control import Steps
 
 Progress = Callable[[float], None]
@@ -60,27 +60,27 @@ def run(plan: Plan, folder: Path, progress: Progress | None = None) -> Outcome:
     progress is told the simulated time (s) now and then.
     """
     outcome = Outcome()
-    live: Live | None = None
+    simulation: Simulation | None = None
 
     def last() -> float:
-        return live.recorders[plan.system.timeline.clocks[0].name].last if live else 0.0
+        return simulation.recorders[plan.system.timeline.clocks[0].name].last if simulation else 0.0
 
     begin = perf_counter()
     try:
         # Values that are not finite are found by 0 x NaN, without numpy's own warning.
         with ExitStack() as stack, np.errstate(invalid="ignore"):
-            live = Live(plan.system, folder, stack)
-            bound = _Bound(plan, live)
+            simulation = Simulation(plan.system, folder, stack)
+            bound = _Bound(plan, simulation)
             interrupted = stack.enter_context(interrupt.watch())
-            live.start()
+            simulation.start()
             begin = perf_counter()
             for count, (tick, event) in enumerate(plan):
                 for call in bound.calls(event):
                     call(tick)
                 if interrupted:
-                    raise Interrupted(live.seconds(tick))
+                    raise Interrupted(simulation.seconds(tick))
                 if progress and not count % 64:
-                    progress(live.seconds(tick))
+                    progress(simulation.seconds(tick))
     except Stop:
         outcome.reason = "stop_when"
     except Fault as fault:
@@ -94,15 +94,15 @@ def run(plan: Plan, folder: Path, progress: Progress | None = None) -> Outcome:
         outcome.fault, outcome.reason = Interrupted(last()), "interrupted"
     finally:
         outcome.wall_time = perf_counter() - begin
-        if live:
+        if simulation:
             outcome.end_time = last()
-            outcome.step_time = {n: i.step_time for n, i in live.instances.items()}
-            outcome.isolated = live.isolated
-            outcome.held = {n: i.held for n, i in live.instances.items() if i.held}
-            smaller = {n: i.smaller_steps for n, i in live.instances.items()}
+            outcome.step_time = {n: i.step_time for n, i in simulation.instances.items()}
+            outcome.isolated = simulation.isolated
+            outcome.held = {n: i.held for n, i in simulation.instances.items() if i.held}
+            smaller = {n: i.smaller_steps for n, i in simulation.instances.items()}
             outcome.smaller_steps = {n: s for n, s in smaller.items() if s}
-            outcome.energies = live.meters.energies()
-            outcome.links = live.links()
+            outcome.energies = simulation.meters.energies()
+            outcome.links = simulation.links()
             outcome.calls = bound.counts()
             outcome.steps = bound.steps()
             outcome.iterations = bound.iterations()
@@ -114,9 +114,9 @@ def run(plan: Plan, folder: Path, progress: Progress | None = None) -> Outcome:
 class _Bound:
     """The calls of each event, bound when it first comes, and how often it came."""
 
-    def __init__(self, plan: Plan, live: Live) -> None:
-        self._plan, self._live = plan, live
-        self._binder = Binder(live, self.calls)
+    def __init__(self, plan: Plan, simulation: Simulation) -> None:
+        self._plan, self._simulation = plan, simulation
+        self._binder = Binder(simulation, self.calls)
         self._bound: dict[Event | Part, list[Call]] = {}
         self._events: Counter[Event | Part] = Counter()
 
@@ -128,7 +128,7 @@ class _Bound:
 
     def counts(self) -> dict[str, dict[str, int]]:
         """FMI calls of the loop, by FMU and kind; those of blocks that a fault cut are in it."""
-        totals: dict[str, Counter[str]] = {name: Counter() for name in self._live.instances}
+        totals: dict[str, Counter[str]] = {name: Counter() for name in self._simulation.instances}
         ran: list[tuple[Operation, int]] = []
         for event, times in self._events.items():
             ran += [(op, times) for op in self._plan.block(event)]

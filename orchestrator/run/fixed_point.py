@@ -13,8 +13,8 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.operations import Repeat
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.jacobians import Through
-from hapticlink.orchestrator.run.signals import Board
-from hapticlink.orchestrator.run.simulation import Call, Live
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.solvers import SOLVERS, Found, Matrix, Newton, Vector
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
@@ -52,29 +52,32 @@ class Unconverged(Fault):
     """Plants that do not agree; names the connection that differs most."""
 
 
-class Loop:
-    """One Repeat, its operations bound: `guess` hands the board to the holds, `body` steps, `again`
-    rolls back. `held` are those of the body that ask holds for what inputs take."""
+class FixedPoint:
+    """One Repeat, its operations bound.
+
+    guess: push trial outputs into the holds. body: one co-simulation step. again: restore FMU
+    states. held: the operations of the body that evaluate holds.
+    """
 
     def __init__(
         self,
         operation: Repeat,
-        live: Live,
+        simulation: Simulation,
         calls: tuple[Sequence[Call], Sequence[Call], Sequence[Call]],
         held: Sequence[Call],
     ) -> None:
-        system, board = live.system, live.board
+        system, signals = simulation.system, simulation.signals
         self._guess, self._body, self._again = calls
         self._settings: Iteration = system.iteration
-        self._board, self._meters, self._dticks = board, live.meters, operation.dticks
+        self._signals, self._meters, self._dticks = signals, simulation.meters, operation.dticks
         self.counts = Iterations()
         self._seconds = system.timeline.seconds
         connections = [c for c in system.connections if c.name in operation.connections]
-        self._held = [(live.holds[c.name], board.sources(c)) for c in connections if c.hold]
+        self._held = [(simulation.holds[c.name], signals.sources(c)) for c in connections if c.hold]
         self._places: list[int] = []
         self._names: list[str] = []
         for c in connections:
-            for place in _read(c, system, board):
+            for place in _read(c, system, signals):
                 if place not in self._places:
                     self._places.append(place)
                     self._names.append(c.name)
@@ -82,11 +85,11 @@ class Loop:
         self._ask, self._tick = held, 0
         self._ways: list[Through] | None = None
         if isinstance(self._solver, Newton) and all(_constant(c, system) for c in connections):
-            ways = jacobians.ways(system, board, live.instances, connections, self._places)
+            ways = jacobians.ways(system, signals, simulation.instances, connections, self._places)
             self._ways, self._solver.given = ways, self._jacobian
 
     def __call__(self, tick: int) -> None:
-        values, places, counts = self._board.values, self._places, self.counts
+        values, places, counts = self._signals.values, self._places, self.counts
         self._tick = tick
         began = False
 
@@ -126,7 +129,7 @@ class Loop:
         makes of these the holds show, which are linear in it."""
         if self._ways is None:
             return None
-        values, places = self._board.values, self._places
+        values, places = self._signals.values, self._places
         kept = values.copy()
         shown = []
         for moved in (None, *places):
@@ -175,10 +178,10 @@ def _constant(c: Connection, system: System) -> bool:
     )
 
 
-def _read(c: Connection, system: System, board: Board) -> list[int]:
+def _read(c: Connection, system: System, signals: SignalVector) -> list[int]:
     """What the target of `c` is made from: the source's outputs, and where its hold wants them
     their derivatives."""
-    places = board.sources(c)
-    if c.hold and HOLDS[c.hold].needs == "derivative" and (name := derivative(c, system.unit)):
-        places = places + board.port(system.unit[c.source], name)
+    places = signals.sources(c)
+    if c.hold and HOLDS[c.hold].needs == "derivative" and (name := derivative(c, system.fmu)):
+        places = places + signals.port(system.fmu[c.source], name)
     return places

@@ -14,7 +14,7 @@ import numpy as np
 from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.run import jacobians
-from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.solvers import Matrix, Newton, Vector
 from hapticlink.orchestrator.system.system import System
 
@@ -22,28 +22,28 @@ SWEEPS = 50
 TOLERANCE = 1e-12
 
 
-def initialize(system: System, instances: Mapping[str, Instance], board: Board) -> None:
-    """Leave every instance in step mode, and the outputs of t = 0 on the board.
+def initialize(system: System, instances: Mapping[str, Instance], signals: SignalVector) -> None:
+    """Leave every instance in step mode, and the outputs of t = 0 on the signals.
 
     Sweeps over all FMUs carry values through connections, parameters set from outputs among
     them. Raises FmuFault where they don't agree to 1e-12 within 50 sweeps and 50 steps of Newton,
     or aren't finite.
     """
     timeline = system.timeline
-    holds = [(board.hold(c.name), board.sources(c)) for c in system.connections if c.hold]
+    holds = [(signals.hold(c.name), signals.sources(c)) for c in system.connections if c.hold]
     setters = []
-    for unit in system.units:
-        instance = instances[unit.name]
-        longest = timeline.clock(unit.clock).longest
+    for fmu in system.fmus:
+        instance = instances[fmu.name]
+        longest = timeline.clock(fmu.clock).longest
         instance.enter_initialization(timeline.seconds(timeline.end + longest))
-        incoming = [c for c in system.connections if c.target == unit.name]
+        incoming = [c for c in system.connections if c.target == fmu.name]
         if incoming:
             scalars = [s for c in incoming for s in c.inputs]
-            places = [p for c in incoming for p in board.places(c)]
+            places = [p for c in incoming for p in signals.places(c)]
             setters.append((instance, instance.connect(scalars, places)))
     for instance in instances.values():
         instance.read()
-    values = board.values
+    values = signals.values
 
     def sweep() -> None:
         for instance, set_from in setters:
@@ -60,7 +60,7 @@ def initialize(system: System, instances: Mapping[str, Instance], board: Board) 
         if agree.all():
             break
     else:
-        _solve(system, instances, board, agree & np.isfinite(values), first, sweep)
+        _solve(system, instances, signals, agree & np.isfinite(values), first, sweep)
     require_finite(instances)
     for instance in instances.values():
         instance.exit_initialization()
@@ -69,14 +69,14 @@ def initialize(system: System, instances: Mapping[str, Instance], board: Board) 
 def _solve(
     system: System,
     instances: Mapping[str, Instance],
-    board: Board,
+    signals: SignalVector,
     settled: np.ndarray,
     first: Vector,
     sweep: Callable[[], None],
 ) -> None:
     """Newton on the outputs that have not settled, from their first values."""
-    values = board.values
-    sources = {p for c in system.connections for p in board.sources(c)}
+    values = signals.values
+    sources = {p for c in system.connections for p in signals.sources(c)}
     places = sorted(p for p in sources if not settled[p])
 
     def residual(point: Vector) -> Vector:
@@ -85,29 +85,29 @@ def _solve(
         return values[places] - point
 
     newton = Newton()
-    newton.given = _jacobian(system, instances, board, places)
+    newton.given = _jacobian(system, instances, signals, places)
     found = newton.solve(residual, first[places], TOLERANCE, SWEEPS)
     if not found.error <= TOLERANCE:
         agree = np.ones(len(values), bool)
         agree[places] = np.abs(found.residual) <= TOLERANCE * (1.0 + np.abs(found.point))
         before = values.copy()
         before[places] = found.point
-        _raise_unsettled(system, board, agree, before)
+        _raise_unsettled(system, signals, agree, before)
 
 
 def _jacobian(
-    system: System, instances: Mapping[str, Instance], board: Board, places: list[int]
+    system: System, instances: Mapping[str, Instance], signals: SignalVector, places: list[int]
 ) -> Callable[[], Matrix | None]:
     """The Jacobian of a sweep's residual by the FMUs' directional derivatives, where all on the way
-    give them: the unit changes of the places, carried from FMU to FMU as the sweep goes."""
-    moved = [c for c in system.connections if {*places} & {*board.sources(c)}]
-    found = jacobians.ways(system, board, instances, moved, places)
-    held = [(board.hold(c.name), board.sources(c)) for c in moved if c.hold]
+    give them: the fmu changes of the places, carried from FMU to FMU as the sweep goes."""
+    moved = [c for c in system.connections if {*places} & {*signals.sources(c)}]
+    found = jacobians.ways(system, signals, instances, moved, places)
+    held = [(signals.hold(c.name), signals.sources(c)) for c in moved if c.hold]
 
     def jacobian() -> Matrix | None:
         if found is None:
             return None
-        tangent = np.zeros((len(board.values), len(places)))
+        tangent = np.zeros((len(signals.values), len(places)))
         tangent[places] = np.eye(len(places))
         for way in found:
             for taken, sources in held:
@@ -121,15 +121,17 @@ def _jacobian(
     return jacobian
 
 
-def _raise_unsettled(system: System, board: Board, agree: np.ndarray, before: Vector) -> None:
-    for unit in system.units:
-        span = board.unit(unit.name)
-        for i, scalar in enumerate(unit.description.outputs, start=span.start):
+def _raise_unsettled(
+    system: System, signals: SignalVector, agree: np.ndarray, before: Vector
+) -> None:
+    for fmu in system.fmus:
+        span = signals.fmu(fmu.name)
+        for i, scalar in enumerate(fmu.description.outputs, start=span.start):
             if not agree[i]:
                 what = f"output {scalar.name} does not settle in initialisation, nor by Newton"
-                values = f"{before[i]!s} on its way round gives {board.values[i]!s}"
+                values = f"{before[i]!s} on its way round gives {signals.values[i]!s}"
                 remedy = "its feed-through loop has no start values: take a connection out of it"
-                raise FmuFault(unit.name, f"{what}: {values}; {remedy}", 0.0)
+                raise FmuFault(fmu.name, f"{what}: {values}; {remedy}", 0.0)
 
 
 DEVICE = "haptic_device"

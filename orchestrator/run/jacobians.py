@@ -18,13 +18,13 @@ from hapticlink.orchestrator.fmi.capabilities import gives_directional_derivativ
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import Connection, System
 
 
 @dataclass(frozen=True)
 class Through:
-    """The way through one FMU: from inputs that stand at `columns` of a board to outputs at
+    """The way through one FMU: from inputs that stand at `columns` of a signals to outputs at
     `rows`."""
 
     instance: Instance
@@ -34,7 +34,7 @@ class Through:
     columns: tuple[int, ...]
 
     def of(self, tangent: Matrix) -> Matrix | None:
-        """(rows, n): what `tangent`, (board, n), becomes; None where the FMU does not tell."""
+        """(rows, n): what `tangent`, (signals, n), becomes; None where the FMU does not tell."""
         found = self.instance.jacobian(self.outputs, self.inputs)
         if found is None:
             return None
@@ -45,7 +45,7 @@ class Through:
 
 def ways(
     system: System,
-    board: Board,
+    signals: SignalVector,
     instances: Mapping[str, Instance],
     connections: Iterable[Connection],
     places: Sequence[int],
@@ -54,20 +54,20 @@ def ways(
     where an FMU on them gives no derivatives, or numbers that have none."""
     found = []
     connections = list(connections)
-    for unit in system.units:
-        incoming = [c for c in connections if c.target == unit.name]
-        span, outputs = board.unit(unit.name), unit.description.outputs
+    for fmu in system.fmus:
+        incoming = [c for c in connections if c.target == fmu.name]
+        span, outputs = signals.fmu(fmu.name), fmu.description.outputs
         rows = tuple(p for p in places if span.start <= p < span.stop)
         if not incoming or not rows:
             continue
         made = Through(
-            instances[unit.name],
+            instances[fmu.name],
             tuple(outputs[p - span.start] for p in rows),
             rows,
             tuple(s for c in incoming for s in c.inputs),
-            tuple(p for c in incoming for p in board.places(c)),
+            tuple(p for c in incoming for p in signals.places(c)),
         )
-        if not gives_directional_derivatives(unit.description):
+        if not gives_directional_derivatives(fmu.description):
             return None
         if any(s.type not in ("Real", "Float64") for s in (*made.outputs, *made.inputs)):
             return None

@@ -7,46 +7,49 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.context import Site
-from hapticlink.orchestrator.holds.energy_tank import SetPoint
+from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.hold import Hold, Vector
 from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run.energy.bonds import bond, reader
-from hapticlink.orchestrator.run.signals import Board
-from hapticlink.orchestrator.scene.records import Spring
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.system.latency import Late, Link
 from hapticlink.orchestrator.system.ports import derivative, turns
 from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
 
-def make_holds(system: System, board: Board) -> tuple[dict[str, Hold], list[SetPoint]]:
+def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], list[EnergyTank]]:
     """By connection; and the accounts of springs, each shared by those that set it."""
-    shared: dict[Spring, SetPoint] = {}
-    holds = {c.name: make_hold(c, system, board, shared) for c in system.connections if c.hold}
+    shared: dict[SetSpring, EnergyTank] = {}
+    holds = {c.name: make_hold(c, system, signals, shared) for c in system.connections if c.hold}
     return holds, [*shared.values()]
 
 
 def make_hold(
-    connection: Connection, system: System, board: Board, shared: dict[Spring, SetPoint]
+    connection: Connection,
+    system: System,
+    signals: SignalVector,
+    shared: dict[SetSpring, EnergyTank],
 ) -> Hold:
     """The hold of `connection`, its kind kept and behind its latency."""
     assert connection.hold is not None
     kind, size = HOLDS[connection.hold], len(connection.inputs)
-    site = _site(connection, system, board, shared)
-    hold = kind(site)
+    context = _context(connection, system, signals, shared)
+    hold = kind(context)
     if connection.kind == "projector" and not kind.gives_samples:
-        hold = Projector(lambda: kind(site), size)
+        hold = Projector(lambda: kind(context), size)
     elif connection.kind == "semidefinite" and not kind.gives_samples:
-        hold = Semidefinite(lambda: kind(site), size)
+        hold = Semidefinite(lambda: kind(context), size)
     elif connection.kind == "angle":
-        turned = turns(connection, system.unit)
-        hold = Unwrapped(lambda: kind(site), list(turned), list(turned.values()))
+        turned = turns(connection, system.fmu)
+        hold = Unwrapped(lambda: kind(context), list(turned), list(turned.values()))
     if connection.latency:
         hold = Late(hold, Link(connection.latency, system.timeline.base))
-    if kind.needs == "derivative" and (name := derivative(connection, system.unit)):
-        slopes = board.port(system.unit[connection.source], name)
-        hold = _Beside(hold, _reader(board, slopes))
+    if kind.needs == "derivative" and (name := derivative(connection, system.fmu)):
+        slopes = signals.port(system.fmu[connection.source], name)
+        hold = _Beside(hold, _reader(signals, slopes))
     return hold
 
 
@@ -61,46 +64,49 @@ class _Beside:
         self._hold.push(stamp, np.concatenate([sample, self._derivative()]), arrival)
 
 
-def _site(
-    connection: Connection, system: System, board: Board, shared: dict[Spring, SetPoint]
-) -> Site:
+def _context(
+    connection: Connection,
+    system: System,
+    signals: SignalVector,
+    shared: dict[SetSpring, EnergyTank],
+) -> HoldContext:
     """The displacement and the spring only where the hold keeps account of energy."""
-    size, moved, moving, set_point = len(connection.inputs), None, None, None
-    found = bond(connection, system, board)
+    size, moved, moving, tank = len(connection.inputs), None, None, None
+    found = bond(connection, system, signals)
     if HOLDS[connection.hold or ""].needs == "power" and found:
         # The hold's own samples are not converted yet: what converts them scales their motion.
         entries, work, places = list(found.entries), np.zeros(size), np.zeros(size, np.intp)
         work[entries], places[entries] = found.work, found.moved
-        moved = reader(board, places.tolist(), work)
+        moved = reader(signals, places.tolist(), work)
         if found.moving:
             places[entries] = found.moving
-            moving = reader(board, places.tolist(), work)
+            moving = reader(signals, places.tolist(), work)
     if HOLDS[connection.hold or ""].needs == "spring":
         of = spring(connection, system.springs)
         assert of is not None
         if of not in shared:
-            shared[of] = _set_point(of, system, board)
+            shared[of] = _set_point(of, system, signals)
         row = of.ports.index(f"{connection.target}.{connection.target_port}")
-        set_point = shared[of], row
-    return Site(size, system.timeline.seconds, moved, moving, set_point)
+        tank = shared[of], row
+    return HoldContext(size, system.timeline.seconds, moved, moving, tank)
 
 
-def _set_point(of: Spring, system: System, board: Board) -> SetPoint:
+def _set_point(of: SetSpring, system: System, signals: SignalVector) -> EnergyTank:
     fmu, _, name = of.position.partition(".")
-    unit = system.unit[fmu]
+    unit = system.fmu[fmu]
     near = next((c for c in system.into(fmu) if c.target_port == name), None)
-    places = board.sources(near) if near else board.port(unit, name)
+    places = signals.sources(near) if near else signals.port(unit, name)
     timeline = system.timeline
     stiffness = np.array(of.stiffness)
-    return SetPoint(
+    return EnergyTank(
         stiffness,
         np.array(of.damping) if of.damping else np.zeros_like(stiffness),
-        _reader(board, places),
+        _reader(signals, places),
         timeline.seconds(timeline.clock(unit.clock).longest),
         timeline.seconds,
     )
 
 
-def _reader(board: Board, places: Sequence[int]) -> Callable[[], Vector]:
-    view = board.view(places)
-    return (lambda: view) if view is not None else lambda: board.values[list(places)]
+def _reader(signals: SignalVector, places: Sequence[int]) -> Callable[[], Vector]:
+    view = signals.view(places)
+    return (lambda: view) if view is not None else lambda: signals.values[list(places)]

@@ -9,18 +9,18 @@ from hapticlink.orchestrator.fmi.instance import Instance, Vector
 from hapticlink.orchestrator.fmi.instance3 import Instance3
 from hapticlink.orchestrator.fmi.isolated import Isolated
 from hapticlink.orchestrator.run.python_modules import clashes
-from hapticlink.orchestrator.system.system import Unit
+from hapticlink.orchestrator.system.system import Fmu
 
 KINDS = {"2": Instance, "3": Instance3}
 
 
-def isolated(units: Iterable[Unit]) -> dict[str, str]:
+def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
     """Why each FMU that runs in a process of its own does, by name."""
-    units = tuple(units)
-    return {u.name: "asked for" for u in units if u.isolate} | clashes(units)
+    fmus = tuple(fmus)
+    return {u.name: "asked for" for u in fmus if u.isolate} | clashes(fmus)
 
 
-def instance(unit: Unit, outputs: Vector, policy: Faults, alone: bool) -> Instance:
-    """The instance of `unit`, not loaded yet, that fills `outputs`."""
-    made = Isolated if alone else KINDS[unit.description.fmi]
-    return made(unit.name, unit.description, outputs, unit.starts, policy)
+def instance(fmu: Fmu, outputs: Vector, policy: Faults, alone: bool) -> Instance:
+    """The instance of `fmu`, not loaded yet, that fills `outputs`."""
+    made = Isolated if alone else KINDS[fmu.description.fmi]
+    return made(fmu.name, fmu.description, outputs, fmu.starts, policy)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.archive import opened
-from hapticlink.orchestrator.system.system import Unit
+from hapticlink.orchestrator.system.system import Fmu
 
 Modules = dict[str, dict[str, int]]
 """By top-level name: CRC-32 by path in resources/."""
@@ -41,20 +41,20 @@ def bundled(path: Path) -> Modules:
     return found
 
 
-def clashes(units: Iterable[Unit]) -> dict[str, str]:
+def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
     """Why FMUs that are not isolated have to be: by name, with the module. The rest count as
     loaded from now on."""
     found = {}
-    for unit in units:
-        if unit.isolate:
+    for fmu in fmus:
+        if fmu.isolate:
             continue
-        modules = bundled(unit.description.path)
+        modules = bundled(fmu.description.path)
         other = next((n for n, files in modules.items() if not _is_mine(n, files)), None)
         if other is None:
             for name, files in modules.items():
                 _loaded.setdefault(name, files)
         else:
-            found[unit.name] = f"another module {other!r} is loaded in this process"
+            found[fmu.name] = f"another module {other!r} is loaded in this process"
     return found
 
 

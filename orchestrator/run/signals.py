@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.system import held_polynomials
-from hapticlink.orchestrator.system.system import Connection, System, Unit
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 Vector = NDArray[np.float64]
 
 
-class Board:
+class SignalVector:
     """Where each signal of a system stands in `values`."""
 
     def __init__(self, system: System) -> None:
-        self._of_unit: dict[str, slice] = {}
+        self._of_fmu: dict[str, slice] = {}
         self._of_clock: dict[str, slice] = {}
         self._of_hold: dict[str, slice] = {}
         self._of_derivatives: dict[str, slice] = {}
@@ -26,9 +26,9 @@ class Board:
         end = 0
         for clock in system.timeline.clocks:
             first = end
-            for unit in (u for u in system.units if u.clock == clock.name):
+            for unit in (u for u in system.fmus if u.clock == clock.name):
                 outputs = unit.description.outputs
-                self._of_unit[unit.name] = slice(end, end + len(outputs))
+                self._of_fmu[unit.name] = slice(end, end + len(outputs))
                 names = ((unit.name, s.name) for s in outputs)
                 self._of_scalar |= {name: end + i for i, name in enumerate(names)}
                 end += len(outputs)
@@ -43,8 +43,8 @@ class Board:
                     end = span.stop + len(connection.inputs)
         self.values = np.zeros(end)
 
-    def unit(self, name: str) -> slice:
-        return self._of_unit[name]
+    def fmu(self, name: str) -> slice:
+        return self._of_fmu[name]
 
     def clock(self, name: str) -> slice:
         return self._of_clock[name]
@@ -66,7 +66,7 @@ class Board:
     def scalar(self, fmu: str, variable: str) -> int:
         return self._of_scalar[fmu, variable]
 
-    def port(self, unit: Unit, name: str) -> list[int]:
+    def port(self, unit: Fmu, name: str) -> list[int]:
         """The places of an output vector."""
         return [self.scalar(unit.name, s.name) for s in unit.description.port(name, "output")]
 

@@ -1,4 +1,4 @@
-"""The live side of a system: instances, board, holds, meters and recorders."""
+"""The simulation side of a system: instances, signals, holds, meters and recorders."""
 
 from __future__ import annotations
 
@@ -14,42 +14,42 @@ from hapticlink.orchestrator.run.energy.meters import Meters
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.open_fmus import instance, isolated
-from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import Connection, System
 
 Call = Callable[[int], object]
 
 
-class Live:
+class Simulation:
     """What `stack` closes again; rows go to `folder`.
 
-    setters, varying_setters and now_setters fill the inputs of an FMU from the board: as its
+    setters, varying_setters and now_setters fill the inputs of an FMU from the signals: as its
     connections hold them, with derivatives beside, and as their sources stand now.
     """
 
     def __init__(self, system: System, folder: Path, stack: ExitStack) -> None:
-        self.system, self.board = system, Board(system)
+        self.system, self.signals = system, SignalVector(system)
         self.seconds = system.timeline.seconds
-        values = self.board.values
+        values = self.signals.values
         self.recorders = {
             c.name: stack.enter_context(
                 Recorder(
                     folder / f"{c.name}.csv",
-                    self.board.columns(c.name),
-                    values[self.board.clock(c.name)],
+                    self.signals.columns(c.name),
+                    values[self.signals.clock(c.name)],
                 )
             )
             for c in system.timeline.clocks
         }
-        self.isolated = isolated(system.units)
+        self.isolated = isolated(system.fmus)
         self.instances: dict[str, Instance] = {}
-        for unit in system.units:
-            view = values[self.board.unit(unit.name)]
-            made = instance(unit, view, system.faults, unit.name in self.isolated)
-            self.instances[unit.name] = stack.enter_context(made)
+        for fmu in system.fmus:
+            view = values[self.signals.fmu(fmu.name)]
+            made = instance(fmu, view, system.faults, fmu.name in self.isolated)
+            self.instances[fmu.name] = stack.enter_context(made)
         stack.callback(self._dismiss)
-        self.holds, self.springs = make_holds(system, self.board)
-        self.meters = Meters(system, self.board)
+        self.holds, self.springs = make_holds(system, self.signals)
+        self.meters = Meters(system, self.signals)
         self.setters: dict[str, Call] = {}
         self.varying_setters: dict[str, Call] = {}
         self.now_setters: dict[str, Call] = {}
@@ -61,37 +61,37 @@ class Live:
 
     def start(self) -> None:
         """Initialise; every hold gets its sample of t = 0, every FMU its way to set inputs."""
-        initialize(self.system, self.instances, self.board)
-        values = self.board.values
+        initialize(self.system, self.instances, self.signals)
+        values = self.signals.values
         for c in self.system.connections:
             if c.hold:
-                self.holds[c.name].push(0, values[self.board.sources(c)], 0)
+                self.holds[c.name].push(0, values[self.signals.sources(c)], 0)
         self.meters.start()
-        for unit in self.system.units:
-            incoming = self.system.into(unit.name)
+        for fmu in self.system.fmus:
+            incoming = self.system.into(fmu.name)
             if not incoming:
                 continue
-            connect = self.instances[unit.name].connect
+            connect = self.instances[fmu.name].connect
             scalars = [s for c in incoming for s in c.inputs]
-            held = [p for c in incoming for p in self.board.places(c)]
+            held = [p for c in incoming for p in self.signals.places(c)]
             set_held = connect(scalars, held)
-            self.setters[unit.name] = _from(set_held, self.board)
+            self.setters[fmu.name] = _from(set_held, self.signals)
             if derived := self._derived(incoming):
-                derive = self.instances[unit.name].connect_derivatives(*derived)
-                self.varying_setters[unit.name] = _from_both(set_held, derive, self.board)
-            if unit.name in self.system.get_after_set:
-                sources = [p for c in incoming for p in self.board.sources(c)]
-                self.now_setters[unit.name] = _from(connect(scalars, sources), self.board)
+                derive = self.instances[fmu.name].connect_derivatives(*derived)
+                self.varying_setters[fmu.name] = _from_both(set_held, derive, self.signals)
+            if fmu.name in self.system.get_after_set:
+                sources = [p for c in incoming for p in self.signals.sources(c)]
+                self.now_setters[fmu.name] = _from(connect(scalars, sources), self.signals)
 
     def _derived(
         self, incoming: Iterable[Connection]
     ) -> tuple[list[Scalar], list[int], list[int]] | None:
-        """(inputs, orders, places on the board) of what varies within the steps of an FMU, values
+        """(inputs, orders, places on the signals) of what varies within the steps of an FMU, values
         first."""
         rows = []
         for c in incoming:
-            span = self.board.derivatives(c.name)
-            places = [*self.board.places(c), *range(span.start, span.stop)] if span.stop else []
+            span = self.signals.derivatives(c.name)
+            places = [*self.signals.places(c), *range(span.start, span.stop)] if span.stop else []
             for i, place in enumerate(places):
                 order, entry = divmod(i, len(c.inputs))
                 rows.append((c.inputs[entry], order, place))
@@ -110,13 +110,13 @@ class Live:
         }
 
 
-def _from(set_from: Callable, board: Board) -> Call:
-    values = board.values
+def _from(set_from: Callable, signals: SignalVector) -> Call:
+    values = signals.values
     return lambda tick: set_from(values)
 
 
-def _from_both(first: Callable, second: Callable, board: Board) -> Call:
-    values = board.values
+def _from_both(first: Callable, second: Callable, signals: SignalVector) -> Call:
+    values = signals.values
 
     def set_both(tick: int) -> None:
         first(values)

@@ -15,8 +15,8 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.plan.operations import Part
 from hapticlink.orchestrator.run.energy.bonds import bond
 from hapticlink.orchestrator.run.fixed_point import Unconverged
-from hapticlink.orchestrator.run.signals import Board
-from hapticlink.orchestrator.run.simulation import Call, Live
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.system.system import System
 
 SLOT = 1
@@ -29,13 +29,13 @@ class Advancer:
     def __init__(
         self,
         clock: str,
-        live: Live,
+        simulation: Simulation,
         calls: Callable[[Part], Sequence[Call]],
     ) -> None:
-        system, board = live.system, live.board
+        system, signals = simulation.system, simulation.signals
         assert system.step_control is not None
         self._settings = settings = system.step_control
-        self._clock, self._values, self._meters = clock, board.values, live.meters
+        self._clock, self._values, self._meters = clock, signals.values, simulation.meters
         self._calls, self._seconds = calls, system.timeline.seconds
         base, longest = system.timeline.base, system.timeline.clock(clock).longest
         self._least = max(int(exact(settings.min) / base), 1)
@@ -44,9 +44,9 @@ class Advancer:
         self._size = float(self._least)
         self._before, self.steps = 0.0, Steps()
         self._growth = 2.0  # of a step; less for a while where an FMU has failed
-        plants = [u.name for u in system.units if u.clock == clock and not u.sampled]
-        self._instances = [live.instances[n] for n in plants]
-        compared = _compared(system, board, plants)
+        plants = [u.name for u in system.fmus if u.clock == clock and not u.sampled]
+        self._instances = [simulation.instances[n] for n in plants]
+        compared = _compared(system, signals, plants)
         self._outputs = [place for place, _ in compared]
         self._nominal = np.array([nominal for _, nominal in compared])
         between = [
@@ -56,11 +56,11 @@ class Advancer:
         ]
         self._order = min((ORDER.get(c.hold or "", 1) for c in between), default=1)
         ours = [c for c in system.connections if c.hold and {c.source, c.target} & {*plants}]
-        self._holds = [*(live.holds[c.name] for c in ours), *live.springs]
+        self._holds = [*(simulation.holds[c.name] for c in ours), *simulation.springs]
         self._bonds = []
         for c in between:
-            if found := bond(c, system, board):
-                places = found.of(board.sources(c)), found.of(board.mean(c)), [*found.moved]
+            if found := bond(c, system, signals):
+                places = found.of(signals.sources(c)), found.of(signals.mean(c)), [*found.moved]
                 self._bonds.append((found.work, places))
 
     def advance(self, tick: int, dticks: int) -> None:
@@ -118,7 +118,7 @@ class Advancer:
         return size
 
     def _both(self, tick: int, size: int, saved: Any) -> float:
-        """The error of a step, in units of the tolerance; its two halves stand."""
+        """The error of a step, in fmus of the tolerance; its two halves stand."""
         self._step(tick, size)
         self._read(tick + size)
         whole = self._values[self._outputs]
@@ -169,14 +169,16 @@ class Advancer:
         return size
 
 
-def _compared(system: System, board: Board, plants: Sequence[str]) -> list[tuple[int, float]]:
+def _compared(
+    system: System, signals: SignalVector, plants: Sequence[str]
+) -> list[tuple[int, float]]:
     """(place, nominal) of the outputs whose error counts: those that do not depend directly on an
     input, which at the end of a step is still that of the step before; all where there are no
     others."""
     every = [
-        ((board.scalar(n, s.name), s.nominal), system.unit[n].description.follows(s))
+        ((signals.scalar(n, s.name), s.nominal), system.fmu[n].description.follows(s))
         for n in plants
-        for s in system.unit[n].description.outputs
+        for s in system.fmu[n].description.outputs
     ]
     return [output for output, follows in every if not follows] or [output for output, _ in every]
 
@@ -206,7 +208,7 @@ ORDER = {"lead": 2, "foh": 2, "foh-derivative": 2, "second-order": 3, "hermite":
 
 
 def integral(error: float, order: int) -> float:
-    """The factor from the step taken to the next, where the error, in units of the tolerance, was
+    """The factor from the step taken to the next, where the error, in fmus of the tolerance, was
     `error` and grows with the step to the power `order`."""
     return 0.9 * error ** (-1 / order) if error else inf
 

@@ -137,7 +137,7 @@ class PowerPort:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spring:
+class SetSpring:
     """F = stiffness (set_position - position) + damping (set_velocity - velocity), entry by entry.
 
     set_position and set_velocity are inputs of one FMU (`fmu.port`), the far end; position is the

@@ -32,7 +32,7 @@ from hapticlink.orchestrator.scene.records import (
     PowerPort,
     Rate,
     Seconds,
-    Spring,
+    SetSpring,
     StepControl,
     Wire,
 )
@@ -112,7 +112,7 @@ class Scene:
     phases: Mapping[str, Seconds] = field(default_factory=dict)
     kinds: Mapping[str, Literal["projector", "semidefinite", "angle"]] = field(default_factory=dict)
     power: tuple[PowerPort, ...] = ()
-    spring: tuple[Spring, ...] = ()
+    spring: tuple[SetSpring, ...] = ()
     substeps: Mapping[str, int] = field(default_factory=dict)
     get_after_set: tuple[str, ...] = ()
     coupling: Literal["gauss-seidel", "jacobi", "gauss-seidel-plants", "iterated"] = "gauss-seidel"

@@ -35,7 +35,7 @@ from hapticlink.orchestrator.ssp.names import (
     STRUCTURE,
     type_of,
 )
-from hapticlink.orchestrator.system.system import Connection, System, Unit
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
@@ -47,7 +47,7 @@ def write(scene: Scene, system: System, target: Path) -> Path:
     try:
         with zipfile.ZipFile(unfinished, "w") as archive:
             _add(archive, STRUCTURE, structure(scene, system))
-            for unit in system.units:
+            for unit in system.fmus:
                 _add(archive, f"resources/{unit.name}.fmu", unit.description.path.read_bytes())
         os.replace(unfinished, target)
     finally:
@@ -68,7 +68,7 @@ def structure(scene: Scene, system: System) -> bytes:
     root = Element(f"{{{SSD}}}SystemStructureDescription", version="1.0", name=scene.title)
     top = SubElement(root, f"{{{SSD}}}System", name="system")
     elements = SubElement(top, f"{{{SSD}}}Elements")
-    for unit in system.units:
+    for unit in system.fmus:
         _component(elements, unit)
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
     lines = [c for c in system.connections if not c.initial]
@@ -94,7 +94,7 @@ def structure(scene: Scene, system: System) -> bytes:
     return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
 
-def _component(elements: Element, unit: Unit) -> None:
+def _component(elements: Element, unit: Fmu) -> None:
     about = {"name": unit.name, "type": FMU, "source": f"resources/{unit.name}.fmu"}
     component = SubElement(elements, f"{{{SSD}}}Component", about, implementation="CoSimulation")
     shown = [s for s in unit.description.scalars if s.causality in ("input", "output", "parameter")]
@@ -126,12 +126,12 @@ def _text(scalar: Scalar, value: bool | int | float | str) -> str:
 def _units(root: Element, system: System) -> None:
     """The units that connectors name; a name that two FMUs define otherwise stays with the first:
     each FMU keeps its own definitions."""
-    named = {u.name: u for unit in system.units for u in unit.description.units.values()}
+    named = {u.name: u for unit in system.fmus for u in unit.description.units.values()}
     if not named:
         return
     units = SubElement(root, f"{{{SSD}}}Units")
     for name in sorted(named):
-        one = SubElement(units, f"{{{SSC}}}Unit", name=name)
+        one = SubElement(units, f"{{{SSC}}}Fmu", name=name)
         unit = named[name]
         powers = zip(BASES, unit.base or (0,) * len(BASES), strict=True)
         base = {b: str(n) for b, n in powers if n}
@@ -161,7 +161,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     found["fmu"] = {
         u.name: {"rate": as_json(rates[u.name]), "timing": u.description.timing}
         | ({"isolate": True} if u.isolate else {})
-        for u in system.units
+        for u in system.fmus
     }
     found["connection"] = [_row(c) for c in system.connections if c.initial]
     return found

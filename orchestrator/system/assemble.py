@@ -15,7 +15,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import checks, haptic_loop
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import Ends, Wiring
-from hapticlink.orchestrator.system.system import Connection, System, Unit
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
 def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> System:
@@ -23,9 +23,9 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     and connections that do not fit, and for names in holds and stop_when that it does not have."""
     wiring = Wiring(scene)
     of = timeline.of
-    ours = tuple(Unit(b.name, describe(files[b.name]), of[b.name]) for b in blocks(scene))
+    ours = tuple(Fmu(b.name, describe(files[b.name]), of[b.name]) for b in blocks(scene))
     foreign = (
-        Unit(fmu.name, description, of[fmu.name], starts, fmu.isolate)
+        Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
         for fmu, description, starts in wiring.fmus()
     )
     units = tuple(replace(u, isolate=u.isolate or scene.isolate) for u in (*ours, *foreign))
@@ -77,7 +77,7 @@ def _not_replaced(rows: Iterable[tuple[str, str]], ends: Iterable[Ends]) -> list
     return [row for row in rows if row[1] not in fed]
 
 
-def _held(e: Ends, units: Iterable[Unit], hold: str, holds: Mapping[str, str]) -> Connection:
+def _held(e: Ends, units: Iterable[Fmu], hold: str, holds: Mapping[str, str]) -> Connection:
     """The connection of `e`; its own hold goes before [holds], and that before the scene's."""
     made = Connection(e.source, e.source_port, e.target, e.target_port, e.outputs, e.inputs)
     clocks = {u.name: u.clock for u in units}
@@ -88,7 +88,7 @@ def _held(e: Ends, units: Iterable[Unit], hold: str, holds: Mapping[str, str]) -
 
 
 def connect(
-    units: Iterable[Unit],
+    units: Iterable[Fmu],
     rows: Iterable[tuple[str, str]],
     hold: str,
     holds: Mapping[str, str],
@@ -132,6 +132,6 @@ def _split(end: str) -> tuple[str, str]:
     return fmu, variable
 
 
-def _has_output(units: Iterable[Unit], condition: Condition) -> bool:
+def _has_output(units: Iterable[Fmu], condition: Condition) -> bool:
     named = (u for u in units if u.name == condition.fmu)
     return any(s.name == condition.variable for u in named for s in u.description.outputs)

@@ -15,12 +15,12 @@ from dataclasses import dataclass, field, replace
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.records import INTERPOLATING, Latency, PowerPort, Spring
+from hapticlink.orchestrator.scene.records import INTERPOLATING, Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import haptic_loop, springs
 from hapticlink.orchestrator.system.haptic_loop import DERIVATIVES, KINDS, UNMIXED
 from hapticlink.orchestrator.system.ports import carries_power, derivative, names
-from hapticlink.orchestrator.system.system import Connection, Refused, Unit
+from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,14 @@ class Rules:
     power: tuple[PowerPort, ...] = ()
     between_plants: str | None = None
     """The hold within a rate between plants that are iterated; None where they are not."""
-    springs: tuple[Spring, ...] = ()
+    springs: tuple[SetSpring, ...] = ()
 
 
 def assign(
-    units: Iterable[Unit], connections: Iterable[Connection], timeline: Timeline, rules: Rules
+    fmus: Iterable[Fmu], connections: Iterable[Connection], timeline: Timeline, rules: Rules
 ) -> tuple[tuple[Connection, ...], tuple[Refused, ...]]:
     """The connections with their holds, latencies and kinds, and the holds that were refused."""
-    by_name = {u.name: u for u in units}
+    by_name = {u.name: u for u in fmus}
     refused: list[Refused] = []
     assigned = tuple(_assign(connections, by_name, timeline, rules, refused))
     assigned = tuple(_with_springs(assigned, by_name, rules, refused))
@@ -54,7 +54,7 @@ def assign(
 
 def _assign(
     connections: Iterable[Connection],
-    units: Mapping[str, Unit],
+    fmus: Mapping[str, Fmu],
     timeline: Timeline,
     rules: Rules,
     refused: list[Refused],
@@ -63,7 +63,7 @@ def _assign(
         if c.initial:
             yield c
             continue
-        source, target = (units[n].clock for n in (c.source, c.target))
+        source, target = (fmus[n].clock for n in (c.source, c.target))
         key = next((k for k in names(c) if k in rules.holds), None)
         latency = next((rules.delays[k] for k in names(c) if k in rules.delays), None)
         hold = rules.holds[key] if key else c.hold
@@ -75,9 +75,9 @@ def _assign(
                 hold = rules.downsampling if longest < other else "zoh"
         elif latency and not hold:
             hold = "zoh"
-        iterated = rules.between_plants if _between_plants(c, units) else None
+        iterated = rules.between_plants if _between_plants(c, fmus) else None
         hold = hold or iterated
-        reason = hold and _misfit(hold, c, units, rules.power, iterated is not None)
+        reason = hold and _misfit(hold, c, fmus, rules.power, iterated is not None)
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
             hold = "foh" if iterated else "zoh"
@@ -92,14 +92,14 @@ def _assign(
 
 def _with_springs(
     connections: Sequence[Connection],
-    units: Mapping[str, Unit],
+    fmus: Mapping[str, Fmu],
     rules: Rules,
     refused: list[Refused],
 ) -> Iterator[Connection]:
     """The connections, a hold that needs a spring refused where there is none for it."""
     for c in connections:
         needs = HOLDS[c.hold].needs if c.hold else None
-        reason = springs.misfit(c, rules.springs, connections, units) if needs == "spring" else None
+        reason = springs.misfit(c, rules.springs, connections, fmus) if needs == "spring" else None
         if c.hold and reason:
             key = next((k for k in names(c) if k in rules.holds), None)
             refused.append(Refused(key, c, c.hold, reason))
@@ -107,16 +107,16 @@ def _with_springs(
         yield c
 
 
-def _between_plants(c: Connection, units: Mapping[str, Unit]) -> bool:
+def _between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:
     """Whether two plants of a rate are connected."""
-    source, target = units[c.source], units[c.target]
+    source, target = fmus[c.source], fmus[c.target]
     return source.clock == target.clock and not source.sampled and not target.sampled
 
 
 def _misfit(
     hold: str,
     c: Connection,
-    units: Mapping[str, Unit],
+    fmus: Mapping[str, Fmu],
     power: Iterable[PowerPort],
     iterated: bool,
 ) -> str | None:
@@ -126,7 +126,7 @@ def _misfit(
         return f"coupling = 'iterated' interpolates here; take one of {', '.join(INTERPOLATING)}"
     if c.source_port in UNMIXED and not HOLDS[hold].gives_samples:
         return f"rows of {c.source_port} name bodies, points and normals: between two there is none"
-    if needs == "derivative" and derivative(c, units) is None:
+    if needs == "derivative" and derivative(c, fmus) is None:
         known = DERIVATIVES.get(c.source_port, f"der({c.source_port})")
         return (
             f"{c.source} does not put out the derivative of {c.source_port} ({known}); "

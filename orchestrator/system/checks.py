@@ -13,13 +13,13 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path
 from hapticlink.orchestrator.system import haptic_loop, springs
 from hapticlink.orchestrator.system.ports import names, turns
-from hapticlink.orchestrator.system.system import Connection, Refused, Unit
+from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 from hapticlink.orchestrator.system.timeline import clocks
 
 
 def unfit(
     scene: Scene,
-    units: Iterable[Unit],
+    units: Iterable[Fmu],
     connections: Iterable[Connection],
     refused: Iterable[Refused],
 ) -> Iterator[Finding]:
@@ -88,7 +88,7 @@ def _refused(scene: Scene, refused: Iterable[Refused]) -> Iterator[Finding]:
 
 
 def _power(
-    scene: Scene, i: int, p: records.PowerPort, units: Mapping[str, Unit]
+    scene: Scene, i: int, p: records.PowerPort, units: Mapping[str, Fmu]
 ) -> Iterator[Finding]:
     sizes = {}
     for end, causality in (("effort", "input"), ("displacement", "output")):
@@ -105,7 +105,7 @@ def _power(
         yield scene.place(("power", i), message)
 
 
-def step_sizes(scene: Scene, units: Iterable[Unit], timeline: Timeline) -> Iterator[Finding]:
+def step_sizes(scene: Scene, units: Iterable[Fmu], timeline: Timeline) -> Iterator[Finding]:
     """A finding for each FMU that takes steps of one size only, where its clock's differ."""
     paces, seconds = clocks(scene).paces, timeline.seconds
     for unit in units:
@@ -122,7 +122,7 @@ def step_sizes(scene: Scene, units: Iterable[Unit], timeline: Timeline) -> Itera
 
 
 def iterated(
-    scene: Scene, units: Iterable[Unit], connections: Iterable[Connection]
+    scene: Scene, units: Iterable[Fmu], connections: Iterable[Connection]
 ) -> Iterator[Finding]:
     """That nothing is there for `coupling = "iterated"` to iterate or interpolate."""
     plants = {u.name: u.clock for u in units if not u.sampled}

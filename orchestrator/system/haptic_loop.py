@@ -8,7 +8,7 @@ the measured one; without a device it holds the operational point itself.
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.scene.records import PowerPort, Spring
+from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 
 Row = tuple[str, str]
@@ -88,13 +88,13 @@ BLOCKS = (
 """Ports of the report's blocks; F_drift acts on the mechanism as -."""
 
 
-def springs_of(scene: Scene) -> tuple[Spring, ...]:
+def springs_of(scene: Scene) -> tuple[SetSpring, ...]:
     """Those of [[spring]], and F_drift of the scene's own controller."""
-    own: tuple[Spring, ...] = ()
+    own: tuple[SetSpring, ...] = ()
     if scene.controller and scene.controller.teleoperation:
         gains = scene.controller.teleoperation
         own = (
-            Spring(
+            SetSpring(
                 set_position="controller.x_S",
                 position="controller.x_D",
                 stiffness=gains.stiffness,

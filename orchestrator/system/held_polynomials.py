@@ -24,7 +24,7 @@ Vector = NDArray[np.float64]
 def degree(system: System, connection: Connection) -> int:
     """Of what is held for a plant within its step; 0 for a constant, and for matrices that are
     kept what they are, which is no polynomial."""
-    if not connection.hold or connection.initial or system.unit[connection.target].sampled:
+    if not connection.hold or connection.initial or system.fmu[connection.target].sampled:
         return 0
     if connection.kind in ("projector", "semidefinite"):
         return 0
@@ -35,7 +35,7 @@ def order(system: System, connection: Connection) -> int:
     """The highest derivative that the target of a connection gets with its inputs; 0 for none,
     as for inputs that are not continuous Reals."""
     continuous = all(s.type == "Real" and s.variability == "continuous" for s in connection.inputs)
-    taken = continuous and takes_input_derivatives(system.unit[connection.target].description)
+    taken = continuous and takes_input_derivatives(system.fmu[connection.target].description)
     return degree(system, connection) if taken else 0
 
 

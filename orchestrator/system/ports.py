@@ -10,7 +10,7 @@ from hapticlink.orchestrator.fmi.units import BASES
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import PowerPort
 from hapticlink.orchestrator.system.haptic_loop import DERIVATIVES
-from hapticlink.orchestrator.system.system import Connection, Unit
+from hapticlink.orchestrator.system.system import Connection, Fmu
 
 
 def names(c: Connection) -> tuple[str, str, str]:
@@ -30,7 +30,7 @@ def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
     return any(paired(c, entry, power) for entry in c.inputs)
 
 
-def turns(c: Connection, units: Mapping[str, Unit]) -> dict[int, float]:
+def turns(c: Connection, units: Mapping[str, Fmu]) -> dict[int, float]:
     """A whole turn in the unit of each entry of a connection that is an angle: 2 pi / factor, where
     its only base unit is rad; 2 pi where the source tells no unit."""
     source = units[c.source].description
@@ -43,7 +43,7 @@ def turns(c: Connection, units: Mapping[str, Unit]) -> dict[int, float]:
     }
 
 
-def derivative(c: Connection, units: Mapping[str, Unit]) -> str | None:
+def derivative(c: Connection, units: Mapping[str, Fmu]) -> str | None:
     """The port of the source that is the derivative of what the connection carries."""
     return slope(units[c.source].description, c.source_port, len(c.outputs))
 

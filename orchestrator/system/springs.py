@@ -7,21 +7,21 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from hapticlink.orchestrator.base.faults import Finding
 from hapticlink.orchestrator.fmi.units import SAME
-from hapticlink.orchestrator.scene.records import Spring
+from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.system import Connection, Unit
+from hapticlink.orchestrator.system.system import Connection, Fmu
 
 
-def spring(c: Connection, springs: Iterable[Spring]) -> Spring | None:
+def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     """The spring that a connection sets."""
     return next((s for s in springs if _end(c) in s.ports), None)
 
 
 def misfit(
     c: Connection,
-    springs: Iterable[Spring],
+    springs: Iterable[SetSpring],
     connections: Collection[Connection],
-    units: Mapping[str, Unit],
+    units: Mapping[str, Fmu],
 ) -> str | None:
     """Why what a connection sets cannot be kept in check."""
     found = spring(c, springs)
@@ -45,7 +45,7 @@ def misfit(
     return None
 
 
-def unfit(scene: Scene, units: Mapping[str, Unit]) -> Iterator[Finding]:
+def unfit(scene: Scene, units: Mapping[str, Fmu]) -> Iterator[Finding]:
     """What [[spring]] says of ports that are not there, or that do not fit together."""
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]
@@ -77,6 +77,6 @@ def _end(c: Connection) -> str:
     return f"{c.target}.{c.target_port}"
 
 
-def _size(end: str, units: Mapping[str, Unit], *causalities: str) -> int:
+def _size(end: str, units: Mapping[str, Fmu], *causalities: str) -> int:
     fmu, _, name = end.partition(".")
     return len(units[fmu].description.port(name, *causalities)) if fmu in units else 0

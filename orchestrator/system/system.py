@@ -12,11 +12,17 @@ from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.start_values import Starts
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.conditions import Condition
-from hapticlink.orchestrator.scene.records import Iteration, Latency, PowerPort, Spring, StepControl
+from hapticlink.orchestrator.scene.records import (
+    Iteration,
+    Latency,
+    PowerPort,
+    SetSpring,
+    StepControl,
+)
 
 
 @dataclass(frozen=True)
-class Unit:
+class Fmu:
     """One FMU of the system and the clock it steps at."""
 
     name: str
@@ -65,7 +71,7 @@ class System:
     are set. refused: default holds that did not fit. springs: what set positions set.
     """
 
-    units: tuple[Unit, ...]
+    fmus: tuple[Fmu, ...]
     connections: tuple[Connection, ...]
     timeline: Timeline
     coupling: str
@@ -77,11 +83,11 @@ class System:
     iteration: Iteration = field(default_factory=Iteration)
     step_control: StepControl | None = None
     refused: tuple[Refused, ...] = ()
-    springs: tuple[Spring, ...] = ()
+    springs: tuple[SetSpring, ...] = ()
 
     @cached_property
-    def unit(self) -> Mapping[str, Unit]:
-        return {u.name: u for u in self.units}
+    def fmu(self) -> Mapping[str, Fmu]:
+        return {u.name: u for u in self.fmus}
 
     @cached_property
     def connection(self) -> Mapping[str, Connection]:

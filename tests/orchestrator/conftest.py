@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.system.assemble import connect
-from hapticlink.orchestrator.system.system import System, Unit
+from hapticlink.orchestrator.system.system import Fmu, System
 
 
 @pytest.fixture(autouse=True)
@@ -84,7 +84,7 @@ def stamped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Timeline, str
 
     def make(timeline: Timeline, coupling: str) -> System:
         units = tuple(
-            Unit(n, d, timeline.of.get(n, "graphics" if n == "graphics" else "haptics"))
+            Fmu(n, d, timeline.of.get(n, "graphics" if n == "graphics" else "haptics"))
             for n, d in described.items()
         )
         return System(units, tuple(connect(units, ROWS, "zoh", {})), timeline, coupling)
@@ -110,13 +110,13 @@ class {name}(Fmi2Slave):
 
 
 @pytest.fixture
-def slave(tmp_path: Path) -> Callable[..., Unit]:
+def slave(tmp_path: Path) -> Callable[..., Fmu]:
     """(name, body of do_step) -> a Python FMU at the haptic rate, not one of ours."""
 
-    def make(name: str, body: str = "pass") -> Unit:
+    def make(name: str, body: str = "pass") -> Fmu:
         script = tmp_path / f"{name}.py"
         script.write_text(SLAVE.format(name=name, body=body))
-        return Unit(name, describe(FmuBuilder.build_FMU(script, dest=tmp_path)), "haptics")
+        return Fmu(name, describe(FmuBuilder.build_FMU(script, dest=tmp_path)), "haptics")
 
     return make
 

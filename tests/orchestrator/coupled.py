@@ -20,7 +20,7 @@ from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
 from hapticlink.orchestrator.system.assemble import connect
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
-from hapticlink.orchestrator.system.system import System, Unit
+from hapticlink.orchestrator.system.system import Fmu, System
 
 from . import oscillator
 
@@ -63,7 +63,7 @@ def with_derivative() -> Component:
 
 
 def stiff(k_1: float, k_2: float, k_c: float, c_c: float) -> tuple[Component, Component]:
-    """Unit masses on k_1 and k_2, at rest at 1 m, joined by k_c and c_c."""
+    """Fmu masses on k_1 and k_2, at rest at 1 m, joined by k_c and c_c."""
     first = Block(
         inputs=[Variable("F", (), "N")],
         states=[Variable("x", (), "m", 1.0), Variable("v", (), "m/s")],
@@ -152,7 +152,7 @@ def system(
     steps = int(until / period)
     clock = Clock("haptics", range(0, (steps + 3) * ticks, ticks))
     timeline = Timeline(period / ticks, steps * ticks, (clock,))
-    units = tuple(Unit(name, fmu, "haptics") for name, fmu in fmus.items())
+    units = tuple(Fmu(name, fmu, "haptics") for name, fmu in fmus.items())
     rows = list(rows)
     holds = {source: hold for source, _ in rows} if hold else {}
     rules = Rules(holds=holds, between_plants=between)

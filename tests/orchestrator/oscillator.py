@@ -23,10 +23,10 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
-from hapticlink.orchestrator.scene.records import PowerPort, Spring
+from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
 from hapticlink.orchestrator.system.assemble import connect
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
-from hapticlink.orchestrator.system.system import System, Unit
+from hapticlink.orchestrator.system.system import Fmu, System
 
 K, C, K_C, C_C = 100.0, 1.0, 100.0, 1.0
 START = np.array([0.0, 1.0, 1.0, 0.0])
@@ -118,7 +118,7 @@ ROWS = [("two.F", "one.F"), ("one.x", "two.x1"), ("one.v", "two.v1")]
 
 POWER = (PowerPort(effort="one.F", displacement="one.x"),)
 SPRINGS = (
-    Spring(
+    SetSpring(
         set_position="two.x1",
         position="two.x",
         stiffness=(K_C,),
@@ -143,7 +143,7 @@ def system(
 ) -> System:
     """`hold` for all three connections, or by source."""
     timeline = Timeline(step, steps, (Clock("haptics", range(0, steps + 3)),))
-    units = tuple(Unit(name, fmu, "haptics") for name, fmu in fmus.items())
+    units = tuple(Fmu(name, fmu, "haptics") for name, fmu in fmus.items())
     one_for_all = {source: hold for source, _ in ROWS} if isinstance(hold, str) else hold
     rules = Rules(holds=one_for_all, power=POWER, springs=SPRINGS)
     connections, refused = assign(units, tuple(connect(units, ROWS, "zoh", {})), timeline, rules)

@@ -92,7 +92,7 @@ def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(
     for c in system.connections:
         seen = tables[time.of[c.target]][f"{c.target}.seen_{c.target_port}"]
         stamps = [time.seconds(use.stamp) for use in said if use.connection == c.name]
-        if not system.unit[c.target].sampled:  # a row holds what the step that ends there has read
+        if not system.fmu[c.target].sampled:  # a row holds what the step that ends there has read
             stamps = [0.0, *stamps]
         np.testing.assert_allclose(seen, stamps, rtol=0, atol=1e-12)
     for clock in time.clocks:

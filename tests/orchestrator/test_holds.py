@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds import HOLDS, Site
+from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
 
@@ -44,14 +44,14 @@ def test_a_polynomial_of_the_holds_degree_is_continued_exactly(
     true = signal(tick + ahead)
     for name, exact_to in (("zoh", 0), ("foh", 1), ("second-order", 2)):
         if degree <= exact_to:
-            value = fed(HOLDS[name](Site(1)), times, signal).value(tick, ahead)
+            value = fed(HOLDS[name](HoldContext(1)), times, signal).value(tick, ahead)
             np.testing.assert_allclose(value, true, rtol=1e-9, atol=1e-9)
     if degree <= 1:
-        own = HOLDS["foh-derivative"](Site(1))
+        own = HOLDS["foh-derivative"](HoldContext(1))
         own.push(int(times[0]), np.concatenate([signal(times[0]), slope(times[0])]), int(times[0]))
         np.testing.assert_allclose(own.value(tick, ahead), true, rtol=1e-9, atol=1e-9)
         period = times[-1] - times[-2]
-        lead = fed(HOLDS["lead"](Site(1)), times, signal).value(tick)
+        lead = fed(HOLDS["lead"](HoldContext(1)), times, signal).value(tick)
         np.testing.assert_allclose(lead, signal(times[-1] + period / 2), rtol=1e-9, atol=1e-9)
 
 
@@ -61,7 +61,7 @@ def test_delayed_and_smooth_reach_each_sample_a_period_later(times: Vector) -> N
     arrival = int(times[-1])
     period = arrival - int(times[-2])
     for name in ("delayed", "smooth"):
-        hold = fed(HOLDS[name](Site(2)), times, signal)
+        hold = fed(HOLDS[name](HoldContext(2)), times, signal)
         np.testing.assert_allclose(hold.value(arrival + period), signal(arrival), atol=1e-9)
 
 
@@ -70,7 +70,7 @@ def test_delayed_goes_from_sample_to_sample_at_a_fixed_period(
     period: int, share: float, seed: int
 ) -> None:
     samples = np.random.default_rng(seed).normal(size=(6, 2))
-    hold = HOLDS["delayed"](Site(2))
+    hold = HOLDS["delayed"](HoldContext(2))
     for n, sample in enumerate(samples):
         hold.push(n * period, sample, n * period)
         expected = samples[max(n - 1, 0)] * (1 - share) + sample * share
@@ -87,7 +87,7 @@ def test_delayed_and_smooth_have_no_jump_at_any_stamps_and_arrivals(
 ) -> None:
     """Nor has `smooth` a kink. The arrivals are as irregular as the stamps, and never fall."""
     samples = iter(np.random.default_rng(seed).normal(size=(len(rows) + 1, 1)))
-    hold, eps = HOLDS[name](Site(1)), 1e-6
+    hold, eps = HOLDS[name](HoldContext(1)), 1e-6
     hold.push(0, next(samples), 0)
     stamp = arrival = 0
     for period, late in rows:
@@ -105,7 +105,7 @@ def test_delayed_and_smooth_have_no_jump_at_any_stamps_and_arrivals(
 
 def test_delayed_where_periods_vary() -> None:
     """Samples at 0, 20, 40, 50: at 50 it stands halfway between the two before."""
-    hold = HOLDS["delayed"](Site(1))
+    hold = HOLDS["delayed"](HoldContext(1))
     for stamp, sample in ((0, 0.0), (20, 1.0), (40, 2.0), (50, 3.0)):
         hold.push(stamp, np.array([sample]), stamp)
     assert [float(hold.value(50, s)[0]) for s in (0, 5, 10, 20)] == [1.5, 2.25, 3.0, 3.0]
@@ -113,7 +113,7 @@ def test_delayed_where_periods_vary() -> None:
 
 @given(stamps)
 def test_mean_over_a_slow_step_is_the_integral_of_the_samples(times: Vector) -> None:
-    hold = HOLDS["mean"](Site(1))
+    hold = HOLDS["mean"](HoldContext(1))
     hold.push(0, np.array([0.0]), 0)
     assert hold.value(0) == 0.0
     for t in times.tolist():
@@ -133,7 +133,7 @@ def test_a_projector_stays_a_projector_of_the_newest_rank(
     name: str, seed: int, ahead: float
 ) -> None:
     generator = np.random.default_rng(seed)
-    hold = Projector(lambda: HOLDS[name](Site(9)), 9)
+    hold = Projector(lambda: HOLDS[name](HoldContext(9)), 9)
     rank = int(generator.integers(0, 4))
     for k in range(6):
         new = k == 0 or k == 3
@@ -150,7 +150,7 @@ def test_a_projector_stays_a_projector_of_the_newest_rank(
 
 def test_a_turning_direction_is_continued_not_frozen() -> None:
     """A first-order hold between lines at 0 and 10 degrees points near 15 half a period later."""
-    hold = Projector(lambda: HOLDS["foh"](Site(4)), 4)
+    hold = Projector(lambda: HOLDS["foh"](HoldContext(4)), 4)
     for stamp, angle in ((0, 0.0), (10, np.radians(10))):
         line = np.array([np.cos(angle), np.sin(angle)])
         hold.push(stamp, np.outer(line, line).ravel(), stamp)
@@ -165,7 +165,7 @@ def test_a_mobility_stays_semidefinite_in_any_units(
 ) -> None:
     generator = np.random.default_rng(seed)
     units = np.outer(u := np.array([1.0, 1.0, 10**scale]), u).ravel()
-    plain, scaled = (Semidefinite(lambda: HOLDS[name](Site(9)), 9) for _ in range(2))
+    plain, scaled = (Semidefinite(lambda: HOLDS[name](HoldContext(9)), 9) for _ in range(2))
     for k in range(4):
         root = generator.normal(size=(3, 2))
         sample = (root @ root.T).ravel()
@@ -179,7 +179,7 @@ def test_a_mobility_stays_semidefinite_in_any_units(
 
 
 def test_a_wrapped_angle_is_continued_over_the_seam() -> None:
-    hold = Unwrapped(lambda: HOLDS["foh"](Site(2)), [1], [2 * np.pi])
+    hold = Unwrapped(lambda: HOLDS["foh"](HoldContext(2)), [1], [2 * np.pi])
     for k, angle in enumerate((3.0, 3.1, 3.2, 3.3)):
         wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
         hold.push(k, np.array([wrapped, wrapped]), k)
@@ -192,7 +192,7 @@ def test_a_turn_is_one_in_the_unit_of_each_angle(turn: float, seed: int) -> None
     """A walk in steps below half a turn, wrapped, is the walk again."""
     walk = np.cumsum(np.random.default_rng(seed).uniform(-0.49, 0.49, size=30)) * turn
     walk -= walk[0]
-    hold = Unwrapped(lambda: HOLDS["zoh"](Site(2)), [0, 1], [turn, 2 * np.pi])
+    hold = Unwrapped(lambda: HOLDS["zoh"](HoldContext(2)), [0, 1], [turn, 2 * np.pi])
     for k, angle in enumerate(walk.tolist()):
         both = np.array([(angle + turn / 2) % turn - turn / 2, 0.0])
         hold.push(k, both, k)

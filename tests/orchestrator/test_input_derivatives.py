@@ -20,7 +20,7 @@ from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.context import Site
+from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 
@@ -55,7 +55,7 @@ def test_derivatives_and_mean_of_a_polynomial(parts: list[float], width: float) 
 def test_what_an_fmu_is_told_is_the_hold(name: str, data: st.DataObject) -> None:
     """Its Taylor polynomial is the hold everywhere within a step, any samples and step sizes."""
     hold, size = HOLDS[name], 2
-    made = hold(Site(size, seconds=lambda ticks: 0.01 * ticks))
+    made = hold(HoldContext(size, seconds=lambda ticks: 0.01 * ticks))
     stamp, period = 0, 8
     width = data.draw(st.integers(1, 8))
     entries = 2 * size if hold.needs == "derivative" else size

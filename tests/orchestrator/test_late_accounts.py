@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds import HOLDS, Site
+from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.run.energy.meter import Meter
@@ -56,7 +56,9 @@ class Line:
 
     def __post_init__(self) -> None:
         self.x, self.v, self.force, self.held = (np.zeros(1) for _ in range(4))
-        hold = HOLDS[self.name](Site(1, displacement=lambda: self.x, velocity=lambda: self.v))
+        hold = HOLDS[self.name](
+            HoldContext(1, displacement=lambda: self.x, velocity=lambda: self.v)
+        )
         assert isinstance(hold, Account)
         self.hold = hold
         arrived = Told(hold)

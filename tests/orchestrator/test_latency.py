@@ -32,7 +32,7 @@ LATE = "graphics.stamp -> controller.g"
 
 def late(system: System, delays: dict[str, Latency], hold: str = "zoh") -> System:
     rules = Rules(hold=hold, delays=delays)
-    assigned, _ = assign(system.units, system.connections, system.timeline, rules)
+    assigned, _ = assign(system.fmus, system.connections, system.timeline, rules)
     return replace(system, connections=assigned)
 
 

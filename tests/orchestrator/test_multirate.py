@@ -26,7 +26,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.system.assemble import connect
-from hapticlink.orchestrator.system.system import System, Unit
+from hapticlink.orchestrator.system.system import Fmu, System
 
 from .oscillator import driven
 from .timelines import fixed
@@ -111,10 +111,10 @@ def forces(
 ) -> NDArray[np.float64]:
     """|F| of the sampled spring at every tick."""
 
-    def unit(name: str, fmu: str, clock: str) -> Unit:
+    def unit(name: str, fmu: str, clock: str) -> Fmu:
         values = [(s, gain) for s in fmus[fmu].port("K", "parameter")]
         values += [(s, ground) for s in fmus[fmu].port("K_g", "parameter")]
-        return Unit(name, fmus[fmu], clock, tuple(values))
+        return Fmu(name, fmus[fmu], clock, tuple(values))
 
     units = (
         unit("device", "device", "haptics"),

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds import HOLDS, Site
+from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_account import repayment
 
 Vector = NDArray[np.float64]
@@ -19,7 +19,7 @@ def account(name: str, forces: Vector, motion: Vector, every: int) -> Vector:
     """What a hold of forces renewed every so many ticks has made at each renewal (J)."""
     x = np.concatenate([[0.0], np.cumsum(motion)])
     now = np.zeros(1)
-    hold = HOLDS[name](Site(1, displacement=lambda: now))
+    hold = HOLDS[name](HoldContext(1, displacement=lambda: now))
     held, made, ideal = 0.0, [], 0.0
     for tick in range(len(x)):
         now[:] = x[tick]
@@ -80,7 +80,7 @@ def test_passive_makes_nothing_at_any_sample_where_the_way_is_foreseen(
     generator = np.random.default_rng(seed)
     every, step = rates  # ticks between samples, ticks of a step of the target
     now, speed = np.zeros(1), np.zeros(1)
-    hold = HOLDS["passive"](Site(1, displacement=lambda: now, velocity=lambda: speed))
+    hold = HOLDS["passive"](HoldContext(1, displacement=lambda: now, velocity=lambda: speed))
     start = 2 * step * every
     swing = 5.0 if every >= step else 10.0  # of a mean that leaves what is held, within +-5
     if known:
@@ -117,7 +117,7 @@ def test_no_hold_withstands_a_motion_that_waits_for_its_force(name: str) -> None
     """A source within +-1 and a motion that goes whichever way makes more, once the force is held:
     at least |F| |dx| a step, whatever is held. So a hold's theorem has to foresee the motion."""
     now = np.zeros(1)
-    hold = HOLDS[name](Site(1, displacement=lambda: now))
+    hold = HOLDS[name](HoldContext(1, displacement=lambda: now))
     force, made = 0.0, []
     for tick in range(50):
         hold.push(tick, np.array([force]), tick)

@@ -67,7 +67,7 @@ def test_every_fmu_is_stepped_without_gap_or_overlap(
     stamped: Make, timeline: Timeline, coupling: str
 ) -> None:
     plan = Plan(stamped(timeline, coupling))
-    reached = dict.fromkeys(plan.system.unit, 0)
+    reached = dict.fromkeys(plan.system.fmu, 0)
     rows = {c.name: 0 for c in timeline.clocks}
     for tick, event in plan:
         assert tick <= timeline.end
@@ -77,7 +77,7 @@ def test_every_fmu_is_stepped_without_gap_or_overlap(
                 reached[operation.fmu] = tick + operation.dticks
             elif isinstance(operation, Record):
                 rows[operation.clock] += 1
-    for unit in plan.system.units:
+    for unit in plan.system.fmus:
         assert (reached[unit.name] > timeline.end) == unit.sampled
     for clock in timeline.clocks:
         assert rows[clock.name] == sum(1 for start in clock.starts if start <= timeline.end)
@@ -91,7 +91,7 @@ def test_nothing_reads_the_future_and_holds_give_the_newest(
     """Of every clock: what it puts out is used at the first tick at or after its stamp, by plants
     and by sampled blocks. Jacobi's sampled outputs come an event later."""
     system = stamped(timeline, coupling)
-    sources = {c.name: system.unit[c.source] for c in system.connections}
+    sources = {c.name: system.fmu[c.source] for c in system.connections}
     for tick, connection, stamp in uses(Plan(system)):
         assert stamp <= tick
         source = sources[connection]

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.scene.conditions import parse_condition
-from hapticlink.orchestrator.system.system import System, Unit
+from hapticlink.orchestrator.system.system import Fmu, System
 
 from .timelines import fixed, single, varying
 
@@ -73,10 +73,10 @@ def test_same_run_same_bytes(stamped: Callable[[Timeline, str], System], tmp_pat
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
 
-Slave = Callable[..., Unit]
+Slave = Callable[..., Fmu]
 
 
-def alone(unit: Unit, steps: int = 64, stop_when: str | None = None) -> Plan:
+def alone(unit: Fmu, steps: int = 64, stop_when: str | None = None) -> Plan:
     condition = parse_condition(stop_when) if stop_when else None
     return Plan(System((unit,), (), single(64, steps), "gauss-seidel", condition))
 

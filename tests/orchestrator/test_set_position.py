@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.holds import HOLDS, Site
-from hapticlink.orchestrator.holds.energy_tank import SetPoint
+from hapticlink.orchestrator.holds import HOLDS, HoldContext
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.hold import Hold
 
 from .foreign_fmus import python_fmu_of, run
@@ -28,9 +28,9 @@ def held(
     stiffness: Vector, damping: Vector, longest: int, position: Callable[[], Vector]
 ) -> tuple[Hold, Hold]:
     """The holds of set position and set velocity."""
-    shared = SetPoint(stiffness, damping, position, longest * TICK, lambda tick: tick * TICK)
+    shared = EnergyTank(stiffness, damping, position, longest * TICK, lambda tick: tick * TICK)
     n = len(stiffness)
-    first, second = (HOLDS["pspm"](Site(n, set_point=(shared, row))) for row in (0, 1))
+    first, second = (HOLDS["pspm"](HoldContext(n, tank=(shared, row))) for row in (0, 1))
     return first, second
 
 
@@ -102,8 +102,8 @@ def test_a_set_position_that_pumps_a_mass_pumps_nothing() -> None:
 
     def swing(name: str) -> float:
         x, v, y = np.array([0.05]), 0.0, np.zeros(1)
-        shared = SetPoint(np.array([100.0]), np.zeros(1), lambda: x, TICK, lambda t: t * TICK)
-        hold = HOLDS[name](Site(1, set_point=(shared, 0)))
+        shared = EnergyTank(np.array([100.0]), np.zeros(1), lambda: x, TICK, lambda t: t * TICK)
+        hold = HOLDS[name](HoldContext(1, tank=(shared, 0)))
         cos, sin, largest = np.cos(10 * TICK), np.sin(10 * TICK), 0.0
         for tick in range(10000):
             if tick % 20 == 0:

@@ -12,28 +12,28 @@ from __future__ import annotations
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.plan import building_blocks, dependency_order
 from hapticlink.orchestrator.plan.operations import Event, Operation
-from hapticlink.orchestrator.system.system import System, Unit
+from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault naming a ring of sampled blocks."""
     sampled, continuous = building_blocks.firing(system, event)
     operations: list[Operation] = [*building_blocks.publish_ended(system, event, continuous)]
-    for unit in in_order(system, sampled):
-        operations += building_blocks.feed(system, event, unit)
-        operations += building_blocks.step(system, event, unit)
-        operations += building_blocks.publish(system, unit)
+    for fmu in in_order(system, sampled):
+        operations += building_blocks.feed(system, event, fmu)
+        operations += building_blocks.step(system, event, fmu)
+        operations += building_blocks.publish(system, fmu)
     operations += building_blocks.record(system, event)
-    for unit in building_blocks.starting(event, continuous):
-        operations += building_blocks.feed(system, event, unit)
-        operations += building_blocks.step(system, event, unit)
+    for fmu in building_blocks.starting(event, continuous):
+        operations += building_blocks.feed(system, event, fmu)
+        operations += building_blocks.step(system, event, fmu)
     return tuple(operations)
 
 
-def in_order(system: System, units: list[Unit]) -> list[Unit]:
-    """`units` so that each comes after those that feed it."""
-    ordered: list[Unit] = []
-    for group in dependency_order.groups(system, units):
+def in_order(system: System, fmus: list[Fmu]) -> list[Fmu]:
+    """`fmus` so that each comes after those that feed it."""
+    ordered: list[Fmu] = []
+    for group in dependency_order.groups(system, fmus):
         inside = dependency_order.direct(system, group)
         for part in dependency_order.components(inside):
             if len(part) > 1 or part[0] in inside[part[0]]:
@@ -42,5 +42,5 @@ def in_order(system: System, units: list[Unit]) -> list[Unit]:
                     f"sampled blocks feed each other in a ring: {ring}; take "
                     "coupling = 'jacobi', which puts a delay of one period into it"
                 )
-            ordered.append(system.unit[part[0]])
+            ordered.append(system.fmu[part[0]])
     return ordered

@@ -35,7 +35,7 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
 )
 from hapticlink.orchestrator.plan.schemes import gauss_seidel
-from hapticlink.orchestrator.system.system import Connection, System, Unit
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
@@ -52,7 +52,7 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     return tuple(operations)
 
 
-def groups(system: System, event: Event) -> list[list[Unit]]:
+def groups(system: System, event: Event) -> list[list[Fmu]]:
     """The plants that start a step, in order; those of a loop together."""
     starting = building_blocks.starting(event, building_blocks.firing(system, event)[1])
     clock = {u.name: u.clock for u in starting}
@@ -60,15 +60,15 @@ def groups(system: System, event: Event) -> list[list[Unit]]:
         u.name: {c.source for c in system.into(u.name) if clock.get(c.source) == u.clock}
         for u in starting
     }
-    return [[system.unit[n] for n in group] for group in dependency_order.components(feeds)]
+    return [[system.fmu[n] for n in group] for group in dependency_order.components(feeds)]
 
 
-def _repeat(system: System, event: Event, group: list[Unit]) -> Iterator[Operation]:
+def _repeat(system: System, event: Event, group: list[Fmu]) -> Iterator[Operation]:
     names = [u.name for u in group]
     rollback.require(system, names, "coupling = 'iterated'")
     loop = [c for n in names for c in system.into(n) if c.source in names]
     dticks = building_blocks.dticks(event, group[0])
-    body = [op for unit in group for op in _step(system, event, unit, loop)]
+    body = [op for fmu in group for op in _step(system, event, fmu, loop)]
     # The board still holds the guess of the end, by which feed-through is read.
     body += [Set(n, now=True) for n in names if n in system.get_after_set]
     body += [Get(n, dticks) for n in names]
@@ -82,27 +82,27 @@ def _repeat(system: System, event: Event, group: list[Unit]) -> Iterator[Operati
     )
 
 
-def _push_on(system: System, event: Event, group: list[Unit]) -> Iterator[Operation]:
+def _push_on(system: System, event: Event, group: list[Fmu]) -> Iterator[Operation]:
     """The end of a group's step, for the plants of its rate that come after it."""
     names, clock = [u.name for u in group], group[0].clock
-    plants = [u.name for u in system.units if u.clock == clock and not u.sampled]
+    plants = [u.name for u in system.fmus if u.clock == clock and not u.sampled]
     for c in (c for n in names for c in system.out_of(n) if c.hold):
         if c.target in plants and c.target not in names:
             yield Push(c.name, building_blocks.dticks(event, group[0]))
 
 
-def _step(system: System, event: Event, unit: Unit, loop: list[Connection]) -> Iterator[Operation]:
+def _step(system: System, event: Event, fmu: Fmu, loop: list[Connection]) -> Iterator[Operation]:
     """The step of a plant, each substep on the means and first moments of what `loop` gives."""
-    parts, dticks = system.substeps.get(unit.name, 1), building_blocks.dticks(event, unit)
+    parts, dticks = system.substeps.get(fmu.name, 1), building_blocks.dticks(event, fmu)
     inside = {c.name for c in loop}
     for part in range(parts):
-        for operation in building_blocks.feed(system, event, unit, part):
+        for operation in building_blocks.feed(system, event, fmu, part):
             match operation:
                 case Evaluate(name, order=0) if name in inside:
                     yield Blend(name, substep(part, parts, dticks))
                 case _:
                     yield operation
-        yield Step(unit.name, dticks, part, parts)
+        yield Step(fmu.name, dticks, part, parts)
 
 
 def substep(part: int, parts: int, dticks: int) -> tuple[tuple[float, Fraction], ...]:

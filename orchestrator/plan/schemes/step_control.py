@@ -22,7 +22,7 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
     Raises InputFault naming plants whose steps cannot be chosen, or where there is nothing to do.
     """
     assert system.step_control is not None
-    between = {u.clock: _between(system, u.clock) for u in system.units}
+    between = {u.clock: _between(system, u.clock) for u in system.fmus}
     if not any(between.values()):
         raise InputFault(
             "[step_control] chooses when connected plants of one rate exchange values, and there "
@@ -31,7 +31,7 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
     clocks = [f.clock for f in event.firings if between.get(f.clock) and not f.final]
     operations = [*scheme(system, building_blocks.without_steps(event, clocks))]
     for clock in clocks:
-        plants = [u for u in system.units if u.clock == clock and not u.sampled]
+        plants = [u for u in system.fmus if u.clock == clock and not u.sampled]
         fixed = [u.name for u in plants if not varies_step(u.description)]
         if fixed:
             raise InputFault(
@@ -50,7 +50,7 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
 
 def _between(system: System, clock: str) -> list[Connection]:
     """The connections between plants of a clock."""
-    plants = [u.name for u in system.units if u.clock == clock and not u.sampled]
+    plants = [u.name for u in system.fmus if u.clock == clock and not u.sampled]
     return [c for name in plants for c in system.into(name) if c.source in plants]
 
 
@@ -78,7 +78,7 @@ def _require_energy(system: System, clock: str, between: list[Connection]) -> No
 def part(system: System, kind: Part, scheme: Scheme) -> tuple[Operation, ...]:
     """One step of the plants of a clock, alone, from outputs that have been read; or the reading
     at its end, carried out at that tick."""
-    plants = tuple(u for u in system.units if u.clock == kind.clock and not u.sampled)
-    alone = replace(system, units=plants, ends_when=None)
+    plants = tuple(u for u in system.fmus if u.clock == kind.clock and not u.sampled)
+    alone = replace(system, fmus=plants, ends_when=None)
     event = Event(not kind.ended, (Firing(kind.clock, kind.dticks, kind.ended),))
     return tuple(op for op in scheme(alone, event) if not isinstance(op, Record))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.ports import paired, slope
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -27,9 +27,9 @@ Vector = NDArray[np.float64]
 class Bond:
     """By entry of the connection that carries power.
 
-    entries: its place in the connection. moved: the displacement's place on the board; moving: that
-    of its derivative, none where the target does not put it out. The effort (SI) is factor y +
-    offset, its displacement (SI, with the sign) scale x.
+    entries: its place in the connection. moved: the displacement's place in the signal vector;
+    moving: that of its derivative, none where the target does not put it out. The effort (SI) is
+    factor y + offset, its displacement (SI, with the sign) scale x.
     """
 
     entries: tuple[int, ...]
@@ -49,9 +49,9 @@ class Bond:
         return self.factor * self.scale
 
 
-def bond(c: Connection, system: System, board: Board) -> Bond | None:
+def bond(c: Connection, system: System, signals: SignalVector) -> Bond | None:
     """The bond of a connection; None where it carries no power."""
-    target = system.unit[c.target].description
+    target = system.fmu[c.target].description
     pairs = [(i, s, paired(c, s, system.power)) for i, s in enumerate(c.inputs)]
     found = [(i, s, p) for i, s, p in pairs if p]
     if not found or c.initial:
@@ -61,8 +61,8 @@ def bond(c: Connection, system: System, board: Board) -> Bond | None:
     signs = [p.sign * _factor(target, x) for x, (_, _, p) in zip(moved, found, strict=True)]
     return Bond(
         tuple(i for i, _, _ in found),
-        tuple(board.scalar(c.target, x.name) for x in moved),
-        _moving(target, c.target, moved, board),
+        tuple(signals.scalar(c.target, x.name) for x in moved),
+        _moving(target, c.target, moved, signals),
         np.array([s.conversion.factor for _, s, _ in found]) * units,
         np.array([s.conversion.offset for _, s, _ in found]) * units,
         np.array(signs),
@@ -77,7 +77,7 @@ def _displacement(target: Description, s: Scalar, effort: str, displacement: str
 
 
 def _moving(
-    target: Description, name: str, moved: Sequence[Scalar], board: Board
+    target: Description, name: str, moved: Sequence[Scalar], signals: SignalVector
 ) -> tuple[int, ...]:
     """The places of the derivatives, all or none."""
     found = []
@@ -85,7 +85,7 @@ def _moving(
         entries = [s.name for s in target.port(x.port, "output")]
         if derivative := slope(target, x.port, len(entries)):
             rows = target.port(derivative, "output")
-            found.append(board.scalar(name, rows[entries.index(x.name)].name))
+            found.append(signals.scalar(name, rows[entries.index(x.name)].name))
     return tuple(found) if len(found) == len(moved) else ()
 
 
@@ -95,10 +95,10 @@ def _factor(target: Description, scalar: Scalar) -> float:
 
 
 def reader(
-    board: Board, places: Sequence[int], factor: Vector, offset: Vector | float = 0.0
+    signals: SignalVector, places: Sequence[int], factor: Vector, offset: Vector | float = 0.0
 ) -> Callable[[], Vector]:
     """What reads factor y + offset of the values at `places`, each time into a new vector."""
-    values, view, where = board.values, board.view(places), np.array(places, dtype=np.intp)
+    values, view, where = signals.values, signals.view(places), np.array(places, dtype=np.intp)
     if np.any(factor != 1.0) or np.any(offset != 0.0):
         return lambda: factor * values[where] + offset
     return (lambda: values[where]) if view is None else view.copy

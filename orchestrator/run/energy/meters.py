@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from hapticlink.orchestrator.run.energy.bonds import bond, reader
 from hapticlink.orchestrator.run.energy.meter import Energy, Mark, Meter
-from hapticlink.orchestrator.run.signals import Board
+from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import System
 
 Call = Callable[[int], object]
@@ -15,21 +15,21 @@ Call = Callable[[int], object]
 class Meters:
     """One meter for each connection that carries power, of the efforts that its target gets."""
 
-    def __init__(self, system: System, board: Board) -> None:
+    def __init__(self, system: System, signals: SignalVector) -> None:
         self._meters: dict[str, Meter] = {}
         self._sources: dict[str, list[Meter]] = {}
         self._targets: dict[str, list[Meter]] = {}
         self._seconds = float(system.timeline.base)
         self._shares = {name: 1.0 / parts for name, parts in system.substeps.items()}
         for c in system.connections:
-            found = bond(c, system, board)
+            found = bond(c, system, signals)
             if found is None:
                 continue
             source, held = (
-                reader(board, found.of(places), found.factor, found.offset)
-                for places in (board.sources(c), board.mean(c))
+                reader(signals, found.of(places), found.factor, found.offset)
+                for places in (signals.sources(c), signals.mean(c))
             )
-            meter = Meter(source, held, reader(board, found.moved, found.scale))
+            meter = Meter(source, held, reader(signals, found.moved, found.scale))
             self._meters[c.name] = meter
             self._sources.setdefault(c.source, []).append(meter)
             self._targets.setdefault(c.target, []).append(meter)

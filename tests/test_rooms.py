@@ -1,0 +1,124 @@
+"""Imports run one way: from room to room in the order below, and between files without a ring.
+
+Imports inside functions and those for type checking count too, and no module is named by a string
+that an import statement could name.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROOMS = {
+    "components": (
+        ".",
+        "specs",
+        "integrators",
+        "linkage",
+        "forces",
+        "dynamics",
+        "formulations",
+        "contact",
+        "control",
+        "device",
+        "blocks",
+    ),
+    "fmus": (".", "native"),
+    "orchestrator": (
+        "base",
+        "fmi",
+        "holds",
+        "scene",
+        "system",
+        "plan",
+        "results",
+        "run",
+        "ssp",
+        ".",
+        "sweep",
+        "report",
+        "study",
+        "commands",
+    ),
+}
+"""By package, its rooms, each of which may import those before it; "." are its loose files."""
+
+Module = tuple[str, ...]
+
+
+def _files() -> dict[Module, Path]:
+    found = {}
+    for package in ROOMS:
+        for path in (ROOT / package).rglob("*.py"):
+            module = path.relative_to(ROOT).with_suffix("").parts
+            found[module[:-1] if module[-1] == "__init__" else module] = path
+    return found
+
+
+FILES = _files()
+
+
+def _imports(path: Path) -> Iterator[Module]:
+    """The modules of the project that a file imports anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.ImportFrom) or not node.module:
+            continue
+        module = tuple(node.module.split("."))
+        if module[0] == "hapticlink":
+            for name in node.names:
+                inner = (*module[1:], name.name)
+                yield inner if inner in FILES else module[1:]
+
+
+def _room(module: Module) -> str:
+    if module == ("orchestrator", "__main__"):
+        return "commands"
+    path = FILES[module].relative_to(ROOT).parts
+    return path[1] if len(path) > 2 else "."
+
+
+def test_packages_import_one_way() -> None:
+    order = list(ROOMS)
+    for module, path in FILES.items():
+        for imported in _imports(path):
+            if imported[0] in order:  # not the scenes, which hold no code
+                assert order.index(imported[0]) <= order.index(module[0]), f"{module} {imported}"
+
+
+@pytest.mark.parametrize("package", ["components", "orchestrator"])
+def test_rooms_import_those_before_them(package: str) -> None:
+    order = ROOMS[package]
+    rooms = {_room(module) for module in FILES if module[0] == package}
+    assert rooms == set(order)
+    against = [
+        f"{'.'.join(module)} imports {'.'.join(imported)}"
+        for module, path in FILES.items()
+        for imported in _imports(path)
+        if module[0] == imported[0] == package
+        if order.index(_room(imported)) > order.index(_room(module))
+    ]
+    assert not against
+
+
+def test_files_import_each_other_in_no_ring() -> None:
+    graph = {m: {i for i in _imports(p) if i in FILES and i != m} for m, p in FILES.items()}
+    try:
+        list(TopologicalSorter(graph).static_order())
+    except CycleError as ring:
+        pytest.fail(" -> ".join(".".join(module) for module in ring.args[1]))
+
+
+def test_no_import_is_hidden_in_a_string() -> None:
+    """Processes are started by module name, commands are imported when they are called (cyclopts);
+    a user's own modules are named by the user."""
+    for module, path in FILES.items():
+        text = path.read_text()
+        if module == ("orchestrator", "commands", "bench"):  # outside the installed package
+            continue
+        assert "import_module" not in text, path
+        assert "__import__" not in text, path
