@@ -4,14 +4,14 @@ Errata of components with tests of their own stand there: (1.3) in test_rules.py
 (4.3) in test_controller.py, (B.14)'s rows of U in test_resisted.py.
 """
 
-import appendix_a
 import numpy as np
 import pytest
-from blocks import Running
-from mechanisms import TABLE_6_1, WRENCH, five_bar
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.linkage import Directions, Mechanism
+from tests.blocks import Running
+from tests.components import appendix_a
+from tests.mechanisms import TABLE_6_1, WRENCH, five_bar
 
 M, L, J = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"]
 F_CM = (0.3, 0.6, 0.45, 0.7)  # not 1/2: f and 1 - f must differ

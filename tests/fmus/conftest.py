@@ -7,10 +7,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-import sample_components
 
 from hapticlink.fmus import build, build_native
 from hapticlink.fmus.check import Session, session
+from tests.fmus import sample_components
 
 
 @pytest.fixture(scope="session")

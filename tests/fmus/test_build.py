@@ -16,11 +16,11 @@ from pathlib import Path
 import casadi as ca
 import fmpy
 import pytest
-import sample_components
 
 from hapticlink.components.component import Variable
 from hapticlink.fmus import FmuError, build
 from hapticlink.fmus.errors import UnsupportedPlatform
+from tests.fmus import sample_components
 
 
 def test_same_component_same_bytes(fmus, tmp_path):

@@ -6,9 +6,9 @@ import threading
 from pathlib import Path
 
 import pytest
-import sample_components
 
 from hapticlink.fmus import build, cache, cached
+from tests.fmus import sample_components
 
 MATERIAL = {"scene": {"mass": 1.0, "rates": [512, 30]}}
 

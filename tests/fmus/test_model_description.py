@@ -6,7 +6,6 @@ import io
 
 import fmpy
 import pytest
-import sample_components
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from hapticlink.components.component import INERTIA, MOBILITY, WRENCH
 from hapticlink.fmus.errors import InvalidUnit
 from hapticlink.fmus.model_description import feed_through, initial_dependencies, model_description
 from hapticlink.fmus.units import BASES, base_unit
+from tests.fmus import sample_components
 
 N = {"kg": 1, "m": 1, "s": -2}
 

@@ -14,13 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sample_components
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from hypothesis import given
 from hypothesis import strategies as st
-from named_fmu import Named
 
 from hapticlink.fmus import FmuError, build_native, check_fmu
 from hapticlink.fmus.blocks import component
@@ -32,6 +30,8 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene import blocks
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
+from tests.fmus import sample_components
+from tests.fmus.named_fmu import Named
 
 OPTIONS = ("sensing=encoders", "controller.bias=full", "mechanism.directions=true")
 NAMES = ("hand", "controller", "haptic_device", "virtual_mechanism", "virtual_environment")

@@ -11,16 +11,16 @@ from pathlib import Path
 
 import fmpy
 import pytest
-import sample_components
 from fmpy.fmi1 import FMICallException
-from mechanisms import five_bar
-from named_fmu import Named
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Block, Variable
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.fmus import build, check_fmu
 from hapticlink.fmus.check import session
+from tests.fmus import sample_components
+from tests.fmus.named_fmu import Named
+from tests.mechanisms import five_bar
 
 OK, DISCARD, FATAL = 0, 2, 4
 

@@ -8,12 +8,12 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
-import sample_components
 from fmpy.fmi1 import FMICallException
-from named_fmu import Named
 
 from hapticlink.fmus import build, build_native, check_fmu
 from hapticlink.fmus.check import Session, session
+from tests.fmus import sample_components
+from tests.fmus.named_fmu import Named
 
 BUILD = {"python": build, "native": build_native}
 DISCARD, ERROR, FATAL = 2, 3, 4

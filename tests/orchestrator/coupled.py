@@ -21,8 +21,7 @@ from hapticlink.orchestrator.run.event_loop import Outcome, run
 from hapticlink.orchestrator.system.assemble import connect
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
 from hapticlink.orchestrator.system.system import Fmu, System
-
-from . import oscillator
+from tests.orchestrator import oscillator
 
 ROWS = oscillator.ROWS
 HERMITE = [*ROWS, ("one.a", "two.a1")]

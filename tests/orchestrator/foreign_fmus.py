@@ -12,8 +12,7 @@ from pythonfmu.builder import FmuBuilder
 
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.results import tables
-
-from .compiled import compiled
+from tests.orchestrator.compiled import compiled
 
 SLAVE = """
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real

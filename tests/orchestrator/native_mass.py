@@ -9,9 +9,8 @@ from pathlib import Path
 from fmpy import platform, sharedLibraryExtension
 
 from hapticlink.orchestrator.fmi.description import Description, describe
-
-from . import oscillator
-from .compiled import compiled
+from tests.orchestrator import oscillator
+from tests.orchestrator.compiled import compiled
 
 REALS = (
     "a", "b", "d", "x", "v", "acc", "F", "dF", "k", "c", "p", "q", "side", "warm", "sign",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
-from .foreign_fmus import python_fmu, with_units
+from tests.orchestrator.foreign_fmus import python_fmu, with_units
 
 HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <ssd:SystemStructureDescription version="1.0" name="nested"

@@ -10,10 +10,8 @@ from fractions import Fraction
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import Running
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mechanisms import five_bar, linkages
 
 from benchmarks.mechanisms import chain, n_four_bar
 from benchmarks.peers import pinocchio_peer
@@ -24,6 +22,8 @@ from hapticlink.components.dynamics.variables import parameters
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.orchestrator import open_scene
+from tests.blocks import Running
+from tests.mechanisms import five_bar, linkages
 
 
 def ours(linkage, q, qd, F):

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from blocks import Running
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
+from tests.blocks import Running
 
 H = 1 / 512
 

@@ -1,0 +1,168 @@
+"""The haptic device as a block: motion, sensing, and what it leaves out."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from hapticlink.components import specs
+from hapticlink.components.blocks.haptic_device import haptic_device
+from hapticlink.components.device import pantograph
+from tests.blocks import Running
+
+T = 1 / 512
+START = (-0.02, 0.01, 3.6)
+IDEAL = haptic_device(specs.Device())
+ENCODERS = haptic_device(specs.Device(sensing="encoders"))
+
+
+def at_start(component, **inputs):
+    return Running(component, inputs, {"x_start": START})
+
+
+def base_jacobian(pose):
+    at = ca.SX.sym("pose", 3)
+    p = {v.name: v.start for v in IDEAL.parameters}
+    return np.array(ca.Function("J", [at], [pantograph.jacobian(at, p)])(pose))
+
+
+def test_starts_at_rest_at_x_start():
+    for component in (IDEAL, ENCODERS):
+        y = at_start(component).y
+        np.testing.assert_array_equal(y["x_true"], START)
+        for name in ("v", "v_true", "F_hand_observed", "c"):
+            np.testing.assert_array_equal(y[name], 0)
+
+
+def test_ideal_sensing_has_no_encoder_and_no_observer():
+    assert [v.name for v in IDEAL.states] == ["x_true", "v_true"]
+    names = {v.name for v in IDEAL.parameters}
+    assert names.isdisjoint({"encoder_resolution", "omega_n", "k_D"})
+    device = at_start(IDEAL, F_hand=(0.3, -0.2, 0.001), F_motor=(0.1, 0.1, 0))
+    for _ in range(50):
+        device.step(T)
+    y = device.y
+    np.testing.assert_array_equal(y["x"], y["x_true"])
+    np.testing.assert_array_equal(y["v"], y["v_true"])
+    np.testing.assert_array_equal(y["F_hand_observed"], (0.3, -0.2, 0.001))
+
+
+def test_acceleration_from_rest_is_force_over_inertia():
+    wrench, motor = np.array([0.3, -0.2, 0.001]), np.array([-0.1, 0.4, -0.002])
+    device = at_start(IDEAL, F_hand=wrench, F_motor=motor)
+    M = device.y["M"]
+    device.step(1e-6)
+    np.testing.assert_allclose(device.y["v"] / 1e-6, np.linalg.solve(M, wrench + motor), rtol=1e-8)
+
+
+def test_held_torques_against_scipy():
+    """One long step: the torques of t_k stay, so the wrench turns with J_q; substeps of Heun's
+    method converge to DOP853 at second order."""
+    wrench, motor, h = np.array([0.1, 0.2, 0.001]), np.array([-0.4, 0.3, 0.004]), 0.04
+    reference = at_start(IDEAL)
+    x0 = np.r_[reference.x[:3], 0.2, -0.1, 3.0]
+    J0 = base_jacobian(x0[:3])
+    tau = J0 @ np.linalg.solve(J0.T @ J0, motor)
+
+    def rate(_, x):
+        reference.x = x
+        y = reference.y
+        F = base_jacobian(x[:3]).T @ tau + wrench - y["c"]
+        return np.concatenate([x[3:], np.linalg.solve(y["M"], F)])
+
+    expected = solve_ivp(rate, (0, h), x0, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    errors, substeps = [], (8, 16, 32)
+    for n in substeps:
+        device = at_start(haptic_device(specs.Device(substeps=n)), F_hand=wrench, F_motor=motor)
+        device.put(v_true=x0[3:])
+        device.step(h)
+        errors.append(np.abs(device.x - expected).max())
+    assert errors[0] < 1e-5
+    slope = np.polyfit(np.log(substeps), np.log(errors), 1)[0]
+    assert slope == pytest.approx(-2, abs=0.15)
+    J1 = base_jacobian(expected[:3])
+    assert np.abs(J1.T @ tau - motor).max() > 1e-3  # a held wrench would be something else
+
+
+def test_energy_balance_under_a_force():
+    """Work of hand and motors equals the kinetic energy gained, to the integrator's error."""
+    device = at_start(IDEAL, F_hand=(0.3, -0.1, 0.002))
+    work = 0.0
+    for _ in range(100):
+        before = device.y["x_true"]
+        device.step(T)
+        work += np.array((0.3, -0.1, 0.002)) @ (device.y["x_true"] - before)
+    v = device.y["v_true"]
+    assert v @ device.y["M"] @ v / 2 == pytest.approx(work, rel=2e-6)
+
+
+def test_measured_pose_is_within_a_count():
+    """One count is 0.15 to 0.21 mm and 4 to 5 mrad: half a count on each encoder at most."""
+    device = at_start(ENCODERS, F_hand=(0.1, -0.05, 0.0004))
+    seen, errors = set(), []
+    for _ in range(256):
+        device.step(T)
+        y = device.y
+        errors.append(y["x"] - y["x_true"])
+        seen.add(tuple(np.round(y["x"], 9)))
+    errors = np.abs(errors)
+    assert errors[:, :2].max() < 0.25e-3
+    assert errors[:, 2].max() < 6e-3
+    assert errors[:, :2].max() > 1e-6
+    assert 20 < len(seen) < 256  # quantised: it stays while no encoder counts
+
+
+def test_theta_is_continuous_over_many_turns():
+    device = at_start(ENCODERS)
+    device.put(v_true=(0, 0, 12.0))
+    for _ in range(600):
+        device.set(
+            F_motor=(*(-40 * (device.y["x_true"] - START)[:2] - 4 * device.y["v_true"][:2]), 0)
+        )
+        device.step(T)
+    y = device.y
+    assert y["x_true"][2] - START[2] > 2 * np.pi
+    assert abs(y["x"][2] - y["x_true"][2]) < 6e-3
+
+
+@pytest.mark.parametrize("rule", ["forward", "backward", "trapezoidal"])
+def test_observer_converges_to_a_constant_force(rule):
+    """The motors balance the hand: the device stays, and the observed force is the hand's."""
+    component = haptic_device(
+        specs.Device(
+            sensing="encoders", encoder_resolution=1e-6, observer=specs.Observer(rule=rule)
+        )
+    )
+    hand = np.array([0.4, -0.3, 0.003])
+    device = at_start(component, F_hand=hand, F_motor=-hand)
+    for _ in range(512):
+        device.step(T)
+    np.testing.assert_allclose(device.y["F_hand_observed"], hand, atol=2e-3 * np.abs(hand).max())
+    np.testing.assert_allclose(device.y["v"], 0, atol=2e-3)
+
+
+def test_observer_follows_a_moving_device():
+    """A free push for 0.2 s, encoders of 0.09 degrees: force to .1 N, velocity to 10 mm/s."""
+    hand = np.array([-0.3, 0.1, -0.001])
+    device = at_start(ENCODERS, F_hand=hand)
+    forces, velocities = [], []
+    for k in range(120):
+        device.step(T)
+        if k > 80:
+            y = device.y
+            forces.append(y["F_hand_observed"] - hand)
+            velocities.append(y["v"] - y["v_true"])
+    assert np.abs(np.mean(forces, axis=0))[:2].max() < 0.03
+    assert np.abs(velocities)[:, :2].max() < 0.02
+
+
+def test_workspace_margin_and_stop():
+    """Pushed out at full reach the margin goes negative and the stop holds the handle."""
+    device = at_start(IDEAL, F_hand=(0, 4.0, 0), F_motor=(0, 0, 0))
+    least = np.inf
+    for _ in range(1024):
+        device.set(F_hand=(0, 4.0 - 5 * device.y["v"][1], -0.01 * device.y["v"][2]))
+        device.step(T)
+        least = min(least, device.y["workspace_margin"])
+    assert -0.01 < least < 0
+    assert np.isfinite(device.x).all()

@@ -1,0 +1,134 @@
+"""Linkage terms against the report's Appendix A and against the laws they must obey."""
+
+from collections import Counter
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from hapticlink.components.component import Signals
+from hapticlink.components.dynamics.articulated_body import TreeInertia
+from hapticlink.components.dynamics.variables import parameters
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.specs.linkage import Body, Joint, Linkage, OperationalPoint
+from tests.components import appendix_a
+from tests.mechanisms import TABLE_6_1, five_bar, linkages
+
+F_CM = (0.3, 0.6, 0.45, 0.7)
+
+
+def functions(linkage, *names):
+    """Numpy-valued terms of a linkage at (q, qd), with its own parameter values."""
+    variables = parameters(linkage)
+    p = Signals("p", variables)
+    n = sum({"free": 3}.get(j.type, 1) for j in linkage.joint)
+    q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
+    model = LinkageModel(linkage, p, q, qd)
+    f = ca.Function("f", [q, qd, p.vector], [getattr(model, name) for name in names])
+    values = [s for v in variables for s in v.starts]
+    return lambda q, qd: [np.array(a) for a in f.call([ca.DM(q), ca.DM(qd), ca.DM(values)])]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_terms_meet_appendix_a(seed):
+    rng = np.random.default_rng(seed)
+    m, l, J = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"]  # noqa: E741
+    at = functions(five_bar(f=F_CM), "D", "C_qd", "W", "w", "h", "x_h", "J_h")
+    q, qd = rng.uniform(-3, 3, 4), rng.uniform(-5, 5, 4)
+    D, C_qd, W, w, h, x_h, J_h = at(q, qd)
+    tight = {"rtol": 1e-13, "atol": 1e-15}
+    np.testing.assert_allclose(D, appendix_a.D(q, m, l, J, F_CM), **tight)
+    C = appendix_a.C(q, qd, m, l, F_CM)
+    np.testing.assert_allclose(C_qd.ravel(), C @ qd, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(W, appendix_a.W(q, l), **tight)
+    np.testing.assert_allclose(w.ravel(), appendix_a.w(q, qd, l), rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(h.ravel(), appendix_a.h(q, l), **tight)
+    np.testing.assert_allclose(x_h.ravel(), appendix_a.r_h(q, l, F_CM), **tight)
+    np.testing.assert_allclose(J_h, appendix_a.J_h(q, l, F_CM), **tight)
+
+
+def test_random_linkages_have_loops_of_every_number():
+    seen = Counter()
+
+    @settings(max_examples=60)
+    @given(linkages())
+    def draw(drawn):
+        linkage, _, _ = drawn
+        seen[len(linkage.loop), any(j.type == "prismatic" for j in linkage.joint)] += 1
+
+    draw()
+    for loops in range(4):
+        assert seen[loops, False] + seen[loops, True] >= 5
+        assert seen[loops, True] >= 2
+
+
+@settings(max_examples=30, deadline=None)
+@given(linkages())
+def test_laws_of_any_linkage(drawn):
+    """D is symmetric positive definite, T = 1/2 qd' D qd, C qd = Ddot qd - dT/dq; loops are closed
+    and regular."""
+    linkage, q, qd = drawn
+    at = functions(linkage, "D", "C_qd", "kinetic_energy", "h", "W")
+    D, C_qd, T, h, W = at(q, qd)
+    np.testing.assert_allclose(D, D.T, atol=1e-14)
+    assert np.linalg.eigvalsh(D).min() > 0
+    np.testing.assert_allclose(T.item(), 0.5 * qd @ D @ qd, rtol=1e-12)
+    step = 1e-6
+    Ddot = (at(q + step * qd, qd)[0] - at(q - step * qd, qd)[0]) / (2 * step)
+    shifts = step * np.eye(len(q))
+    dT = np.array([at(q + e, qd)[2] - at(q - e, qd)[2] for e in shifts]).ravel() / (2 * step)
+    size = 1 + np.abs(Ddot).max()
+    np.testing.assert_allclose(C_qd.ravel(), Ddot @ qd - dT, atol=1e-7 * size)
+    assert np.abs(h).max(initial=0) < 1e-14
+    if linkage.loop:
+        assert np.linalg.cond(W @ np.linalg.solve(D, W.T)) < 1e6
+
+
+def test_free_body_is_its_own_inertia():
+    linkage = Linkage(
+        body=(Body(name="b", mass=2.0, inertia=0.1, center=(0.3, -0.2)),),
+        joint=(Joint(name="j", type="free", child="b"),),
+        operational_point=OperationalPoint(body="b", at=(0.3, -0.2)),
+    )
+    q, qd = np.array([0.1, -0.2, 0.7]), np.array([1.0, 2.0, 3.0])
+    D, J_h, T = functions(linkage, "D", "J_h", "kinetic_energy")(q, qd)
+    v = J_h @ qd
+    np.testing.assert_allclose(J_h.T @ np.diag([2.0, 2.0, 0.1]) @ J_h, D, atol=1e-15)
+    np.testing.assert_allclose(T.item(), 0.5 * (2 * v[0] ** 2 + 2 * v[1] ** 2 + 0.1 * v[2] ** 2))
+
+
+def test_mean_link_length_of_the_five_bar():
+    assert mean_link_length(five_bar()) == pytest.approx(np.mean(TABLE_6_1["l"]), rel=1e-15)
+
+
+def test_a_tree_without_a_root_is_refused():
+    linkage = Linkage(
+        body=(Body(name="a", mass=1, inertia=1), Body(name="b", mass=1, inertia=1)),
+        joint=(Joint(name="ab", parent="b", child="a"), Joint(name="ba", parent="a", child="b")),
+        operational_point=OperationalPoint(body="a"),
+    )
+    with pytest.raises(ValueError, match="no chain of joints leads to `ground`"):
+        functions(linkage, "x_h")
+
+
+@settings(max_examples=30, deadline=None)
+@given(linkages())
+def test_tree_recursion_is_D_and_its_inverse(drawn):
+    """D a and D^-1 b by the articulated-body recursion against the matrix, free joints too."""
+    linkage, q, qd = drawn
+    free = Joint(name="float", type="free", child="extra", parent=linkage.body[-1].name)
+    body = Body(name="extra", mass=0.7, inertia=0.02, center=(0.1, -0.2))
+    linkage = replace(linkage, body=(*linkage.body, body), joint=(*linkage.joint, free))
+    q, qd = np.r_[q, 0.2, -0.1, 0.5], np.r_[qd, 1, 2, 3]
+    variables = parameters(linkage)
+    p, symbol = Signals("p", variables), ca.SX.sym("q", len(q))
+    model = LinkageModel(linkage, p, symbol, ca.SX.sym("qd", len(q)))
+    tree, right = TreeInertia(model), ca.SX.sym("b", len(q), 2)
+    f = ca.Function("f", [symbol, p.vector, right], [model.D, tree.apply(right), tree.solve(right)])
+    b = np.random.default_rng(0).normal(size=(len(q), 2))
+    D, applied, solved = map(np.array, f(q, [s for v in variables for s in v.starts], b))
+    np.testing.assert_allclose(applied, D @ b, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(solved, np.linalg.solve(D, b), rtol=1e-8, atol=1e-8)

@@ -1,0 +1,81 @@
+"""The commands from outside: files, messages and exit statuses."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.results import tables
+from tests.orchestrator.conftest import status
+
+
+def test_a_mechanism_alone_runs_at_the_haptic_rate(
+    bar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status("run", str(bar), "--out", str(tmp_path / "out")) == 0
+    found = tables.load(tmp_path / "out")
+    time = np.arange(129) / 512
+    np.testing.assert_array_equal(found.haptics["time"], time)
+    x = found.haptics["virtual_mechanism.x"][:, 0]
+    np.testing.assert_allclose(x, 0.5 * time, rtol=0, atol=1e-13)  # no force: uniform motion
+    assert found.run["end"] == {"reason": "duration", "time": 0.25}
+    assert found.run["energies"] == "none"
+    assert found.run["fault"] is None
+    assert (tmp_path / "out" / "trajectories.png").stat().st_size > 0
+    assert "done at 0.25 s" in capsys.readouterr().out
+
+
+def test_build_writes_one_fmu_a_block(bar: Path, tmp_path: Path) -> None:
+    assert status("build", str(bar), "--out", str(tmp_path / "fmus")) == 0
+    assert [p.name for p in (tmp_path / "fmus").iterdir()] == ["virtual_mechanism.fmu"]
+
+
+def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status("info", "closed-loop") == 0
+    said = capsys.readouterr().out
+    assert "ticks of 1/7680 s, gauss-seidel" in said
+    assert "virtual_environment.Lambda_inv -> controller.Lambda_inv: 0 to 33.2, zoh" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "no-such-scene"], "neither a file nor a shipped scene"),
+        (["run", "closed-loop", "--set", "controler.topology=false"], "did you mean 'controller'"),
+        (["run", "closed-loop", "--set", "holds.hand.G=zoh"], "is no connection of this"),
+        (["run", "closed-loop", "--set", "stop_when=hand.G<0"], "there is no such output"),
+        (["run", "closed-loop", "--bogus"], "Unknown option"),
+        (["fly"], "Unknown command"),
+    ],
+)
+def test_bad_input_is_status_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status(*arguments) == 2
+    assert message in " ".join("".join(capsys.readouterr()).split())
+
+
+def test_a_run_that_fails_is_status_1_and_keeps_results(
+    bar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # A start at 1e308 m: the pose is finite, and overflows after some steps.
+    velocity = "linkage.start_velocity.slide=1e308"
+    start = "linkage.start.slide=1.7e308"
+    out = tmp_path / "out"
+    assert status("run", str(bar), "--out", str(out), "--set", velocity, "--set", start) == 1
+    assert "virtual_mechanism:" in capsys.readouterr().err
+    run = json.loads((out / "run.json").read_text())
+    assert run["fault"]["kind"] == "FmuFault"
+    assert (out / "haptics.csv").is_file()
+
+
+def test_the_command_imports_no_equations_before_it_needs_them() -> None:
+    code = (
+        "import sys, hapticlink.orchestrator.commands\n"
+        "print([m for m in ('casadi', 'numpy', 'matplotlib') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,125 @@
+"""Malformed FMUs and SSPs are refused with a reason, and nothing of them lands anywhere."""
+
+import stat
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.ssp import read
+from tests.orchestrator.foreign_fmus import DESCRIPTION
+
+LAUGHS = """<?xml version="1.0"?>
+<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">
+<!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;">]><fmiModelDescription fmiVersion="2.0">&c;
+</fmiModelDescription>"""
+
+
+def archive(path: Path, **entries: str | bytes) -> Path:
+    with zipfile.ZipFile(path, "w") as made:
+        for name, content in entries.items():
+            made.writestr(name, content)
+    return path
+
+
+def fmu(path: Path, text: str = DESCRIPTION, **entries: str) -> Path:
+    return archive(path, **{"modelDescription.xml": text, **entries})
+
+
+def link(path: Path) -> Path:
+    with zipfile.ZipFile(path, "w") as made:
+        entry = zipfile.ZipInfo("resources/passwords")
+        entry.external_attr = (stat.S_IFLNK | 0o777) << 16
+        made.writestr(entry, "/etc/passwd")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda p: p, "there is no such file"),
+        (lambda p: p.write_text("no zip") and p, "damaged, not a readable zip archive"),
+        (lambda p: fmu(p).write_bytes(fmu(p).read_bytes()[:-30]) and p, "damaged"),
+        (lambda p: archive(p, readme="none"), "holds no modelDescription.xml"),
+        (lambda p: fmu(p, "<fmiModelDescription>"), "not well-formed XML"),
+        (lambda p: fmu(p, LAUGHS), "declares a document type"),
+        (lambda p: fmu(p, LAUGHS.encode("utf-16").decode("latin1")), "not well-formed|document"),
+        (lambda p: fmu(p, **{"../evil.so": "x"}), "'../evil.so' points outside the archive"),
+        (lambda p: fmu(p, **{"a/../../evil": "x"}), "points outside the archive"),
+        (lambda p: fmu(p, **{"/etc/evil": "x"}), "points outside the archive"),
+        (lambda p: fmu(p, **{"C:/evil": "x"}), "not a path with forward slashes"),
+        (link, "is a symbolic link"),
+        (lambda p: fmu(p), "no binary for this platform .* only for none"),
+        (lambda p: fmu(p, **{"binaries/win95/faults.dll": "x"}), "only for win95"),
+        (lambda p: fmu(p, DESCRIPTION.replace('"2.0"', '"1.0"')), "FMI version 1.0"),
+        (lambda p: fmu(p, DESCRIPTION.replace("CoSimulation ", "ModelExchange ")), "co-simulation"),
+        (lambda p: fmu(p, DESCRIPTION.replace('index="2"', 'index="9"')), "cannot be used"),
+        (lambda p: fmu(p, DESCRIPTION.replace('start="0"', 'start="zero"')), "cannot be used"),
+    ],
+)
+def test_malformed_fmus(tmp_path: Path, make: Callable[[Path], Path], message: str) -> None:
+    path = make(tmp_path / "model.fmu")
+    with pytest.raises(InputFault, match=message) as refused:
+        describe(path)
+    assert str(path) in str(refused.value)
+    assert {p.name for p in tmp_path.iterdir()} <= {"model.fmu"}
+
+
+def test_a_damaged_entry_is_found(tmp_path: Path) -> None:
+    path = fmu(tmp_path / "model.fmu")
+    content = bytearray(path.read_bytes())
+    content[content.index(b"<CoSimulation")] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(InputFault, match="damaged"):
+        describe(path)
+
+
+def test_xml_of_any_size_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hapticlink.orchestrator.fmi.archive.MOST_XML", 100)
+    path = fmu(tmp_path / "model.fmu")
+    with (
+        opened(path, "FMU") as found,
+        pytest.raises(InputFault, match="bytes; at most 100 are read"),
+    ):
+        read_xml(found, "modelDescription.xml")
+
+
+SSD = """<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription version="1.0" name="two"
+ xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+ xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"
+ xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">
+<ssd:System name="top"><ssd:Elements>
+<ssd:Component name="a" source="resources/a.fmu"/>
+</ssd:Elements></ssd:System></ssd:SystemStructureDescription>"""
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda p: p, "there is no such file"),
+        (lambda p: p.write_text("no zip") and p, "damaged"),
+        (lambda p: archive(p, other="x"), "holds no SystemStructure.ssd"),
+        (lambda p: archive(p, **{"SystemStructure.ssd": LAUGHS}), "declares a document type"),
+        (lambda p: archive(p, **{"SystemStructure.ssd": "<a/>"}), "is no SSP 1.0"),
+        (lambda p: archive(p, **{"SystemStructure.ssd": SSD}), "there is no 'resources/a.fmu'"),
+        (lambda p: archive(p, **{"SystemStructure.ssd": SSD, "../a": "x"}), "points outside"),
+        (
+            lambda p: archive(p, **{"SystemStructure.ssd": SSD, "resources/a.fmu": "x"}),
+            "a.fmu: damaged",
+        ),
+        (
+            lambda p: archive(p, **{"SystemStructure.ssd": SSD.replace("resources", "../etc")}),
+            "there is no '../etc/a.fmu'",
+        ),
+    ],
+)
+def test_malformed_ssps(tmp_path: Path, make: Callable[[Path], Path], message: str) -> None:
+    path = make(tmp_path / "system.ssp")
+    with pytest.raises(InputFault, match=message):
+        read.tables(path)
+    assert {p.name for p in tmp_path.iterdir()} <= {"system.ssp"}

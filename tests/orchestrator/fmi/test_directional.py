@@ -1,0 +1,166 @@
+"""Directional derivatives of compiled FMUs in Newton's method: used, doubted, and done without."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.results.tables import Table
+from hapticlink.orchestrator.run.event_loop import Outcome
+from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.system.system import System
+from tests.orchestrator.compiled import compiled
+from tests.orchestrator.coupled import ROWS, simulate, system
+from tests.orchestrator.native_mass import FLAGS, native
+
+STEP, WRONG, FAILING = 1.0, 2.0, 3.0
+"""What an FMU offers: derivatives of its step, others, or an error."""
+STIFF = (100.0, 300.0, 2e4, 200.0)
+
+
+def iterated(folder: Path, offered: float, between: str, flags: tuple[str, ...] = FLAGS) -> System:
+    """The stiff pair of masses, each 1 kg at rest at 1 m, which takes constant inputs."""
+    k_1, k_2, k_c, c_c = STIFF
+    own = {"warm": 0.0, "offered": offered, "x": 1.0}
+    one = native(folder, "one", flags[1:], k=k_1, c=0.0, **own)
+    two = native(folder, "two", flags[1:], k=k_2 + k_c, c=c_c, p=k_c, q=c_c, a=1.0, **own)
+    return system(
+        {"one": one, "two": two}, ROWS, "iterated", Fraction(1, 400), Fraction(1, 4),
+        between=between, iteration=Iteration(method="newton", tolerance=1e-10),
+    )  # fmt: skip
+
+
+def solved(made: System, folder: Path) -> tuple[Outcome, Table]:
+    outcome, table = simulate(made, folder)
+    assert outcome.fault is None
+    return outcome, table
+
+
+@pytest.mark.parametrize("between", ["zoh", "foh"])
+def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path: Path, between: str) -> None:
+    """Linear plants: the Jacobian told is exact, so Newton needs no differences."""
+    outcome, table = solved(iterated(tmp_path, STEP, between), tmp_path)
+    without, same = solved(iterated(tmp_path, STEP, between, FLAGS[:-1]), tmp_path)
+    counts, plain = outcome.iterations, without.iterations
+    assert counts is not None
+    assert plain is not None
+    assert (counts.jacobians, counts.told_jacobians) == (0, 1)
+    assert (plain.jacobians, plain.told_jacobians) == (1, 0)
+    assert counts.most <= 3
+    assert counts.iterations < plain.iterations
+    assert table["one.calls"][-1] == 1
+    assert table["two.calls"][-1] == 2  # one for each input
+    np.testing.assert_allclose(table["one.x"], same["one.x"], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("offered", [WRONG, FAILING])
+def test_derivatives_that_do_not_help_give_way_to_differences(
+    tmp_path: Path, offered: float
+) -> None:
+    outcome, table = solved(iterated(tmp_path, offered, "foh"), tmp_path)
+    _, same = solved(iterated(tmp_path, STEP, "foh"), tmp_path)
+    assert outcome.iterations is not None
+    assert outcome.iterations.jacobians >= 1
+    assert outcome.iterations.unconverged == 0
+    np.testing.assert_allclose(table["one.x"], same["one.x"], rtol=0, atol=1e-8)
+
+
+def test_where_the_jacobian_is_not_that_of_a_step_differences_are_taken(tmp_path: Path) -> None:
+    """Substeps, and feed-through read after the step with other inputs."""
+    made = iterated(tmp_path, STEP, "foh")
+    for other in (
+        replace(made, substeps={"one": 1, "two": 2}),
+        replace(made, get_after_set=("two",)),
+    ):
+        outcome, table = solved(other, tmp_path)
+        assert outcome.iterations is not None
+        assert outcome.iterations.told_jacobians == 0
+        assert outcome.iterations.jacobians >= 1
+        assert table["two.calls"][-1] == 0
+
+
+# --- initialisation -----------------------------------------------------------------------
+
+
+def looped(folder: Path, offered: float, flags: tuple[str, ...] = FLAGS, **own: float) -> System:
+    """F = p (x_2 - a) + q v_2 of `two` drives `one`, whose acceleration a = F - k x_1 - c v_1 is
+    the motion that `two` takes: a loop of gain -p, far from contracting."""
+    values = {"warm": 0.0, "offered": offered, **own}
+    fmus = {
+        "one": native(folder, "one", flags, **values, x=0.3, v=0.2),
+        "two": native(folder, "two", flags, **values, x=0.5, v=-0.1),
+    }
+    rows = [("two.F", "one.F"), ("one.a", "two.x1")]
+    return system(fmus, rows, "jacobi", Fraction(1, 1000), Fraction(1, 1000))
+
+
+@pytest.mark.parametrize("isolate", [False, True])
+@pytest.mark.parametrize(
+    ("offered", "flags", "used"),
+    [(STEP, FLAGS, True), (WRONG, FLAGS, True), (FAILING, FLAGS, False), (STEP, FLAGS[:-1], False)],
+)
+def test_start_values_by_directional_derivatives(
+    tmp_path: Path, offered: float, flags: tuple[str, ...], used: bool, isolate: bool
+) -> None:
+    made = looped(tmp_path, offered, flags)
+    made = replace(made, units=tuple(replace(u, isolate=isolate) for u in made.units))
+    _, table = solved(made, tmp_path)
+    p, q, k, c = 100.0, 1.0, 100.0, 1.0
+    force = (p * (0.5 + k * 0.3 + c * 0.2) - q * 0.1) / (1 + p)
+    assert table["two.F"][0] == pytest.approx(force, rel=1e-12)
+    assert table["one.a"][0] == pytest.approx(force - k * 0.3 - c * 0.2, rel=1e-12)
+    assert (table["one.calls"][0] > 0) == (table["two.calls"][0] > 0) == used
+
+
+# --- FMI 3.0 ------------------------------------------------------------------------------
+
+LINEAR = """
+#include <stddef.h>
+/* y[0..1] (reference 7) = A u[0..2] (5) + b w (6), z (8) = w */
+int fmi3GetDirectionalDerivative(void *c, const unsigned *unknown, size_t nu, const unsigned *known,
+        size_t nk, const double *seed, size_t ns, double *found, size_t nf) {
+    double a[2][3] = {{1, 2, 3}, {4, 5, 6}}, b[2] = {7, 8}, u[3] = {0}, w = 0, *out = found;
+    for (size_t k = 0; k < nk; k++)
+        if (known[k] == 5) { for (int i = 0; i < 3; i++) u[i] = *seed++; ns -= 3; }
+        else if (known[k] == 6) { w = *seed++; ns--; }
+        else return 3;
+    for (size_t k = 0; k < nu; k++)
+        if (unknown[k] == 7) for (int i = 0; i < 2; i++, nf--)
+            *out++ = a[i][0] * u[0] + a[i][1] * u[1] + a[i][2] * u[2] + b[i] * w;
+        else if (unknown[k] == 8) { *out++ = w; nf--; }
+    return ns || nf ? 3 : 0;
+}
+"""
+
+
+def test_fmi3_arrays_are_derived_whole(tmp_path: Path) -> None:
+    """Of single entries of arrays, in any order; the arrays' sizes are what the standard asks."""
+    (tmp_path / "linear.c").write_text(LINEAR)
+    library = compiled(tmp_path / "linear.c", tmp_path, "linear")
+    sizes = {
+        "u": (5, 3, "input"),
+        "w": (6, 1, "input"),
+        "y": (7, 2, "output"),
+        "z": (8, 1, "output"),
+    }
+    scalars = {
+        (name, i): Scalar(f"{name}[{i + 1}]", ref, "Float64", causality, None, entry=i)
+        for name, (ref, size, causality) in sizes.items()
+        for i in range(size)
+    }
+    described = Description(Path("x.fmu"), "", "", "continuous", tuple(scalars.values()), "3")
+    slave = SimpleNamespace(dll=ctypes.CDLL(str(library)), component=0)
+    outputs = [scalars["z", 0], scalars["y", 1]]
+    inputs = [scalars["u", 2], scalars["w", 0], scalars["u", 0]]
+    found = derivatives(slave, described, outputs, inputs)
+    np.testing.assert_array_equal(found, [[0, 1, 0], [6, 8, 4]])
+    assert derivatives(slave, described, outputs, [scalars["y", 0]]) is None

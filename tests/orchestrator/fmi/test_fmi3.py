@@ -1,0 +1,111 @@
+"""FMI 3.0 from a compiled FMU: every number type, and what is called after a fault."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.orchestrator.foreign_fmus import NUMBERS, c_fmu3, python_fmu, run
+
+ONE = '[[fmu]]\nname = "one"\npath = "types.fmu"\n'
+ISOLATED = "isolate = true\n"
+EXTREMES = {
+    "Float64": -1e300, "Float32": 0.1, "Int64": -(2**53), "Int32": -(2**31), "Int16": -(2**15),
+    "Int8": -(2**7), "UInt64": 2**53, "UInt32": 2**32 - 1, "UInt16": 2**16 - 1, "UInt8": 2**8 - 1,
+    "Boolean": True,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_start_values_of_every_type(
+    tmp_path: Path, isolate: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    c_fmu3(tmp_path)
+    log = tmp_path / "log"
+    monkeypatch.setenv("FAULT_FMU_LOG", str(log))
+    starts = "".join(f"start.in_{k} = {str(v).lower()}\n" for k, v in EXTREMES.items())
+    experiment, found = run(tmp_path, ONE + isolate + starts + 'start.text = "Grüße"\n')
+    assert experiment.outcome.fault is None
+    assert sorted(EXTREMES) == sorted(NUMBERS)
+    for kind, value in EXTREMES.items():
+        column = found.haptics[f"one.out_{kind}"]
+        np.testing.assert_array_equal(column[0], 0.0)
+        np.testing.assert_array_equal(column[1:], np.float32(0.1) if kind == "Float32" else value)
+    assert log.read_text(encoding="utf-8").splitlines() == ["Grüße", "terminate", "free"]
+
+
+def test_connections_to_every_type_round_to_whole_numbers(tmp_path: Path) -> None:
+    c_fmu3(tmp_path)
+    python_fmu(tmp_path, "Gives", "self.y = 2.6 - self.steps * 0.25")
+    gives = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
+    wires = "".join(f'[[connection]]\nfrom = "gives.y"\nto = "one.in_{k}"\n' for k in NUMBERS)
+    experiment, found = run(tmp_path, gives + ONE + wires, "duration=0.125")
+    assert experiment.outcome.fault is None
+    y = found.haptics["gives.y"][:-1]
+    for kind in NUMBERS:
+        given = y.astype(np.float32) if kind == "Float32" else y
+        expected = given if "Float" in kind else y >= 0.5 if kind == "Boolean" else np.rint(y)
+        np.testing.assert_array_equal(found.haptics[f"one.out_{kind}"][1:], expected)
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize(
+    ("kind", "value", "limits"),
+    [
+        ("Int8", 128.0, "-128 to 127"),
+        ("UInt8", -1.0, "0 to 255"),
+        ("UInt64", 2.0**64, "0 to 18446744073709551615"),
+        ("Int64", 2.0**63, "-9223372036854775808 to 9223372036854775807"),
+        ("Int32", -(2.0**31) - 1, "-2147483648 to 2147483647"),
+    ],
+)
+def test_a_number_that_its_type_cannot_hold_is_a_fault(
+    tmp_path: Path, kind: str, value: float, limits: str, isolate: str
+) -> None:
+    c_fmu3(tmp_path)
+    python_fmu(tmp_path, "Gives", f"self.y = {value!r} if self.steps == 3 else 1.0")
+    gives = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
+    wire = f'[[connection]]\nfrom = "gives.y"\nto = "one.in_{kind}"\n'
+    experiment, found = run(tmp_path, gives + ONE + isolate + wire)
+    said = f"one: in_{kind} cannot be {value!r}: {kind} holds {limits} at t = 0.046875 s"
+    assert str(experiment.outcome.fault) == said
+    assert found.haptics[f"one.out_{kind}"].tolist() == [0, 0, 1, 1]
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize(
+    ("mode", "named", "calls"),
+    [
+        (1, None, ["terminate", "free"]),
+        (2, "fmi3DoStep returned discard at t = 0.046875 s", ["terminate", "free"]),
+        (3, "fmi3DoStep returned error at t = 0.046875 s", ["free"]),
+        (4, "fmi3DoStep returned fatal at t = 0.046875 s", []),
+        (7, "asks to end the simulation at t = 0.0625 s", ["terminate", "free"]),
+    ],
+)
+def test_what_is_called_after_a_fault(
+    tmp_path: Path,
+    mode: int,
+    named: str | None,
+    calls: list[str],
+    isolate: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """FMI 3.0 section 2.3.1: after an error only fmi3FreeInstance and fmi3Reset, after a fatal
+    error nothing; a discarded step leaves the FMU as it was."""
+    c_fmu3(tmp_path)
+    log = tmp_path / "log"
+    monkeypatch.setenv("FAULT_FMU_LOG", str(log))
+    experiment, found = run(tmp_path, ONE + isolate + f"start.mode = {mode}\n")
+    fault = experiment.outcome.fault
+    assert (fault and str(fault)) == (named and f"one: {named}")
+    assert len(found.haptics["time"]) == (33 if named is None else 4)
+    assert (log.read_text().splitlines() if log.exists() else []) == calls
+
+
+def test_an_isolated_one_that_crashes(tmp_path: Path) -> None:
+    c_fmu3(tmp_path)
+    experiment, found = run(tmp_path, ONE + ISOLATED + "start.mode = 5\n")
+    said = "one: its process ended by SIGABRT at t = 0.046875 s"
+    assert str(experiment.outcome.fault) == said
+    assert len(found.haptics["time"]) == 4

@@ -1,0 +1,277 @@
+"""Passive set-position modulation: a spring whose far end is held gives no more than it got."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.holds import HOLDS, HoldContext
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank
+from hapticlink.orchestrator.holds.hold import Hold
+from tests.orchestrator.foreign_fmus import python_fmu_of, run
+
+Vector = NDArray[np.float64]
+TICK = 1e-3
+
+
+def held(
+    stiffness: Vector, damping: Vector, longest: int, position: Callable[[], Vector]
+) -> tuple[Hold, Hold]:
+    """The holds of set position and set velocity."""
+    shared = EnergyTank(stiffness, damping, position, longest * TICK, lambda tick: tick * TICK)
+    n = len(stiffness)
+    first, second = (HOLDS["pspm"](HoldContext(n, tank=(shared, row))) for row in (0, 1))
+    return first, second
+
+
+@settings(max_examples=150)
+@given(st.integers(0, 2**32 - 1), st.booleans(), st.booleans(), st.integers(1, 4))
+def test_nothing_is_created_at_any_instant_on_any_motion_from_any_samples(
+    seed: int, damped: bool, moving: bool, longest: int
+) -> None:
+    """Random springs, samples at random ticks, steps of random length, motion straight or not
+    within them: the work of F = K (y - x) + B (w - v), in closed form on each straight piece, never
+    exceeds what the spring held at the start less what it holds now."""
+    generator = np.random.default_rng(seed)
+    n = 3
+    stiffness = 10 ** generator.uniform(-1, 3, n)
+    damping = 10 ** generator.uniform(-4, 1, n) * damped
+    x = generator.normal(size=n)
+    holds = held(stiffness, damping, longest, lambda: x)
+
+    def stored(at: Vector) -> float:
+        return float(stiffness @ (y - at) ** 2) / 2
+
+    work, scale = 0.0, 0.0
+    tick, due = 0, 0
+    sample, rate = generator.normal(size=n), generator.normal(size=n) * moving
+    for k in range(60):
+        if tick >= due:
+            if k:
+                sample, rate = generator.normal(size=n), 10 * generator.normal(size=n) * moving
+            holds[0].push(tick, sample, tick)
+            holds[1].push(tick, rate, tick)
+            due = tick + generator.integers(1, 8)
+        y, w = (hold.value(tick).copy() for hold in holds)
+        if k == 0:
+            begin = float(stiffness @ (sample - x) ** 2) / 2
+            assert moving or np.array_equal(y, sample)
+        step = int(generator.integers(1, longest + 1))
+        pieces = int(generator.integers(1, 4))
+        parts = generator.dirichlet(np.ones(pieces)) * step * TICK
+        for seconds in parts:
+            moved = generator.normal(size=n) * 10 ** generator.uniform(-3, -1)
+            if moving and generator.random() < 0.9:  # pulled along: what a set velocity costs most
+                moved = w * seconds * generator.uniform(0.0, 1.0)
+            at = x + moved
+            work += stored(x) - stored(at) + float(damping @ (w * moved - moved**2 / seconds))
+            x = at
+            scale = max(scale, abs(work), stored(x))
+            assert work <= begin - stored(x) + 1e-12 * scale
+        tick += step
+
+
+def test_a_sample_that_costs_no_more_than_there_is_passes_unchanged() -> None:
+    x = np.array([0.0])
+    position, velocity = held(np.array([100.0]), np.array([20.0]), 1, lambda: x)
+    position.push(0, np.array([0.1]), 0)  # 0.5 J to begin with
+    velocity.push(0, np.array([0.0]), 0)
+    assert position.value(0) == 0.1
+    x[:] = 0.02  # towards it: the spring gives 0.18 J, the damper takes 8 J
+    position.push(1, np.array([0.12]), 1)
+    velocity.push(1, np.array([0.5]), 1)
+    assert (position.value(1), velocity.value(1)) == (0.12, 0.5)
+    position.push(2, np.array([1.02]), 2)  # 50 J are needed: 0.5 - 0.18 + 8 J are there
+    velocity.push(2, np.array([0.0]), 2)
+    assert position.value(2) == pytest.approx(0.02 + np.sqrt(8.32 / 50.0), rel=1e-12)
+
+
+def test_a_set_position_that_pumps_a_mass_pumps_nothing() -> None:
+    """y steps with the sign of the mass's velocity: at resonance, without damping, each swing adds
+    to the last. 1 kg on 100 N/m, solved exactly in each step."""
+
+    def swing(name: str) -> float:
+        x, v, y = np.array([0.05]), 0.0, np.zeros(1)
+        shared = EnergyTank(np.array([100.0]), np.zeros(1), lambda: x, TICK, lambda t: t * TICK)
+        hold = HOLDS[name](HoldContext(1, tank=(shared, 0)))
+        cos, sin, largest = np.cos(10 * TICK), np.sin(10 * TICK), 0.0
+        for tick in range(10000):
+            if tick % 20 == 0:
+                hold.push(tick, np.array([0.02 * np.sign(v)]), tick)
+            y = hold.value(tick).copy()
+            e = x - y
+            x[:] = y + e * cos + v / 10 * sin
+            v = float((v * cos - e * 10 * sin)[0])
+            largest = max(largest, 0.5 * v * v + 50.0 * float((x - y)[0]) ** 2)
+        return largest
+
+    start = 0.5 * 100.0 * 0.05**2
+    assert swing("zoh") > 50 * start
+    assert swing("pspm") <= start * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("rate", [10, 30])
+def test_the_controllers_spring_creates_nothing_in_the_loop(tmp_path: Path, rate: int) -> None:
+    """F_drift on the handle, from the run's own signals. Beside the spring-damper's work there is
+    what the controller makes by sampling it, F held over a step: 1/2 K dx^2 + B (dx/T - v) dx."""
+    gains = np.array([100.0, 100.0, 0.1]), np.array([20.0, 20.0, 0.02])
+    sets = ("virtual_mechanism.x -> controller.x_S", "virtual_mechanism.v -> controller.v_S")
+    made = {}
+    for hold in ("zoh", "pspm"):
+        options = [f"hold={hold}", f"graphics.rate={rate}", "controller.bias=none"]
+        found = simulate("closed-loop-direct", tmp_path / hold, options).results
+        assert [found.run["holds"][name] for name in sets] == [hold, hold]
+        force, x, v = (
+            found.haptics[name]
+            for name in ("controller.F_drift", "haptic_device.x", "haptic_device.v")
+        )
+        dx = np.diff(x, axis=0)
+        sampled = (gains[0] / 2 * dx + gains[1] * (dx * 512.0 - v[:-1])) * dx
+        made[hold] = float((force[:-1] * dx - sampled).sum(axis=1).cumsum().max())
+    assert made["zoh"] > 1e-3
+    assert made["pspm"] <= 1e-12
+
+
+@pytest.mark.parametrize(
+    ("scene", "option", "why"),
+    [
+        ("closed-loop", "hold=pspm", "no held connection sets a spring"),
+        ("closed-loop-direct", "holds.virtual_mechanism.F_drift=pspm", "sets no spring"),
+        ("closed-loop-direct", "holds.controller.x_S=pspm", "controller.v_S sets the same spring"),
+        ("closed-loop-direct", "holds.controller.v_S=pspm", "controller.x_S sets the same spring"),
+    ],
+)
+def test_where_no_spring_is_set_or_half_of_one_it_is_refused(
+    tmp_path: Path, scene: str, option: str, why: str
+) -> None:
+    with pytest.raises(SceneFault, match=why):
+        simulate(scene, tmp_path, [option])
+
+
+def test_a_near_end_that_is_late_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneFault, match="near end of its spring has to be at hand"):
+        simulate("closed-loop-direct", tmp_path, ["hold=pspm", "delays.controller.x_D=0.004"])
+
+
+MOVES = """
+from math import sin
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.u, self.y, self.seen = 0.0, 0.0, 0.0
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+        self.register_variable(Real("seen", causality=Fmi2Causality.output))
+
+    def do_step(self, time, size):
+        self.y, self.seen = sin({rate} * (time + size)), self.u
+        return True
+"""
+SPRING = """
+[[fmu]]
+name = "far"
+path = "Far.fmu"
+rate = 20
+
+[[fmu]]
+name = "near"
+path = "Near.fmu"
+
+[[connection]]
+from = "far.y"
+to = "near.u"
+
+[[spring]]
+set_position = "near.u"
+position = "near.{position}"
+stiffness = [{stiffness}]
+"""
+
+
+def test_a_spring_of_another_fmu_is_kept_in_check(tmp_path: Path) -> None:
+    """Its near end goes its own way, as an output of the FMU that holds the spring."""
+    for name, rate in (("Far", 9.0), ("Near", 5.0)):
+        python_fmu_of(tmp_path, MOVES.format(name=name, rate=rate), f"{name}{uuid.uuid4().hex}")
+    made = {}
+    for hold in ("zoh", "pspm"):
+        text = SPRING.format(position="y", stiffness=100.0)
+        near = run(tmp_path, text, f"hold={hold}", "duration=2.0")[1].haptics
+        x, y = near["near.y"], near["near.seen"][1:]
+        work = np.cumsum(50.0 * ((y - x[:-1]) ** 2 - (y - x[1:]) ** 2))
+        made[hold] = float(np.max(work + 50.0 * (y - x[1:]) ** 2))
+    assert made["zoh"] > 10.0
+    assert made["pspm"] <= 1e-12
+
+
+@pytest.mark.parametrize(
+    ("position", "stiffness", "why"),
+    [
+        ("nothing", "100.0", "there is no input or output near.nothing"),
+        ("y", "100.0, 1.0", "2 gains for the 1 of near.u"),
+        ("y", "-1.0", "a gain below 0"),
+    ],
+)
+def test_a_spring_that_is_not_there_is_told(
+    tmp_path: Path, position: str, stiffness: str, why: str
+) -> None:
+    for name in ("Far", "Near"):
+        python_fmu_of(tmp_path, MOVES.format(name=name, rate=1.0), f"{name}{uuid.uuid4().hex}")
+    with pytest.raises(SceneFault, match=why):
+        run(tmp_path, SPRING.format(position=position, stiffness=stiffness), "hold=zoh")
+
+
+SWITCHED = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.u, self.y, self.x, self.v, self.most = 0.0, {start}, 0.05, 0.0, 0.0
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        for name in ("y", "x", "v", "most"):
+            self.register_variable(Real(name, causality=Fmi2Causality.output))
+
+    def do_step(self, time, size):
+        {body}
+        return True
+"""
+MASS = """
+        from math import cos, sin
+        e, c, s = self.x - self.u, cos(10 * size), sin(10 * size)
+        self.x, self.v = self.u + e * c + self.v / 10 * s, self.v * c - 10 * e * s
+        self.most = max(self.most, 0.5 * self.v ** 2 + 50.0 * (self.x - self.u) ** 2)
+        self.y = self.x"""
+BACK_AND_FORTH = "self.y = 0.3 if int((time + size) * 20 + 1e-6) % 2 == 0 else -0.3"
+LAG = """
+        from math import exp
+        self.y += (1 - exp(-50 * size)) * (self.u - self.y)"""
+
+
+def test_steps_that_are_taken_back_put_nothing_in_the_tank(tmp_path: Path) -> None:
+    """1 kg on 100 N/m, exact in each step, its far end switched 20 times a second; step doubling
+    cuts its own steps and takes some back."""
+    bodies = {"Far": (BACK_AND_FORTH, 0.3), "Near": (MASS, 0.05), "Lag": (LAG, 0.0)}
+    for name, (body, start) in bodies.items():
+        text = SWITCHED.format(name=name, body=body.strip(), start=start)
+        module = f"{name}{uuid.uuid4().hex}"
+        python_fmu_of(tmp_path, text, module, canGetAndSetFMUstate="true")  # type: ignore[arg-type]
+    scene = SPRING.format(position="x", stiffness=100.0)
+    scene += '[[fmu]]\nname = "lag"\npath = "Lag.fmu"\n'
+    scene += '[[connection]]\nfrom = "near.x"\nto = "lag.u"\n'
+    control = 'step_control={method="doubling", tolerance=0.05, min="1/5000"}'
+    options = (control, "haptics.rate=50", "duration=2.0", "holds.near.u=pspm")
+    experiment, found = run(tmp_path, scene, *options)
+    assert experiment.outcome.fault is None
+    assert experiment.outcome.steps["haptics"].rejected > 10
+    assert found.haptics["near.most"].max() <= 0.5 * 100.0 * 0.25**2 * (1 + 1e-9)

@@ -1,0 +1,143 @@
+"""Observed order, size of the error and limit of stability of every hold, on real FMUs.
+
+The two-mass oscillator with exact subsystems (computed independently, two ways). Where the plant
+must take inputs that vary within a step it takes substeps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.fmi.description import Description
+from tests.orchestrator.oscillator import WARM, built, exact, simulate, system
+
+Fmus = Mapping[str, Description]
+Hold = str | Mapping[str, str]
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
+    return built(tmp_path_factory.mktemp("oscillator"))
+
+
+OWN = {"two.F": "lead", "one.x": "foh-derivative", "one.v": "foh-derivative"}
+"""A force has no derivative to send along."""
+
+
+def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how: object) -> float:
+    """The largest error of a position within 1 s after the start."""
+    steps = round((1 + WARM) * rate)
+    made = system(fmus, Fraction(1, rate), steps, hold, substeps=substeps, **how)  # type: ignore[arg-type]
+    times, rows = simulate(made, folder)
+    return float(np.abs(rows - exact(times))[:, [0, 2]].max())
+
+
+@pytest.mark.parametrize(
+    ("hold", "substeps", "order"),
+    [
+        ("zoh", 1, 1),
+        ("latest", 1, 1),
+        ("lead", 1, 2),
+        ("foh", 1, 2),
+        ("foh", 4, 2),
+        (OWN, 1, 2),
+        ("second-order", 16, 3),
+        ("delayed", 4, 1),
+        ("smooth", 4, 1),
+        ("mean", 1, 1),
+    ],
+)
+def test_order_of_a_hold(fmus: Fmus, tmp_path: Path, hold: Hold, substeps: int, order: int) -> None:
+    rates = [200, 400, 800]
+    errors = [error(fmus, tmp_path, rate, hold, substeps) for rate in rates]
+    observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
+    assert observed == pytest.approx(order, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["passive", "nepce"])
+def test_holds_that_keep_account_are_of_order_one(fmus: Fmus, tmp_path: Path, name: str) -> None:
+    rates = [400, 800, 1600]
+    errors = [error(fmus, tmp_path, rate, {**OWN, "two.F": name}, 1) for rate in rates]
+    observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
+    assert observed == pytest.approx(1, abs=0.15)
+
+
+def test_a_set_position_that_is_not_paid_for_has_no_order(fmus: Fmus, tmp_path: Path) -> None:
+    """The motion that the other mass sends is refused in part, at any rate."""
+    hold = {"two.F": "lead", "one.x": "pspm", "one.v": "pspm"}
+    coarse, fine = (error(fmus, tmp_path, rate, hold, 1) for rate in (800, 1600))
+    assert fine > 0.7 * coarse
+
+
+@pytest.mark.parametrize("coupling", ["jacobi", "gauss-seidel-plants"])
+@pytest.mark.parametrize(("hold", "order"), [("zoh", 1), ("foh", 2)])
+def test_order_is_that_of_the_hold_for_either_coupling(
+    fmus: Fmus, tmp_path: Path, coupling: str, hold: str, order: int
+) -> None:
+    rates = [200, 400, 800]
+    errors = [error(fmus, tmp_path, rate, hold, 4, coupling=coupling) for rate in rates]
+    observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
+    assert observed == pytest.approx(order, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("hold", "substeps", "published"),
+    [
+        ("zoh", 1, 8.75e-2),
+        ("foh", 16, 8.90e-3),
+        ("second-order", 32, 1.53e-3),
+        ("lead", 1, 7.08e-3),
+    ],
+)
+def test_largest_error_at_a_hundredth(
+    fmus: Fmus, tmp_path: Path, hold: str, substeps: int, published: float
+) -> None:
+    assert error(fmus, tmp_path, 100, hold, substeps) == pytest.approx(published, rel=0.02)
+
+
+def growth(
+    fmus: Fmus, folder: Path, step: Fraction, hold: str, substeps: int, steps: int, **how: object
+) -> float:
+    """Of the envelope between the last quarters of a run; 1 is the limit of stability."""
+    made = system(fmus, step, steps, hold, substeps=substeps, **how)  # type: ignore[arg-type]
+    _, rows = simulate(made, folder)
+    size = np.abs(rows / [1.0, 17.0, 1.0, 17.0]).max(axis=1)
+    quarter = steps // 4
+    return float(size[-quarter:].max() / size[-2 * quarter : -quarter].max())
+
+
+JACOBI = [
+    ("zoh", 1, ".0404", True),
+    ("foh", 8, ".0630", True),
+    ("second-order", 16, ".0765", True),
+    ("lead", 1, ".0712", True),
+    ("delayed", 8, ".0198", True),
+    ("zoh", 1, ".0250", False),  # get all, set all, step all, as FMI wants it
+]
+SEIDEL = [("zoh", 1, ".0402"), ("foh", 8, ".0763"), ("second-order", 16, ".0843")]
+LIMITS = [(*row, "jacobi") for row in JACOBI]
+LIMITS += [(*row, True, "gauss-seidel-plants") for row in SEIDEL]
+
+
+@pytest.mark.parametrize(("hold", "substeps", "limit", "get_after_set", "coupling"), LIMITS)
+def test_limit_of_stability_to_one_percent(
+    fmus: Fmus,
+    tmp_path: Path,
+    hold: str,
+    substeps: int,
+    limit: str,
+    get_after_set: bool,
+    coupling: str,
+) -> None:
+    how = {"get_after_set": get_after_set, "coupling": coupling}
+    steps = 500 if substeps > 1 else 2000
+    below, above = (
+        growth(fmus, tmp_path, Fraction(limit) * part, hold, substeps, steps, **how)
+        for part in (Fraction(99, 100), Fraction(101, 100))
+    )
+    assert below < 1 < above

@@ -1,0 +1,127 @@
+"""Order of calls and causality of plans, without running an FMU."""
+
+from bisect import bisect_right
+from collections.abc import Callable
+from fractions import Fraction
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.plan.operations import Get, Record, Set, Step
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import delays, uses
+from hapticlink.orchestrator.plan.schemes import CAUSAL, SCHEMES
+from hapticlink.orchestrator.system.assemble import connect
+from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import timeline as timeline_of
+from tests.orchestrator.timelines import fixed, scenes, single, varying
+
+Make = Callable[[Timeline, str], System]
+shared = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+timelines = st.one_of(
+    st.builds(
+        fixed,
+        st.fractions(100, 1000, max_denominator=7),
+        st.fractions(5, 100, max_denominator=7),
+        st.integers(1, 120),
+        st.sampled_from(["exact", "tick"]),
+    ),
+    st.builds(
+        varying,
+        st.just(Fraction(512)),
+        st.just(Fraction(10)),
+        st.just(Fraction(60)),
+        st.integers(0, 99),
+        st.integers(1, 200),
+    ),
+    scenes().map(timeline_of),
+)
+couplings = st.sampled_from(sorted(SCHEMES))
+
+
+@shared
+@given(timelines, couplings)
+def test_no_get_after_set_without_a_step_between(
+    stamped: Make, timeline: Timeline, coupling: str
+) -> None:
+    plan = Plan(stamped(timeline, coupling))
+    dirty: set[str] = set()
+    for _, event in plan:
+        for operation in plan.block(event):
+            match operation:
+                case Set(fmu):
+                    dirty.add(fmu)
+                case Step(fmu, _):
+                    dirty.discard(fmu)
+                case Get(fmu):
+                    assert fmu not in dirty
+
+
+@shared
+@given(timelines, couplings)
+def test_every_fmu_is_stepped_without_gap_or_overlap(
+    stamped: Make, timeline: Timeline, coupling: str
+) -> None:
+    plan = Plan(stamped(timeline, coupling))
+    reached = dict.fromkeys(plan.system.fmu, 0)
+    rows = {c.name: 0 for c in timeline.clocks}
+    for tick, event in plan:
+        assert tick <= timeline.end
+        for operation in plan.block(event):
+            if isinstance(operation, Step):
+                assert reached[operation.fmu] == tick
+                reached[operation.fmu] = tick + operation.dticks
+            elif isinstance(operation, Record):
+                rows[operation.clock] += 1
+    for unit in plan.system.fmus:
+        assert (reached[unit.name] > timeline.end) == unit.sampled
+    for clock in timeline.clocks:
+        assert rows[clock.name] == sum(1 for start in clock.starts if start <= timeline.end)
+
+
+@shared
+@given(timelines, st.sampled_from(sorted(CAUSAL)))
+def test_nothing_reads_the_future_and_holds_give_the_newest(
+    stamped: Make, timeline: Timeline, coupling: str
+) -> None:
+    """Of every clock: what it puts out is used at the first tick at or after its stamp, by plants
+    and by sampled blocks. Jacobi's sampled outputs come an event later."""
+    system = stamped(timeline, coupling)
+    sources = {c.name: system.fmu[c.source] for c in system.connections}
+    for tick, connection, stamp in uses(Plan(system)):
+        assert stamp <= tick
+        source = sources[connection]
+        until = max(tick - 1, 0) if coupling == "jacobi" and source.sampled else tick
+        starts = timeline.clock(source.clock).starts
+        assert stamp == starts[bisect_right(starts, until) - 1]
+
+
+def test_gauss_seidel_delays_nothing_and_jacobi_the_sampled_by_one_period(stamped: Make) -> None:
+    timeline = fixed(Fraction(512), Fraction(30), 512)
+    period = 1 / 512
+    for coupling, late in (("gauss-seidel", 0.0), ("jacobi", period)):
+        ages = delays(Plan(stamped(timeline, coupling)))
+        for name in ("controller.stamp -> device.f", "controller.stamp -> mechanism.f"):
+            assert (ages[name].least, ages[name].most) == (late, late)
+        assert ages["device.stamp -> controller.d"].most == 0.0
+        # 30 Hz: the oldest frame in use is one tick of 1/7680 s short of 1/30 s plus.
+        assert ages["graphics.stamp -> controller.g"].most < 1 / 30
+
+
+def test_an_event_of_one_kind_shares_its_block(stamped: Make) -> None:
+    plan = Plan(stamped(fixed(Fraction(512), Fraction(30), 1536), "gauss-seidel"))
+    blocks = {id(plan.block(event)) for _, event in plan}
+    assert len(blocks) <= 8
+
+
+def test_a_ring_of_sampled_blocks_is_named(stamped: Make) -> None:
+    units = stamped(single(512, 4), "gauss-seidel").units[:3]
+    rows = [("controller.stamp", "hand.d"), ("hand.stamp", "controller.d")]
+    ring = System(units, tuple(connect(units, rows, "zoh", {})), single(512, 4), "gauss-seidel")
+    with pytest.raises(InputFault, match="ring: controller -> hand -> controller"):
+        list(delays(Plan(ring)))
+    as_jacobi = System(units, ring.connections, ring.timeline, "jacobi")
+    assert delays(Plan(as_jacobi))["hand.stamp -> controller.d"].most == 1 / 512

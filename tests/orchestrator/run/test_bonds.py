@@ -1,0 +1,161 @@
+"""Energy of connections whose numbers are converted on the way, or stand apart on the board: the
+sampled spring in closed form, whatever its units, factors and the order of its outputs."""
+
+from __future__ import annotations
+
+import uuid
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.experiment import Experiment, simulate
+from tests.orchestrator.foreign_fmus import python_fmu_of, scene, with_units
+
+SLAVE = """
+from math import cos, sin
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.u, self.y = [0.0, 0.0], [0.0, 0.0, 7.0]
+        for i in (0, 1):
+            self.add("{input}[%d]" % (i + 1), Fmi2Causality.input, self.u, i)
+        for name, i in {outputs}:
+            self.add(name, Fmi2Causality.output, self.y, i)
+
+    def add(self, name, causality, values, i):
+        self.register_variable(Real(name, causality=causality, getter=lambda: values[i],
+                                    setter=lambda v: values.__setitem__(i, v)))
+
+    def do_step(self, t, size):
+        u, end = self.u, t + size
+        self.y[0], self.y[1] = {motion}
+        return True
+"""
+STIFFNESS = np.array([300.0, 50.0])
+"""N/m, along x[1] and x[2]."""
+
+
+def path(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The way that Moves goes (m)."""
+    return np.stack([0.02 * np.sin(9 * t), 0.03 * (np.cos(7 * t) - 1)], axis=1)
+
+
+def made(folder: Path, name: str, units: tuple[str, str], *parts: object) -> None:
+    keys = ("input", "outputs", "motion")
+    text = SLAVE.format(name=name, **dict(zip(keys, parts, strict=True)))
+    entry, output = str(parts[0]), parts[1][0][0][0]  # type: ignore[index]
+    said = {f"{n}[{i}]": u for n, u in zip((entry, output), units, strict=True) for i in (1, 2)}
+    with_units(python_fmu_of(folder, text, uuid.uuid4().hex), **said)
+
+
+def fmus(folder: Path, length: str = "m", force: str = "N", sign: int = -1) -> None:
+    """Moves goes its way in `length` and takes efforts in `force`; Spring takes m and gives N."""
+    scale = {"m": 1.0, "mm": 1e3}[length]
+    moves = f"{scale} * .02 * sin(9 * end), {scale} * .03 * (cos(7 * end) - 1)"
+    made(folder, "Moves", (force, length), "f", [("x[1]", 0), ("z", 2), ("x[2]", 1)], moves)
+    pull = ", ".join(f"{sign * k} * u[{i}]" for i, k in enumerate(STIFFNESS))
+    made(folder, "Spring", ("m", "N"), "d", [("F[2]", 1), ("e", 2), ("F[1]", 0)], pull)
+
+
+FMUS = """
+[[fmu]]
+name = "moves"
+path = "Moves.fmu"
+[[fmu]]
+name = "spring"
+path = "Spring.fmu"
+timing = "sampled"
+[[power]]
+effort = "moves.f"
+displacement = "moves.x"
+"""
+BACK = """
+[[connection]]
+from = "moves.x[{0}]"
+to = "spring.d[{0}]"
+"""
+PULL = """
+[[connection]]
+from = "spring.F[{0}]"
+to = "moves.f[{0}]"
+"""
+
+
+def run(folder: Path, how: str = "", head: str = "") -> Experiment:
+    text = head + FMUS + "".join(BACK.format(i) + PULL.format(i) + how for i in (1, 2))
+    experiment = simulate(str(scene(folder, text)), folder / "out")
+    assert experiment.outcome.fault is None
+    return experiment
+
+
+def energies(experiment: Experiment) -> dict[str, NDArray[np.float64]]:
+    """made, held and ideal (J) of both entries."""
+    found = experiment.results.run["energies_within_a_rate"]
+    rows = [found[f"spring.F[{i}] -> moves.f[{i}]"] for i in (1, 2)]
+    return {key: np.array([row[key] for row in rows]) for key in ("made", "held", "ideal")}
+
+
+@pytest.mark.parametrize("length", ["m", "mm"])
+@pytest.mark.parametrize("force", ["N", "kN"])
+@pytest.mark.parametrize(("factor", "offset"), [(1.0, 0.0), (-2.5, 0.0), (0.5, 0.004)])
+def test_a_sampled_spring_through_conversions(
+    tmp_path: Path, length: str, force: str, factor: float, offset: float
+) -> None:
+    fmus(tmp_path, length, force)
+    found = energies(run(tmp_path, f"factor = {factor}\noffset = {offset}\n"))
+    stiffness, push = factor * STIFFNESS, offset * {"N": 1.0, "kN": 1e3}[force]
+    x = path(np.arange(33) / 64)
+    gone = x[-1] - x[0]
+    made = 0.5 * stiffness * np.sum(np.diff(x, axis=0) ** 2, axis=0)
+    ideal = -0.5 * stiffness * (x[-1] ** 2 - x[0] ** 2) + push * gone
+    np.testing.assert_allclose(found["made"], made, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found["ideal"], ideal, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found["held"], made + ideal, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("hold", ["passive", "nepce"])
+def test_holds_that_keep_account_do_so_in_the_units_of_the_target(
+    tmp_path: Path, hold: str
+) -> None:
+    head = f'holds."spring.F[1]" = "{hold}"\nholds."spring.F[2]" = "{hold}"\n'
+    fmus(tmp_path)
+    plain = energies(run(tmp_path, head=head))
+    fmus(tmp_path, "mm", "kN", sign=1)
+    turned = energies(run(tmp_path, "factor = -1.0\n", head))
+    for key, value in plain.items():
+        np.testing.assert_allclose(turned[key], value, rtol=1e-9)
+    fmus(tmp_path)
+    assert (plain["made"] < 0.2 * energies(run(tmp_path))["made"]).all()
+
+
+def test_a_vector_whose_entries_stand_apart_is_booked_as_one(tmp_path: Path) -> None:
+    fmus(tmp_path, "mm", "kN")
+    one_by_one = energies(run(tmp_path))
+    text = FMUS + (BACK + PULL).replace("[{0}]", "")
+    experiment = simulate(str(scene(tmp_path, text)), tmp_path / "whole")
+    found = experiment.results.run["energies_within_a_rate"]["spring.F -> moves.f"]
+    for key, values in one_by_one.items():
+        assert found[key] == pytest.approx(values.sum(), rel=1e-12)
+
+
+def test_step_control_by_energy_sees_the_energy_of_the_target(tmp_path: Path) -> None:
+    head = """[step_control]
+method = "ecco"
+tolerance = 1e-4
+energy = 0.1
+min = "1/8192"
+"""
+    steps = []
+    for units, how in (((), ""), (("mm", "kN", 1), "factor = -1.0\n")):
+        fmus(tmp_path, *units)
+        text = FMUS.replace('timing = "sampled"\n', "")
+        text += "".join(BACK.format(i) + PULL.format(i) + how for i in (1, 2))
+        experiment = simulate(str(scene(tmp_path, text + head)), tmp_path / "out")
+        assert experiment.outcome.fault is None
+        steps.append(experiment.outcome.steps["haptics"])
+    assert steps[0] == steps[1]
+    assert steps[0].shortest < 0.5 * steps[0].longest

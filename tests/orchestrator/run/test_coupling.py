@@ -1,0 +1,326 @@
+"""Iterated coupling, start values through feed-through loops, order from declared dependencies.
+
+On real FMUs, against closed forms and the two-mass oscillator's numbers, computed independently.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator import experiment
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault, SceneFault
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import delays, uses
+from hapticlink.orchestrator.run.fixed_point import Unconverged
+from hapticlink.orchestrator.scene.load import read
+from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.scene.scene import Scene
+from tests.orchestrator import oscillator
+from tests.orchestrator.coupled import (
+    HERMITE,
+    POWER,
+    ROWS,
+    described,
+    error,
+    gain,
+    simulate,
+    stiff,
+    stiff_exact,
+    system,
+    with_derivative,
+)
+
+Fmus = Mapping[str, Description]
+NEWTON = Iteration(method="newton", tolerance=1e-10)
+UNTIL = Fraction("1.06")
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
+    parts = (oscillator.one(), with_derivative())
+    return described(parts, tmp_path_factory.mktemp("oscillator"))
+
+
+def largest(fmus: Fmus, folder: Path, rate: int, between: str, substeps: int) -> float:
+    """The largest error of a position within 1 s."""
+    made = system(
+        fmus,
+        HERMITE,
+        "iterated",
+        Fraction(1, rate),
+        UNTIL,
+        between=between,
+        substeps=substeps,
+        get_after_set=("one", "two"),
+        iteration=NEWTON,
+    )
+    outcome, table = simulate(made, folder)
+    assert outcome.fault is None
+    return error(table)
+
+
+@pytest.mark.parametrize(
+    ("between", "substeps", "published"), [("foh", 2, 1.73e-3), ("hermite", 8, 7.8e-7)]
+)
+def test_error_of_the_two_mass_oscillator(
+    fmus: Fmus, tmp_path: Path, between: str, substeps: int, published: float
+) -> None:
+    found = largest(fmus, tmp_path, 100, between, substeps)
+    assert found == pytest.approx(published, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("between", "substeps", "order"),
+    [("zoh", 1, 1), ("foh", 1, 2), ("second-order", 4, 3), ("hermite", 4, 4)],
+)
+def test_order_is_that_of_the_interpolation(
+    fmus: Fmus, tmp_path: Path, between: str, substeps: int, order: int
+) -> None:
+    rates = [50, 100, 200]
+    errors = [largest(fmus, tmp_path, rate, between, substeps) for rate in rates]
+    observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
+    assert observed == pytest.approx(order, abs=0.1)
+
+
+def test_hermite_falls_back_to_linear_without_a_derivative(fmus: Fmus) -> None:
+    made = system(fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="hermite")
+    assert {c.source_port: c.hold for c in made.connections} == {
+        "F": "hermite",
+        "x": "hermite",
+        "v": "hermite",
+    }
+    by_force = replace(
+        fmus["two"], scalars=tuple(s for s in fmus["two"].scalars if "der" not in s.name)
+    )
+    less = system(
+        {"one": fmus["one"], "two": by_force}, ROWS, "iterated", Fraction(1, 100), UNTIL,
+        between="hermite",
+    )  # fmt: skip
+    assert next(c.hold for c in less.connections if c.source_port == "F") == "foh"
+
+
+def test_both_methods_find_the_same(fmus: Fmus, tmp_path: Path) -> None:
+    tables = []
+    for method in ("aitken", "newton"):
+        made = system(
+            fmus,
+            ROWS,
+            "iterated",
+            Fraction(1, 100),
+            Fraction(1, 2),
+            between="foh",
+            get_after_set=("one", "two"),
+            iteration=Iteration(method=method, tolerance=1e-11),  # type: ignore[arg-type]
+        )
+        outcome, table = simulate(made, tmp_path)
+        assert outcome.fault is None
+        tables.append(table.rows)
+    np.testing.assert_allclose(tables[0], tables[1], atol=1e-7)
+
+
+def test_what_was_iterated_is_counted(fmus: Fmus, tmp_path: Path) -> None:
+    made = system(
+        fmus, ROWS, "iterated", Fraction(1, 100), Fraction(1, 2), between="foh", substeps=3
+    )
+    outcome, _ = simulate(made, tmp_path)
+    found, calls = outcome.iterations, outcome.calls["two"]
+    assert found is not None
+    assert found.steps == 50
+    assert found.rollbacks == found.iterations - found.steps > 0
+    assert calls["step"] == 3 * found.iterations
+    assert (calls["save"], calls["rollback"]) == (50, found.rollbacks)
+
+
+def test_it_reads_the_future_and_says_so(fmus: Fmus) -> None:
+    plan = Plan(system(fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh"))
+    assert all(use.stamp == use.tick + 1 for use in uses(plan))
+
+
+def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus: Fmus, tmp_path: Path) -> None:
+    """Linear interpolation holds the mean of the source's samples, so it makes no energy: the
+    work of both books is the same."""
+    made = system(
+        fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh", power=POWER,
+        get_after_set=("one", "two"), iteration=NEWTON,
+    )  # fmt: skip
+    outcome, _ = simulate(made, tmp_path)
+    booked = outcome.energies["two.F -> one.F"]
+    assert abs(booked.held) > 1.0
+    assert abs(booked.made) < 1e-8
+
+
+STIFF = (100.0, 300.0, 2e4, 200.0)
+
+
+def test_newton_converges_where_the_fixed_point_does_not(tmp_path: Path) -> None:
+    made = described(stiff(*STIFF), tmp_path)
+
+    def coupled(coupling: str, rate: int, method: str = "newton") -> tuple[object, float]:
+        outcome, table = simulate(
+            system(
+                made, ROWS, coupling, Fraction(1, rate), Fraction(1),
+                between="foh" if coupling == "iterated" else None,
+                substeps=2,
+                get_after_set=("two",),
+                iteration=Iteration(method=method),  # type: ignore[arg-type]
+            ),
+            tmp_path,
+        )  # fmt: skip
+        found = np.stack([table["one.x"], table["two.x"]], axis=1)
+        return outcome.fault, float(np.abs(found - stiff_exact(table["time"], *STIFF)).max())
+
+    assert coupled("jacobi", 100)[1] > 1e6
+    fault = coupled("iterated", 100, "aitken")[0]
+    assert isinstance(fault, Unconverged)
+    assert "two.F -> one.F does not converge at t = " in str(fault)
+    (coarse_fault, coarse), (fine_fault, fine) = (coupled("iterated", rate) for rate in (100, 400))
+    assert coarse_fault is None
+    assert fine_fault is None
+    assert coarse < 1.0
+    assert fine < coarse / 12  # order 2
+
+
+def test_an_fmu_that_cannot_roll_back_is_named(fmus: Fmus) -> None:
+    rigid = {"one": fmus["one"], "two": replace(fmus["two"], flags=frozenset())}
+    made = system(rigid, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh")
+    with pytest.raises(InputFault, match=r"two cannot save .*canGetAndSetFMUstate"):
+        list(delays(Plan(made)))
+
+
+def test_fmus_in_processes_of_their_own_roll_back_too(fmus: Fmus, tmp_path: Path) -> None:
+    made = system(
+        fmus, ROWS, "iterated", Fraction(1, 100), Fraction(1, 10), between="foh", substeps=2,
+        get_after_set=("one", "two"), iteration=NEWTON,
+    )  # fmt: skip
+    _, here = simulate(made, tmp_path)
+    units = tuple(replace(u, isolate=True) for u in made.units)
+    outcome, apart = simulate(replace(made, units=units), tmp_path)
+    assert outcome.fault is None
+    np.testing.assert_array_equal(apart.rows, here.rows)
+
+
+def test_a_hold_that_does_not_interpolate_is_refused(fmus: Fmus) -> None:
+    made = system(fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh", hold="delayed")
+    assert {c.hold for c in made.connections} == {"foh"}
+
+
+# --- initialisation -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("a", "b"), [(2.0, 0.25), (2.0, 3.0), (-5.0, 4.0), (-1.0, 1.0)])
+def test_start_values_go_through_a_feed_through_loop_of_any_gain(
+    tmp_path: Path, a: float, b: float
+) -> None:
+    """y_a = a y_b + 1, y_b = b y_a - 3."""
+    parts = described([gain("a", a, 1.0), gain("b", b, -3.0)], tmp_path)
+    rows = [("a.y", "b.u"), ("b.y", "a.u")]
+    outcome, table = simulate(system(parts, rows, "jacobi", Fraction(1), Fraction(1)), tmp_path)
+    assert outcome.fault is None
+    assert table["a.y"][0] == pytest.approx((1 - 3 * a) / (1 - a * b), rel=1e-12)
+
+
+def test_a_loop_without_start_values_is_an_error_that_names_it(tmp_path: Path) -> None:
+    parts = described([gain("a", 2.0, 1.0), gain("b", 0.5, -3.0)], tmp_path)
+    rows = [("a.y", "b.u"), ("b.y", "a.u")]
+    outcome, _ = simulate(system(parts, rows, "jacobi", Fraction(1), Fraction(1)), tmp_path)
+    assert isinstance(outcome.fault, FmuFault)
+    assert "output y does not settle in initialisation, nor by Newton" in str(outcome.fault)
+
+
+# --- order from dependencies --------------------------------------------------------------
+
+
+def test_an_input_that_no_output_follows_makes_no_order(tmp_path: Path) -> None:
+    """b takes a's y directly, a takes b's into its state only: a goes first."""
+    parts = described([gain("a", 2.0, 1.0, "sampled"), gain("b", 3.0, 0.0, "sampled")], tmp_path)
+    rows = [("a.y", "b.u"), ("b.y", "a.w")]
+    made = system(parts, rows, "gauss-seidel", Fraction(1), Fraction(4))
+    ages = delays(Plan(made))
+    assert ages["a.y -> b.u"].most == 0.0
+    assert ages["b.y -> a.w"].least == 1.0
+    outcome, table = simulate(made, tmp_path)
+    assert outcome.fault is None
+    np.testing.assert_array_equal(table["b.y"], 3.0)
+
+
+def test_a_ring_of_direct_dependencies_is_named(tmp_path: Path) -> None:
+    parts = described([gain("a", 2.0, 1.0, "sampled"), gain("b", 3.0, 0.0, "sampled")], tmp_path)
+    rows = [("a.y", "b.u"), ("b.y", "a.u")]
+    made = system(parts, rows, "gauss-seidel", Fraction(1), Fraction(4))
+    with pytest.raises(InputFault, match=r"ring: (a -> b -> a|b -> a -> b);"):
+        list(delays(Plan(made)))
+
+
+# --- as a scene ---------------------------------------------------------------------------
+
+SCENE = """
+title = "Two masses"
+duration = 0.5
+coupling = "{coupling}"
+haptics.rate = 100
+get_after_set = ["one", "two"]
+{settings}
+fmu = [{{ name = "one", path = "{folder}/one.fmu" }}, {{ name = "two", path = "{folder}/two.fmu" }}]
+connection = [
+    {{ from = "two.F", to = "one.F" }},
+    {{ from = "one.x", to = "two.x1" }},
+    {{ from = "one.v", to = "two.v1" }},
+]
+power = [{{ effort = "one.F", displacement = "one.x" }}]
+"""
+
+
+def scene(fmus: Fmus, coupling: str, settings: str) -> Scene:
+    folder = fmus["one"].path.parent.as_posix()
+    return read(SCENE.format(coupling=coupling, settings=settings, folder=folder))
+
+
+def test_a_scene_is_iterated_as_it_says(fmus: Fmus, tmp_path: Path) -> None:
+    settings = 'iteration = { method = "newton", interpolation = "hermite" }\nsubsteps.one = 2'
+    found = experiment.simulate(scene(fmus, "iterated", settings), tmp_path).results.run
+    assert found["fault"] is None
+    assert found["causal"] is False
+    assert set(found["holds"].values()) == {"hermite"}
+    assert found["iterations"]["steps"] == 50
+    assert found["iterations"]["rollbacks"] > 0
+    assert found["iterations"]["jacobians"] >= 1
+
+
+@pytest.mark.parametrize(("method", "tolerance"), [("doubling", 0.3), ("ecco", 1e-3)])
+def test_a_scene_controls_its_steps(
+    fmus: Fmus, tmp_path: Path, method: str, tolerance: float
+) -> None:
+    control = f'method = "{method}", tolerance = {tolerance}, min = 1e-5, energy = 10.0'
+    settings = f"step_control = {{ {control} }}"
+    found = experiment.simulate(scene(fmus, "jacobi", settings), tmp_path).results.run
+    steps = found["controlled_steps"]["haptics"]
+    assert found["fault"] is None
+    assert found["base"] == "1/100000 s"
+    assert steps["taken"] > 50
+    assert steps["longest"] <= 0.01
+    assert (steps["rejected"] > 0) == (method == "doubling")
+
+
+ECCO = 'method = "ecco"'
+
+
+@pytest.mark.parametrize(
+    ("settings", "key"),
+    [
+        ("iteration.most = 0", "iteration.most"),
+        ("iteration.tolerance = -1.0", "iteration.tolerance"),
+        (f"step_control = {{ {ECCO}, tolerance = 0.0, min = 1e-4 }}", "step_control.tolerance"),
+        (f"step_control = {{ {ECCO}, tolerance = 1.0, min = 0 }}", "step_control.min"),
+        (f"step_control = {{ {ECCO}, tolerance = 1.0, min = 0.1, max = 1e-3 }}", "swap them"),
+    ],
+)
+def test_settings_that_cannot_be_are_told(fmus: Fmus, settings: str, key: str) -> None:
+    with pytest.raises(SceneFault, match=key):
+        scene(fmus, "iterated", settings)

@@ -1,0 +1,366 @@
+"""Faults made to happen through real FMUs: what each policy does, that results are kept, and that
+no process and no folder stays behind."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import tables
+from tests.orchestrator.foreign_fmus import SLAVE, c_fmu, python_fmu, python_fmu_of, run, scene
+
+resource = pytest.importorskip("resource")  # these are the signals and limits of POSIX
+
+ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
+OTHER = '[[fmu]]\nname = "other"\npath = "Other.fmu"\n'
+ISOLATED = "isolate = true\n"
+
+
+def folders() -> set[str]:
+    return {p.name for p in Path(tempfile.gettempdir()).glob("hapticlink-*")}
+
+
+def children() -> set[str]:
+    own = Path(f"/proc/{os.getpid()}/task")
+    found = (task / "children" for task in own.iterdir()) if own.exists() else ()
+    return {child for path in found if path.exists() for child in path.read_text().split()}
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left_behind(own_temporary_folder: Path) -> Iterator[None]:
+    before = folders(), children(), list(sys.path), os.getcwd()
+    yield
+    assert folders() <= before[0]
+    assert children() <= before[1]
+    assert os.getcwd() == before[3]
+    assert not [p for p in sys.path if "hapticlink-" in p]
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize("value", ["float('nan')", "float('inf')"])
+def test_a_value_that_is_not_finite_stops_or_is_held(
+    tmp_path: Path, value: str, isolate: str
+) -> None:
+    body = f"self.y = {value} if self.steps == 5 else float(self.steps)"
+    python_fmu(tmp_path, "Lost", body)
+    one = ONE.format("Lost.fmu") + isolate
+    experiment, found = run(tmp_path, one)
+    assert f"output y is {value[7:10]} at t = 0.078125 s" in str(experiment.outcome.fault)
+    assert found.haptics["one.y"].tolist() == [0, 1, 2, 3, 4]
+    experiment, found = run(tmp_path, one, "faults.nan=hold")
+    assert experiment.outcome.fault is None
+    assert found.haptics["one.y"][:8].tolist() == [0, 1, 2, 3, 4, 4, 6, 7]
+    assert found.run["held_outputs"] == {"one": 1}
+
+
+def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path: Path) -> None:
+    never = SLAVE.format(name="Never", body="pass").replace("0.0, 0.0, 1.0", "0.0, float('nan'), 1")
+    python_fmu_of(tmp_path, never, "never")
+    experiment, _ = run(tmp_path, ONE.format("Never.fmu"), "faults.nan=hold")
+    assert "one: output y is nan at t = 0 s" in str(experiment.outcome.fault)
+
+
+HALF = "\n        ".join(
+    ["if size > 0.005: return False", "self.gain += size", "self.y = self.gain"]
+)
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path: Path, isolate: str) -> None:
+    python_fmu(tmp_path, "Stiff", HALF, canGetAndSetFMUstate=True)
+    one = ONE.format("Stiff.fmu") + isolate
+    experiment, found = run(tmp_path, one)
+    assert "one: fmi2DoStep returned discard at t = 0 s" in str(experiment.outcome.fault)
+    assert found.haptics["time"].tolist() == [0.0]
+    experiment, found = run(tmp_path, one, "faults.discard=retry")
+    assert experiment.outcome.fault is None
+    np.testing.assert_allclose(found.haptics["one.y"][1:], 1 + found.haptics["time"][1:], 1e-15)
+    assert found.haptics["one.steps"][-1] == 32 * 4  # quarters of 1/64 s are below 5 ms
+    assert found.run["smaller_steps"] == {"one": 32}
+
+
+def test_a_retry_that_cannot_be_says_why(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Stiff", "return False")
+    experiment, _ = run(tmp_path, ONE.format("Stiff.fmu"), "faults.discard=retry")
+    assert "not retried: the FMU lacks canGetAndSetFMUstate" in str(experiment.outcome.fault)
+    python_fmu(tmp_path, "Stiffer", "return False", canGetAndSetFMUstate=True)
+    experiment, _ = run(tmp_path, ONE.format("Stiffer.fmu"), "faults.discard=retry")
+    assert "in steps of 1/1024 too" in str(experiment.outcome.fault)
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_an_exception_in_a_python_fmu(tmp_path: Path, isolate: str) -> None:
+    python_fmu(tmp_path, "Raises", "if time > 0.2: raise RuntimeError('broken gear')")
+    python_fmu(tmp_path, "Other")
+    experiment, found = run(tmp_path, ONE.format("Raises.fmu") + isolate + OTHER)
+    message = str(experiment.outcome.fault)
+    assert message.startswith("one: fmi2DoStep returned fatal at t = 0.203125 s")
+    assert "broken gear" in message
+    assert found.haptics["other.y"][-1] == found.haptics["time"][-1] == 0.203125
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize(
+    ("mode", "named", "calls"),
+    [
+        (1, None, ["terminate", "free"]),
+        (2, "discard", ["terminate", "free"]),
+        (3, "error", ["free"]),
+        (4, "fatal", []),
+    ],
+)
+def test_every_status(
+    tmp_path: Path,
+    mode: int,
+    named: str | None,
+    calls: list[str],
+    isolate: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What is called after a fault: FMI 2.0.5 sections 2.1.3 and 4.2.4."""
+    log = tmp_path / "log"
+    monkeypatch.setenv("FAULT_FMU_LOG", str(log))
+    c_fmu(tmp_path)
+    python_fmu(tmp_path, "Other")
+    text = ONE.format("faults.fmu") + isolate + f"start.mode = {mode}\n" + OTHER
+    experiment, found = run(tmp_path, text)
+    fault = experiment.outcome.fault
+    said = log.read_text().splitlines() if log.exists() else []
+    assert [line for line in said if "unloaded" not in line] == calls
+    if named is None:  # a warning is no fault
+        assert fault is None
+        return
+    assert str(fault) == f"one: fmi2DoStep returned {named} at t = 0.046875 s"
+    assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
+    assert found.run["fault"]["kind"] == "FmuFault"
+
+
+@pytest.mark.parametrize(
+    ("body", "how"),
+    [
+        ("if time > 0.2: __import__('os')._exit(3)", "its process ended with exit status 3"),
+        ("if time > 0.2: __import__('ctypes').string_at(0)", "its process ended by SIGSEGV"),
+        ("if time > 0.2: __import__('time').sleep(60)", "did not answer within 2 s"),
+    ],
+)
+def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(
+    tmp_path: Path, body: str, how: str
+) -> None:
+    python_fmu(tmp_path, "Dies", body)
+    ended = tmp_path / "ended"
+    said = f"\n    def terminate(self):\n        open({str(ended)!r}, 'w').close()\n"
+    python_fmu_of(tmp_path, SLAVE.format(name="Other", body="pass") + said, tmp_path.name)
+    text = ONE.format("Dies.fmu") + ISOLATED + OTHER
+    experiment, found = run(tmp_path, text, "faults.timeout=2")
+    message = str(experiment.outcome.fault)
+    assert message.startswith("one: ")
+    assert how in message
+    assert message.endswith("at t = 0.203125 s")
+    np.testing.assert_array_equal(found.haptics["time"], np.arange(14) / 64)
+    assert found.run["end"]["reason"] == "fault"
+    assert ended.exists()  # the other FMU was terminated
+
+
+def test_a_native_crash_and_an_endless_loop(tmp_path: Path) -> None:
+    c_fmu(tmp_path)
+    for mode, how in ((5, "ended by SIGABRT"), (6, "did not answer within 2 s and was ended")):
+        text = ONE.format("faults.fmu") + ISOLATED + f"start.mode = {mode}\n"
+        experiment, found = run(tmp_path, text, "faults.timeout=2")
+        assert how in str(experiment.outcome.fault)
+        assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
+
+
+def test_isolated_runs_give_the_same_bytes(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
+    wire = '[[connection]]\nfrom = "one.y"\nto = "two.u"\nfactor = 0.3\n'
+    back = '[[connection]]\nfrom = "two.y"\nto = "one.u"\n'
+    two = ONE.format("Gives.fmu").replace("one", "two") + "rate = 24\n"
+    text = ONE.format("Gives.fmu") + two + wire + back
+    for out, options in (("a", []), ("b", ["isolate=true"]), ("c", ["fmu.two.isolate=true"])):
+        ended = simulate(str(scene(tmp_path, text)), tmp_path / out, options)
+        assert ended.outcome.fault is None
+        assert (out == "a") == (ended.outcome.isolated == {})
+        for table in ("haptics.csv", "24hz.csv"):
+            assert (tmp_path / out / table).read_bytes() == (tmp_path / "a" / table).read_bytes()
+
+
+def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path: Path) -> None:
+    for name, value in (("first", 1.0), ("second", 2.0)):
+        (tmp_path / name).mkdir()
+        slave = SLAVE.format(name="Same", body=f"self.y = {value}")
+        python_fmu_of(tmp_path / name, slave, "same")
+    two = ONE.format("second/Same.fmu").replace("one", "two")
+    experiment, found = run(tmp_path, ONE.format("first/Same.fmu") + two)
+    assert experiment.outcome.fault is None
+    assert found.haptics["one.y"][-1] == 1.0
+    assert found.haptics["two.y"][-1] == 2.0
+    assert "another module 'msame'" in found.run["isolated"]["two"]
+
+
+# --- the commands from outside ------------------------------------------------------------
+
+COMMAND = [sys.executable, "-c", "from hapticlink.orchestrator.commands import main; main()"]
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
+    tmp_path: Path, isolate: str
+) -> None:
+    c_fmu(tmp_path)
+    path = scene(tmp_path, ONE.format("faults.fmu") + isolate)
+    log = tmp_path / "log"
+    command = [*COMMAND, "run", str(path), "--out", str(tmp_path / "out")]
+    subprocess.run(command, check=True, env=os.environ | {"FAULT_FMU_LOG": str(log)})
+    assert log.read_text().splitlines() == ["terminate", "free", "unloaded after its interpreter"]
+
+
+@pytest.mark.parametrize("crash", ["__import__('os')._exit(139)", "__import__('os').abort()"])
+def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
+    tmp_path: Path, crash: str
+) -> None:
+    python_fmu(tmp_path, "Dies", f"self.y = time + size\n        if time >= 2.0: {crash}")
+    path, out = scene(tmp_path, ONE.format("Dies.fmu"), duration=5), tmp_path / "out"
+    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    # Its end is that of the process beside it, which holds the same stream.
+    ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
+    assert ended.returncode in (139, -signal.SIGABRT)
+    assert b"isolate = true" in ended.stderr
+    found = tables.load(out)
+    np.testing.assert_array_equal(found.haptics["time"], np.arange(2 * 64 + 1) / 64)
+    np.testing.assert_array_equal(found.haptics["one.y"][1:], found.haptics["time"][1:])
+    assert found.run["end"] == {"reason": "fault", "time": 2.0}
+    assert found.run["fault"]["kind"] == "Crash"
+    assert not folders()
+
+
+def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path: Path) -> None:
+    name = "hapticlink.orchestrator.base.temporary_folders"
+    made = f"import {name} as folders; print(folders.new()); {{}}"
+    kill = "__import__('os').kill(__import__('os').getpid(), 9)"
+    script = [sys.executable, "-c", "import sys; " + made.format(f"sys.stdout.flush(); {kill}")]
+    dead = Path(subprocess.run(script, capture_output=True, text=True, check=False).stdout.strip())
+    others = [
+        Path(temporary_folders.new()),
+        dead.with_name(f"hapticlink-elsewhere-{dead.name[20:]}"),
+    ]
+    others[1].mkdir()
+    assert dead.is_dir()
+    subprocess.run([*COMMAND, "--version"], check=True, capture_output=True)
+    assert not dead.exists()
+    for other in others:
+        other.rmdir()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_a_signal_keeps_results_and_exits_with_1(
+    tmp_path: Path, number: signal.Signals, isolate: str
+) -> None:
+    started = tmp_path / "started"
+    body = f"""__import__('time').sleep(0.01)
+        if time > 0.3 and self.steps % 10 == 0:
+            with open({str(started)!r} + 'ing', 'w') as file:
+                print(__import__('os').getpid(), file=file)
+            __import__('os').replace({str(started)!r} + 'ing', {str(started)!r})"""
+    python_fmu(tmp_path, "Slow", body)
+    path = scene(tmp_path, ONE.format("Slow.fmu") + isolate, duration=100)
+    out = tmp_path / "out"
+    with subprocess.Popen([*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE) as running:
+        deadline = time.monotonic() + 60
+        while not started.exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        running.send_signal(number)
+        _, said = running.communicate(timeout=60)
+    assert running.returncode == 1
+    assert b"interrupted at t = " in said
+    with pytest.raises(ProcessLookupError):  # the FMU's, when it has one of its own
+        os.kill(int(started.read_text()), 0)
+    found = tables.load(out)
+    assert found.run["end"]["reason"] == "interrupted"
+    assert found.haptics["time"][-1] == found.run["end"]["time"] >= 0.3
+
+
+def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path: Path) -> None:
+    most = 40_000
+    limit = f"__import__('resource').setrlimit({resource.RLIMIT_FSIZE}, ({most}, {most}))"
+    python_fmu(tmp_path, "Fine", f"self.y = 1 / 3 + time; self.steps == 1 and {limit}")
+    path = scene(tmp_path, ONE.format("Fine.fmu"), duration=60)
+    out = tmp_path / "out"
+    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    ended = subprocess.run(command, capture_output=True, check=False)
+    assert ended.returncode == 1
+    assert b"File too large" in ended.stderr
+    assert b"Traceback" not in ended.stderr
+    found = tables.load(out)
+    assert found.run["end"]["time"] == found.haptics["time"][-1]
+    rows = found.haptics["time"]
+    np.testing.assert_array_equal(rows, np.arange(len(rows)) / 64)
+    assert (out / "haptics.csv").stat().st_size > most - 100
+    assert not list(out.glob(".*"))
+
+
+FILLS = """
+        if self.steps == {step}:
+            import contextlib
+            with contextlib.suppress(OSError), open({filler!r}, "wb", buffering=0) as file:
+                while file.write(bytes(4096)):
+                    pass"""
+
+
+@pytest.mark.skipif(shutil.which("unshare") is None, reason="no disk of one's own")
+@pytest.mark.parametrize("step", [50, 320])
+def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path: Path, step: int) -> None:
+    """A disk of 256 kB that fills up before any row is written, and with the last."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    body = "self.y = 1 / 3 + time" + FILLS.format(step=step, filler=str(disk / "filler"))
+    python_fmu(tmp_path, "Fine", body)
+    path = scene(tmp_path, ONE.format("Fine.fmu"), duration=5)
+    mount, told = f"mount -t tmpfs -o size=256k tmpfs {disk}", "No space left on device"
+    if subprocess.run(["unshare", "-rm", "sh", "-c", mount], check=False).returncode:
+        pytest.skip("no disk of one's own")
+    out = disk / "out"
+    command = f'{mount}; "$0" -c "$1" run {path} --out {out}; echo $?; cp -r {out} {tmp_path}'
+    ended = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", command, *(COMMAND[0], COMMAND[2])],
+        capture_output=True,
+        check=False,
+    )
+    assert ended.stdout.splitlines()[-1] == b"1", ended.stderr
+    assert told.encode() in ended.stderr
+    found = tables.load(tmp_path / "out")
+    assert found.run["end"]["reason"] == "fault"
+    assert told in found.run["fault"]["message"]
+    assert found.run["end"]["time"] == found.haptics["time"][-1]
+    assert found.run["calls"]["one"]["step"] > 0
+
+
+def test_bad_fmus_are_refused_before_anything_runs(tmp_path: Path) -> None:
+    c_fmu(tmp_path, guid="{another}")
+    experiment, _ = run(tmp_path, ONE.format("faults.fmu"))
+    assert "its guid may not be that of its binary" in str(experiment.outcome.fault)
+    (tmp_path / "broken.fmu").write_bytes((tmp_path / "faults.fmu").read_bytes()[:500])
+    with pytest.raises(InputFault, match="damaged, not a readable zip archive"):
+        run(tmp_path, ONE.format("broken.fmu"))
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["fault"]
+
+
+def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Gives")
+    text = 'extends = "closed-loop"\n' + ONE.format("Gives.fmu")
+    wire = '[[connection]]\nfrom = "one.y"\nto = "controller.x_D[1]"\n'
+    (tmp_path / "scene.toml").write_text(text + wire)
+    with pytest.raises(InputFault, match=r"line 7: .*x_D lose their source, haptic_device.x"):
+        simulate(str(tmp_path / "scene.toml"), tmp_path / "out")

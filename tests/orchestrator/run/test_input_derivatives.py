@@ -1,0 +1,249 @@
+"""Inputs that vary within a step: polynomial holds on compiled FMUs that interpolate.
+
+Against the two-mass oscillator's published errors, orders and limits of stability, which exact
+subsystems reach only where the hold acts within the step; without substeps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator.commands import main
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.system import held_polynomials
+from tests.orchestrator import coupled, oscillator
+from tests.orchestrator.native_mass import FLAGS, native
+from tests.orchestrator.plan.test_dependency_order import error, growth
+
+Fmus = Mapping[str, Description]
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
+    folder = tmp_path_factory.mktemp("native")
+    return {name: native(folder, name) for name in ("one", "two")}
+
+
+@given(st.lists(st.floats(-10, 10), min_size=2, max_size=4), st.floats(1e-4, 10))
+def test_derivatives_and_mean_of_a_polynomial(parts: list[float], width: float) -> None:
+    """Of p(t) = sum_j parts_j t^j / width^j, whose derivatives at 0 and mean are known."""
+    order = len(parts) - 1
+    values = np.polynomial.Polynomial(parts)(np.linspace(0, 1, order + 1))
+    derivatives, mean = held_polynomials.split(values[:, None], width)
+    expected = np.polynomial.Polynomial(parts)
+    np.testing.assert_allclose(mean, expected.integ()(1), rtol=0, atol=1e-12)
+    for j in range(1, order + 1):
+        found = derivatives[j - 1, 0] * width**j
+        np.testing.assert_allclose(found, expected.deriv(j)(0), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", sorted(n for n, hold in HOLDS.items() if hold.degree))
+@given(data=st.data())
+def test_what_an_fmu_is_told_is_the_hold(name: str, data: st.DataObject) -> None:
+    """Its Taylor polynomial is the hold everywhere within a step, any samples and step sizes."""
+    hold, size = HOLDS[name], 2
+    made = hold(HoldContext(size, seconds=lambda ticks: 0.01 * ticks))
+    stamp, period = 0, 8
+    width = data.draw(st.integers(1, 8))
+    entries = 2 * size if hold.needs == "derivative" else size
+    for _ in range(data.draw(st.integers(1, 4))):
+        stamp += period
+        sample = data.draw(st.lists(st.floats(-5, 5), min_size=entries, max_size=entries))
+        made.push(stamp, np.array(sample), stamp)
+    tick = stamp + data.draw(st.integers(0, period - width))  # no bend of the hold in the step
+    instants = np.linspace(0, width, hold.degree + 1)
+    values = np.stack([made.value(tick, s) for s in instants])
+    derivatives, mean = held_polynomials.split(values, 0.01 * width)
+    inside = np.linspace(0, width, 7)
+    found = [
+        values[0]
+        + sum(d * (0.01 * s) ** j / math.factorial(j) for j, d in enumerate(derivatives, 1))
+        for s in inside
+    ]
+    expected = [made.value(tick, s) for s in inside]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+    # Gauss-Legendre of two points is exact for cubics.
+    points = width / 2 * (1 + np.array([-1, 1]) / np.sqrt(3))
+    gauss = sum(made.value(tick, s) for s in points) / 2
+    np.testing.assert_allclose(mean, gauss, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("hold", "published"),
+    [("zoh", 8.75e-2), ("foh", 8.90e-3), ("second-order", 1.53e-3), ("lead", 7.08e-3)],
+)
+def test_largest_error_at_a_hundredth(
+    fmus: Fmus, tmp_path: Path, hold: str, published: float
+) -> None:
+    assert error(fmus, tmp_path, 100, hold, 1) == pytest.approx(published, rel=0.02)
+
+
+@pytest.mark.parametrize(("hold", "order"), [("foh", 2), ("second-order", 3), ("delayed", 1)])
+def test_order_of_a_hold(fmus: Fmus, tmp_path: Path, hold: str, order: int) -> None:
+    rates = [200, 400, 800]
+    errors = [error(fmus, tmp_path, rate, hold, 1) for rate in rates]
+    observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
+    assert observed == pytest.approx(order, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("hold", "limit", "coupling"),
+    [
+        ("foh", ".0630", "jacobi"),
+        ("second-order", ".0765", "jacobi"),
+        ("delayed", ".0198", "jacobi"),
+        ("foh", ".0763", "gauss-seidel-plants"),
+        ("second-order", ".0843", "gauss-seidel-plants"),
+    ],
+)
+def test_limit_of_stability_to_one_percent(
+    fmus: Fmus, tmp_path: Path, hold: str, limit: str, coupling: str
+) -> None:
+    below, above = (
+        growth(fmus, tmp_path, Fraction(limit) * part, hold, 1, 500, coupling=coupling)
+        for part in (Fraction(99, 100), Fraction(101, 100))
+    )
+    assert below < 1 < above
+
+
+@pytest.mark.parametrize("hold", ["foh", "second-order", "delayed", "smooth"])
+def test_substeps_change_nothing(fmus: Fmus, tmp_path: Path, hold: str) -> None:
+    """Each substep goes on along the same polynomial."""
+    rows = []
+    for substeps in (1, 3):
+        made = oscillator.system(fmus, Fraction(1, 100), 60, hold, substeps=substeps)
+        rows.append(oscillator.simulate(made, tmp_path)[1])
+    np.testing.assert_allclose(rows[0], rows[1], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize(("between", "published"), [("foh", 1.73e-3), ("hermite", 7.8e-7)])
+def test_iterated_coupling_needs_no_substeps(
+    fmus: Fmus, tmp_path: Path, between: str, published: float
+) -> None:
+    made = coupled.system(
+        fmus, coupled.HERMITE, "iterated", Fraction(1, 100), Fraction("1.06"), between=between,
+        get_after_set=("one", "two"), iteration=Iteration(method="newton", tolerance=1e-10),
+    )  # fmt: skip
+    outcome, table = coupled.simulate(made, tmp_path)
+    assert outcome.fault is None
+    assert coupled.error(table) == pytest.approx(published, rel=0.02)
+
+
+def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus: Fmus, tmp_path: Path) -> None:
+    """`foh` on it is the lead; where only one of the two can, each gets what it can take."""
+    constant = {n: native(tmp_path, n, FLAGS[1:]) for n in ("one", "two")}
+    assert error(constant, tmp_path, 100, "foh", 1) == pytest.approx(7.08e-3, rel=0.02)
+    mixed = {"one": fmus["one"], "two": constant["two"]}
+    made = oscillator.system(mixed, Fraction(1, 100), 10, "foh")
+    assert {c.name: held_polynomials.order(made, c) for c in made.connections} == {
+        "two.F -> one.F": 1,
+        "one.x -> two.x1": 0,
+        "one.v -> two.v1": 0,
+    }
+
+
+def test_energy_is_booked_with_the_mean(fmus: Fmus, tmp_path: Path) -> None:
+    """Iterated and linear, what is held has the mean of the source's two samples: none is made."""
+    made = coupled.system(
+        fmus, coupled.ROWS, "iterated", Fraction(1, 100), Fraction("1.06"), between="foh",
+        power=coupled.POWER, get_after_set=("one", "two"),
+        iteration=Iteration(method="newton", tolerance=1e-10),
+    )  # fmt: skip
+    outcome, _ = coupled.simulate(made, tmp_path)
+    booked = outcome.energies["two.F -> one.F"]
+    assert abs(booked.held) > 1.0
+    assert abs(booked.made) < 1e-8
+
+
+SCENE = """
+title = "Two masses"
+duration = 0.5
+haptics.rate = 100
+coupling = "jacobi"
+holds = { "two.F" = "second-order", "one.x" = "foh", "one.v" = "zoh" }
+fmu = [{ name = "one", path = "one.fmu"ISOLATE }, { name = "two", path = "two.fmu" }]
+connection = [
+    { from = "two.F", to = "one.F", factor = FACTOR },
+    { from = "one.x", to = "two.x1" },
+    { from = "one.v", to = "two.v1" },
+]
+"""
+
+
+def scene(fmus: Fmus, isolate: bool = False, factor: float = 1.0) -> Path:
+    path = fmus["one"].path.parent / "scene.toml"
+    text = SCENE.replace("ISOLATE", ", isolate = true" if isolate else "")
+    path.write_text(text.replace("FACTOR", str(factor)))
+    return path
+
+
+def test_a_run_and_a_plan_say_who_takes_what(
+    fmus: Fmus, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["substeps.two=2"]
+    found = simulate(str(scene(fmus)), tmp_path / "out", options).results.run
+    assert found["within_a_step"] == {
+        "two.F -> one.F": "derivatives to order 2",
+        "one.x -> two.x1": "derivatives to order 1, renewed in 2 substeps",
+    }
+    with pytest.raises(SystemExit, match="0"):
+        main(["run", str(scene(fmus)), "--explain", "--set", options[0]])
+    told = capsys.readouterr().out
+    assert "  evaluate two.F -> one.F order 2 width 1\n" in told
+    assert "  evaluate one.x -> two.x1 ahead 1/2 order 1 width 1/2\n" in told
+    assert "  set one derivatives True\n" in told
+
+
+def test_a_run_says_where_an_fmu_cannot(tmp_path: Path) -> None:
+    constant = {n: native(tmp_path, n, FLAGS[1:]) for n in ("one", "two")}
+    found = simulate(str(scene(constant)), tmp_path / "out", ["substeps.two=2"]).results.run
+    assert found["within_a_step"] == {
+        "two.F -> one.F": "constant, the hold at the middle (half-step lead)",
+        "one.x -> two.x1": "constant in each of 2 substeps",
+    }
+
+
+def test_in_a_process_of_its_own_it_is_the_same(fmus: Fmus, tmp_path: Path) -> None:
+    for isolate in (False, True):
+        ended = simulate(str(scene(fmus, isolate)), tmp_path / str(isolate))
+        assert ended.outcome.fault is None
+    same = [(tmp_path / str(i) / "haptics.csv").read_bytes() for i in (False, True)]
+    assert same[0] == same[1]
+
+
+def test_derivatives_convert_like_values(fmus: Fmus, tmp_path: Path) -> None:
+    """A force of minus F through a factor of -1, from a spring that pushes the other way."""
+    turned = {"one": native(tmp_path, "one"), "two": fmus["two"]}
+    (tmp_path / "two.fmu").write_bytes(native(tmp_path, "two", sign=-1.0).path.read_bytes())
+    plain = simulate(str(scene(fmus)), tmp_path / "plain").results.haptics
+    found = simulate(str(scene(turned, factor=-1.0)), tmp_path / "out").results.haptics
+    np.testing.assert_allclose(found["one.x"], plain["one.x"], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found["two.F"], -plain["two.F"], rtol=0, atol=1e-9)
+
+
+def test_a_step_taken_again_in_halves_goes_on_along_the_polynomial(
+    fmus: Fmus, tmp_path: Path
+) -> None:
+    """`one` discards what is longer than an eighth of a step; exact as it is, nothing changes."""
+    (tmp_path / "brittle").mkdir()
+    brittle = native(tmp_path / "brittle", "one", brittle=1e-9, fine=0.01 / 8, failure=2)
+    plain = simulate(str(scene(fmus)), tmp_path / "plain").results.haptics
+    path = scene({"one": brittle})
+    (path.parent / "two.fmu").write_bytes(fmus["two"].path.read_bytes())
+    ended = simulate(str(path), tmp_path / "out", ["faults.discard=retry"])
+    assert ended.outcome.fault is None
+    assert ended.outcome.smaller_steps["one"] > 40
+    for name in ("one.x", "one.v", "two.F"):
+        np.testing.assert_allclose(ended.results.haptics[name], plain[name], rtol=0, atol=1e-10)

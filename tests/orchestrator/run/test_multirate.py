@@ -1,0 +1,179 @@
+"""Limits of stability of a virtual coupling across rates that do not divide, on real FMUs.
+
+A device (m = 0.1, b = 2) at 512 Hz and a linkage (M = 0.5, b_l = 1) at the graphics rate, joined by
+a spring F = K (x_l - x) + B (v_l - v), B = 1. The device takes it sampled in the fast block, from
+the linkage's held pose and velocity. The linkage takes that force held, or has a spring of its own
+inside, continuous, to the held pose and velocity of the device. First crossing of stability in K,
+computed independently.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hapticlink.components.component import Block, Component, Variable
+from hapticlink.fmus.build import build
+from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.system.assemble import connect
+from hapticlink.orchestrator.system.system import Fmu, System
+from tests.orchestrator.oscillator import driven
+from tests.orchestrator.timelines import fixed
+
+X, V, F = Variable("x", (), "m"), Variable("v", (), "m/s"), Variable("F", (), "N")
+GAIN = Variable("K", (), "N/m", 100.0)
+GROUND = Variable("K_g", (), "N/m", 0.0)
+FAST = [
+    ("device.x", "spring.x"),
+    ("device.v", "spring.v"),
+    ("linkage.x", "spring.x_l"),
+    ("linkage.v", "spring.v_l"),
+    ("spring.F", "device.F"),
+]
+ROWS = {
+    "linkage": [("spring.F_l", "linkage.F")],
+    "sprung": [("device.x", "linkage.x_d"), ("device.v", "linkage.v_d")],
+}
+
+
+def mass(name: str, m: float, b: float, start: float) -> Component:
+    """m v' = F - b v, exact for a constant force."""
+    block = Block(inputs=[F], states=[X, V], outputs=[X, V])
+    x, v, force, h = block.x["x"], block.x["v"], block.u["F"], block.h
+    decay = ca.exp(-b / m * h)
+    end = {"v": decay * v + (1 - decay) * force / b}
+    end["x"] = x + force / b * h + (v - force / b) * (1 - decay) * m / b
+    initial = {"x": ca.SX(0.0), "v": ca.SX(start)}
+    output = {"x": x, "v": v}
+    return block.component(name, "a mass", "continuous", initial=initial, step=end, output=output)
+
+
+def spring() -> Component:
+    block = Block(
+        inputs=[X, V, Variable("x_l", (), "m"), Variable("v_l", (), "m/s")],
+        parameters=[GAIN],
+        outputs=[F, Variable("F_l", (), "N")],
+    )
+    u = block.u
+    force = block.p["K"] * (u["x_l"] - u["x"]) + (u["v_l"] - u["v"])
+    output = {"F": force, "F_l": -force}
+    return block.component("spring", "a spring", "sampled", initial={}, step={}, output=output)
+
+
+def sprung() -> Component:
+    """The linkage with the spring inside, exact:
+    M v' = K (x_d - x) + B (v_d - v) - b_l v - K_g x."""
+    block = Block(
+        inputs=[Variable("x_d", (), "m"), Variable("v_d", (), "m/s")],
+        parameters=[GAIN, GROUND],
+        states=[X, V],
+        outputs=[X, V],
+    )
+    u, k, ground = block.u, block.p["K"], block.p["K_g"]
+    pull = (k * u["x_d"] + u["v_d"]) / 0.5
+    x, v = driven(block.x["x"], block.x["v"], pull, (k + ground) / 0.5, 4.0, block.h)
+    initial = {"x": ca.SX(0.0), "v": ca.SX(0.0)}
+    return block.component(
+        "sprung",
+        "a mass on a spring",
+        "continuous",
+        initial=initial,
+        step={"x": x, "v": v},
+        output={name: block.x[name] for name in ("x", "v")},
+    )
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Description]:
+    folder = tmp_path_factory.mktemp("multirate")
+    parts = (mass("device", 0.1, 2.0, 1.0), spring(), mass("linkage", 0.5, 1.0, 0.0), sprung())
+    return {c.name: describe(build(c, folder)) for c in parts}
+
+
+def forces(
+    fmus: dict[str, Description],
+    folder: Path,
+    linkage: str,
+    timeline: Timeline,
+    gain: float,
+    ground: float = 0.0,
+) -> NDArray[np.float64]:
+    """|F| of the sampled spring at every tick."""
+
+    def unit(name: str, fmu: str, clock: str) -> Fmu:
+        values = [(s, gain) for s in fmus[fmu].port("K", "parameter")]
+        values += [(s, ground) for s in fmus[fmu].port("K_g", "parameter")]
+        return Fmu(name, fmus[fmu], clock, tuple(values))
+
+    units = (
+        unit("device", "device", "haptics"),
+        unit("spring", "spring", "haptics"),
+        unit("linkage", linkage, "graphics"),
+    )
+    connections = tuple(connect(units, [*FAST, *ROWS[linkage]], "zoh", {}))
+    outcome = run(Plan(System(units, connections, timeline, "gauss-seidel")), folder)
+    assert outcome.fault is None
+    return np.abs(read_table(folder / "haptics.csv")["spring.F"])
+
+
+@pytest.mark.parametrize(
+    ("linkage", "rate", "align", "limit"),
+    [
+        ("linkage", 10, "tick", 152),
+        ("linkage", 20, "tick", 561),
+        ("linkage", 30, "tick", 1186),
+        ("linkage", 60, "tick", 1199),
+        ("linkage", 512, "tick", 2487),
+        ("sprung", 10, "tick", 181),
+        ("sprung", 20, "tick", 528),
+        ("sprung", 30, "tick", 1071),
+        ("sprung", 60, "tick", 1122),
+        ("sprung", 512, "tick", 2559),
+        ("sprung", 60, "exact", 1004),
+    ],
+)
+def test_limit_of_the_coupling_to_one_percent(
+    fmus: dict[str, Description],
+    tmp_path: Path,
+    linkage: str,
+    rate: int,
+    align: str,
+    limit: float,
+) -> None:
+    timeline = fixed(Fraction(512), Fraction(rate), 512 * 16, align)
+
+    def growth(gain: float) -> float:
+        """Between the last quarters of a run."""
+        _, _, third, last = np.split(forces(fmus, tmp_path, linkage, timeline, gain)[1:], 4)
+        return float(last.max() / third.max())
+
+    assert growth(0.99 * limit) < 1 < growth(1.01 * limit)
+
+
+@pytest.mark.parametrize(
+    ("frames", "growth"), [((17, 17), None), ((51, 51), None), ((17, 51), 1.86)], ids=str
+)
+def test_alternating_frames_grow_where_each_alone_is_stable(
+    fmus: dict[str, Description], tmp_path: Path, frames: tuple[int, int], growth: float | None
+) -> None:
+    """K = 1050 and a spring of 20 to ground: spectral radii at most .986 alone."""
+    starts = np.cumsum([0, *frames * 40]).tolist()
+    clocks = (Clock("haptics", range(starts[-1] + 2)), Clock("graphics", starts))
+    timeline = Timeline(Fraction(1, 512), starts[-5], clocks)
+    force = forces(fmus, tmp_path, "sprung", timeline, 1050.0, ground=20.0)
+    peaks = [force[a:b].max() for a, b in pairwise(starts[:-4])]
+    a_frame = (max(peaks[-10:]) / max(peaks[-50:-40])) ** (1 / 40)
+    if growth is None:
+        assert a_frame < 0.99
+    else:
+        assert a_frame == pytest.approx(growth, rel=0.005)

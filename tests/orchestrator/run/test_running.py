@@ -1,0 +1,182 @@
+"""What a run leaves in its folder, what it tells of itself, and how it takes a signal."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import summary, tables
+from tests.orchestrator.conftest import status
+from tests.orchestrator.foreign_fmus import python_fmu, run, scene
+
+COMMAND = [sys.executable, "-m", "hapticlink.orchestrator"]
+ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
+SHORT = ("--set", "duration=0.05")
+ROCKER = "linkage.start.rocker=2.9"
+FAR = 'linkage.operational_point={ body = "link2", at = [0.9, 0.0] }'
+
+
+def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert status("run", "closed-loop", "--out", out, *SHORT) == 0
+    first = {p.name for p in out.iterdir()}
+    assert set(tables.load(out).run["files"]) == first
+    assert {"graphics.csv", "constraints.png"} <= first
+    (out / "notes.txt").write_text("mine")
+    outside = tmp_path / "outside.txt"
+    outside.write_text("mine")
+    run = json.loads((out / "run.json").read_text())
+    run["files"] += ["../outside.txt", str(outside), "..", 3]
+    (out / "run.json").write_text(json.dumps(run))
+    assert status("run", "four-bar", "--out", out, *SHORT) == 0
+    found = {p.name for p in out.iterdir()}
+    assert found == {*tables.load(out).run["files"], "notes.txt"}
+    assert "graphics.csv" not in found
+    assert outside.read_text() == "mine"
+
+
+@pytest.mark.parametrize("command", ["run", "build", "export"])
+def test_a_folder_that_cannot_be_is_bad_input(
+    bar: Path, tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert status(command, bar, "--out", tmp_path / "file") == 2
+    assert "is a file; name a folder" in capsys.readouterr().err
+    assert status(command, bar, "--out", tmp_path / "file" / "below") == 2
+    assert "cannot be made" in capsys.readouterr().err
+
+
+def test_a_handle_out_of_reach_is_a_fault_of_the_device(tmp_path: Path) -> None:
+    """0.9 m along link 2 lie beyond links of 0.3 m at most."""
+    fault = simulate("closed-loop", tmp_path, [FAR]).outcome.fault
+    assert str(fault).startswith("haptic_device: the start pose (x m, y m, theta rad) = (0.66")
+    assert "outside the device's workspace by 0.7" in str(fault)
+    assert "move linkage.operational_point" in str(fault)
+
+
+def test_a_start_that_assembly_moves_far_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for options, count in (((), 0), (("--set", ROCKER), 1)):
+        assert status("info", "four-bar", *options) == 0
+        assert status("run", "four-bar", "--out", tmp_path, *SHORT, *options) == 0
+        told = capsys.readouterr().out
+        assert told.count("the loops do not close at the start given") == 2 * count
+    assert told.count("rocker from 2.9 to ") == 2
+
+
+def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Lost", "self.y = float('nan') if self.steps > 3 else 1.0")
+    _, found = run(tmp_path, 'faults.nan = "hold"\n' + ONE.format("Lost.fmu"))
+    held = found.run["held_outputs"]["one"]
+    assert held > 0
+    assert list(summary.lines(found)) == [
+        f'one: {held} outputs were not finite and held (faults.nan = "hold")'
+    ]
+    found.run["links"]["a.y -> b.u"] = {"sent": 9, "lost": 2, "overtaken": 1}
+    found.run["iterations"] = {"unconverged": 2, "steps": 5}
+    found.run["smaller_steps"] = {"one": 7}
+    found.run["holds_that_did_not_fit"] = {
+        f"{a}.y -> b.u": {"hold": "passive", "reason": "no power"} for a in "ac"
+    }
+    assert list(summary.lines(found))[1:] == [
+        "one: 7 steps were discarded and taken again in smaller ones",
+        "2 of 5 iterated steps did not converge",
+        "a.y -> b.u: 2 of 9 samples were lost, 1 overtaken",
+        "hold passive does not fit a.y -> b.u (no power) and 1 more: zoh there",
+    ]
+
+
+def test_a_scene_of_given_fmus_has_nothing_to_build(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    python_fmu(tmp_path, "Given")
+    path = scene(tmp_path, ONE.format("Given.fmu"), duration=1)
+    assert status("build", path, "--out", tmp_path / "fmus") == 2
+    assert "nothing to build" in capsys.readouterr().err
+    assert not (tmp_path / "fmus").exists()
+
+
+def test_a_signal_of_another_rate_is_told_where_it_is(tmp_path: Path) -> None:
+    phase = ("--set", "phases.virtual_mechanism=0.0005")
+    assert status("run", "closed-loop", "--out", tmp_path, *SHORT, *phase) == 0
+    found = tables.load(tmp_path)
+    (table,) = (n for n, t in found.tables.items() if "virtual_mechanism.x" in t)
+    assert table != "haptics"
+    with pytest.raises(KeyError, match=rf"it is in tables\['{table}'\]"):
+        found.haptics["virtual_mechanism.x"]
+
+
+def test_a_reader_that_has_enough_is_no_fault() -> None:
+    with subprocess.Popen(
+        [*COMMAND, "run", "closed-loop", "--explain"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    ) as told:  # fmt: skip
+        assert told.stdout is not None
+        assert told.stderr is not None
+        assert told.stdout.readline().startswith(b"Time is counted in ticks")
+        told.stdout.close()
+        assert told.stderr.read() == b""
+    assert told.returncode == 0
+
+
+def workers(pid: int) -> list[bytes]:
+    """Command lines of the worker processes that a process has."""
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        for child in (task / "children").read_text().split():
+            found.append(Path(f"/proc/{child}/cmdline").read_bytes())
+    return [line for line in found if b"orchestrator.fmi.worker" in line]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="finds the processes of a process in /proc")
+def test_ctrl_c_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path: Path) -> None:
+    """As in a terminal, the signal goes to the whole group, and the worker is at its imports."""
+    python_fmu(tmp_path, "Slow", "__import__('time').sleep(0.01)")
+    path = scene(tmp_path, "isolate = true\n" + ONE.format("Slow.fmu"), duration=100)
+    out = tmp_path / "out"
+    with subprocess.Popen(
+        [*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE, start_new_session=True
+    ) as running:
+        until = time.monotonic() + 60
+        while not workers(running.pid) and time.monotonic() < until:
+            time.sleep(0.01)
+        time.sleep(0.1)  # the caller waits for it by now
+        os.killpg(running.pid, signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+    assert running.returncode == 1
+    assert said.startswith(b"hapticlink: interrupted at t = 0")
+    assert said.count(b"\n") == 1
+    assert tables.load(out).run["end"]["reason"] == "interrupted"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize(
+    ("body", "when"),
+    [
+        ("interrupt()", "before the run"),
+        ("with suppress(KeyboardInterrupt): interrupt()", "at t = 0 s"),
+    ],
+    ids=["told", "swallowed by what was imported"],
+)
+def test_ctrl_c_before_the_run_says_so(bar: Path, tmp_path: Path, body: str, when: str) -> None:
+    code = (
+        "import hapticlink.orchestrator.scene_file as s, os, signal\n"
+        "from contextlib import suppress\n"
+        "interrupt, load = lambda: os.kill(os.getpid(), signal.SIGINT), s.load\n"
+        "def interrupted(*a):\n"
+        f"    {body}\n"
+        "    return load(*a)\n"
+        "s.load = interrupted\n"
+        "from hapticlink.orchestrator.commands import main\n"
+        f"main(['run', {str(bar)!r}, '--out', {str(tmp_path / 'out')!r}])"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr.strip() == f"hapticlink: interrupted {when}".encode()

@@ -1,0 +1,180 @@
+"""Steps chosen for accuracy: error against tolerance, cost against fixed steps, and who is cut."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import delays
+from hapticlink.orchestrator.run.event_loop import Outcome
+from hapticlink.orchestrator.run.step_control import rounded
+from hapticlink.orchestrator.scene.records import StepControl
+from hapticlink.orchestrator.system.system import System
+from tests.orchestrator import oscillator
+from tests.orchestrator.conftest import clock
+from tests.orchestrator.coupled import POWER, ROWS, described, error, simulate, system
+
+Fmus = Mapping[str, Description]
+BASE = Fraction(1, 50000)
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
+    parts = (oscillator.one(), oscillator.two())
+    return described(parts, tmp_path_factory.mktemp("oscillator"))
+
+
+def controlled(
+    fmus: Fmus, control: StepControl | None, period: Fraction = Fraction(2, 100), **others: object
+) -> System:
+    how: dict[str, object] = {"hold": "foh", "until": Fraction("1.06"), **others}
+    return system(
+        fmus,
+        ROWS,
+        str(how.pop("coupling", "jacobi")),
+        period,
+        base=BASE if control else None,
+        get_after_set=("one", "two"),
+        power=POWER,
+        step_control=control,
+        **how,  # type: ignore[arg-type]
+    )
+
+
+def doubling(tolerance: float) -> StepControl:
+    return StepControl(method="doubling", tolerance=tolerance, min="1/50000")
+
+
+def ecco(tolerance: float) -> StepControl:
+    return StepControl(method="ecco", tolerance=tolerance, min="1/50000", energy=100.0)
+
+
+def solved(made: System, folder: Path) -> tuple[Outcome, float]:
+    outcome, table = simulate(made, folder)
+    assert outcome.fault is None
+    return outcome, error(table)
+
+
+@pytest.mark.parametrize(
+    ("control", "tolerances", "power"),
+    [(doubling, [0.1, 0.01, 0.001], 1.0), (ecco, [1e-4, 1e-5, 1e-6], 2 / 3)],
+)
+def test_the_error_follows_the_tolerance(
+    fmus: Fmus, tmp_path: Path, control: object, tolerances: list[float], power: float
+) -> None:
+    """Proportional for an error per second; to the power 2/3 for one per step of order 2."""
+    errors = [
+        solved(controlled(fmus, control(t)), tmp_path)[1]  # type: ignore[operator]
+        for t in tolerances
+    ]
+    observed = np.polyfit(np.log(tolerances), np.log(errors), 1)[0]
+    assert observed == pytest.approx(power, abs=0.15)
+
+
+def test_iterated_coupling_takes_longer_steps_for_the_same_tolerance(
+    fmus: Fmus, tmp_path: Path
+) -> None:
+    explicit, first = solved(controlled(fmus, doubling(0.003)), tmp_path)
+    made = controlled(
+        fmus, doubling(0.003), coupling="iterated", between="foh", hold=None, substeps=2
+    )
+    iterated, second = solved(made, tmp_path)
+    assert max(first, second) < 0.001
+    assert iterated.steps["haptics"].taken < explicit.steps["haptics"].taken
+
+
+def test_it_takes_fewer_steps_than_a_fixed_step_for_the_same_error(
+    fmus: Fmus, tmp_path: Path
+) -> None:
+    """The oscillation dies away within seconds; all steps that were tried are counted."""
+    until = Fraction(12)
+    long = controlled(fmus, doubling(0.03), Fraction(6, 100), until=until)
+    outcome, varied = solved(long, tmp_path)
+    rate = 160
+    fixed, uniform = solved(controlled(fmus, None, Fraction(1, rate), until=until), tmp_path)
+    assert varied < uniform
+    assert outcome.calls["one"]["step"] < 0.8 * fixed.calls["one"]["step"]
+
+
+def test_what_was_done_is_counted(fmus: Fmus, tmp_path: Path) -> None:
+    outcome, _ = solved(controlled(fmus, doubling(0.01)), tmp_path)
+    steps, calls = outcome.steps["haptics"], outcome.calls["one"]
+    assert steps.rejected > 0
+    assert steps.shortest <= 4 / 50000 < steps.longest <= 0.02
+    # Each try is a step and its two halves; the forced ones are of one tick, which has no halves.
+    assert calls["step"] == 3 * (steps.taken + steps.rejected) - 2 * steps.forced
+
+
+def test_a_sampled_block_is_never_cut(tmp_path: Path) -> None:
+    """It steps at its own ticks only; plants see its last output, and each other's last step."""
+    kinds = {
+        "plant": ("continuous", ["f", "o"]),
+        "other": ("continuous", ["p"]),
+        "law": ("sampled", ["d"]),
+    }
+    fmus = described([clock(n, t, i) for n, (t, i) in kinds.items()], tmp_path)
+    rows = [
+        ("plant.stamp", "law.d"),
+        ("law.stamp", "plant.f"),
+        ("other.stamp", "plant.o"),
+        ("plant.stamp", "other.p"),
+    ]
+    control = StepControl(method="doubling", tolerance=1e-3, min="1/1000", max="1/100")
+    made = system(
+        fmus, rows, "gauss-seidel", Fraction(1, 8), Fraction(1), base=Fraction(1, 8000),
+        step_control=control,
+    )  # fmt: skip
+    outcome, table = simulate(made, tmp_path)
+    assert outcome.fault is None
+    assert outcome.calls["law"]["step"] == 9
+    assert outcome.calls["plant"]["step"] > 8 * 12
+    np.testing.assert_array_equal(table["law.stamp"], table["time"])
+    np.testing.assert_array_equal(table["law.seen_d"], table["time"])
+    np.testing.assert_array_equal(table["plant.seen_f"][1:], table["time"][:-1])
+    seen = table["time"][1:] - table["plant.seen_o"][1:]
+    assert (seen > 0).all()
+    assert (seen <= 0.01).all()
+
+
+def test_the_values_of_a_run_taken_back_leave_no_trace(fmus: Fmus, tmp_path: Path) -> None:
+    """Steps of one size, each tried whole and then taken in halves: the run with fixed steps."""
+    control = StepControl(method="doubling", tolerance=1e9, min="1/50", max="1/50")
+    _, table = simulate(controlled(fmus, control), tmp_path)
+    _, fixed = simulate(controlled(fmus, None, Fraction(1, 100)), tmp_path)
+    np.testing.assert_allclose(table["one.x"], fixed["one.x"][::2], atol=1e-13)
+
+
+def test_ecco_needs_power_energy_and_extrapolation(fmus: Fmus) -> None:
+    made = controlled(fmus, ecco(1e-4))
+    for change, remedy in (
+        ({"power": ()}, r"\[\[power\]\]"),
+        ({"step_control": StepControl(method="ecco", tolerance=1.0, min=1e-3)}, "give energy"),
+        ({"coupling": "gauss-seidel-plants"}, "interpolates"),
+    ):
+        with pytest.raises(InputFault, match=remedy):
+            list(delays(Plan(System(**{**vars_of(made), **change}))))  # type: ignore[arg-type]
+
+
+def test_there_must_be_something_to_control(fmus: Fmus) -> None:
+    made = controlled(fmus, doubling(0.1))
+    with pytest.raises(InputFault, match="there are none"):
+        list(delays(Plan(System(**{**vars_of(made), "connections": ()}))))  # type: ignore[arg-type]
+
+
+def vars_of(made: System) -> dict[str, object]:
+    return {name: getattr(made, name) for name in made.__dataclass_fields__}
+
+
+@given(st.floats(0, 1e9))
+def test_rounded_is_a_little_less(ticks: float) -> None:
+    found = rounded(ticks)
+    assert found == 1 or ticks * 8 / 9 < found + 1 <= ticks + 1

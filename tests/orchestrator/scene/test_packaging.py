@@ -1,0 +1,132 @@
+"""A scene whose blocks are compiled gives the results of the one whose blocks are Python."""
+
+import json
+import zipfile
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+
+import pytest
+
+from hapticlink.fmus.native import compiler, host_platform
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.experiment import simulate
+from tests.orchestrator.conftest import status
+
+SHORT = ("duration=0.2", "graphics.rate=60")
+NATIVE = (*SHORT, "packaging=native")
+TABLES = ("haptics.csv", "graphics.csv")
+
+
+@pytest.fixture(scope="module")
+def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a native run of the report's experiment."""
+    folder = tmp_path_factory.mktemp("native")
+    assert simulate("closed-loop", folder, NATIVE).outcome.fault is None
+    return folder
+
+
+def same(one: Path, two: Path) -> bool:
+    return all((one / name).read_bytes() == (two / name).read_bytes() for name in TABLES)
+
+
+def test_a_run_gives_the_same_bytes(native: Path, tmp_path: Path) -> None:
+    assert simulate("closed-loop", tmp_path, SHORT).outcome.fault is None
+    assert (native / "haptics.csv").read_text().count("\n") > 100
+    assert same(native, tmp_path)
+
+
+def test_run_json_says_it(native: Path, tmp_path: Path) -> None:
+    told = json.loads((native / "run.json").read_text())
+    assert told["scene"]["packaging"] == "native"
+    assert told["versions"]["ziglang"] == compiler.compiler_version()
+
+
+def test_an_exported_scene_runs_again(native: Path, tmp_path: Path) -> None:
+    """The SSP holds the compiled FMUs, and says nothing of how they were made."""
+    options = [part for option in NATIVE for part in ("--set", option)]
+    assert status("export", "closed-loop", *options, "--out", tmp_path) == 0
+    path = tmp_path / "closed-loop.ssp"
+    with zipfile.ZipFile(path) as archive:
+        assert b"packaging" not in archive.read("SystemStructure.ssd")
+        archive.extract("resources/virtual_mechanism.fmu", tmp_path)
+    with zipfile.ZipFile(tmp_path / "resources" / "virtual_mechanism.fmu") as archive:
+        binaries = [n for n in archive.namelist() if n.startswith("binaries/")]
+    assert [n.split("/")[1] for n in binaries] == [host_platform()]
+    assert status("run", path, "--out", tmp_path / "again") == 0
+    assert same(native, tmp_path / "again")
+
+
+def test_all_platforms_are_for_what_is_compiled(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status("build", "five-bar", "--all-platforms", "--out", tmp_path) == 2
+    assert "--set packaging=native" in capsys.readouterr().err
+
+
+def test_all_platforms_are_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled by a stand-in: tests/fmus/test_native_fmu.py compiles."""
+    monkeypatch.setenv("HAPTICLINK_CACHE", "off")
+    asked = []
+
+    def compiled(source: Path, library: Path, platform: str) -> Path:
+        asked.append(platform)
+        library.write_bytes(platform.encode())
+        return library
+
+    monkeypatch.setattr("hapticlink.fmus.native.archive.compile_library", compiled)
+    options = ("--set", "packaging=native", "--all-platforms", "--out", tmp_path)
+    assert status("build", "five-bar", *options) == 0
+    assert asked == ["linux64", "win64", "darwin64"] * 2  # of the hand and the mechanism
+    with zipfile.ZipFile(tmp_path / "virtual_mechanism.fmu") as archive:
+        assert archive.read("binaries/win64/virtual_mechanism.dll") == b"win64"
+        assert archive.read("binaries/darwin64/virtual_mechanism.dylib") == b"darwin64"
+
+
+@pytest.mark.parametrize("packaging", ["python", "native"])
+def test_two_hands_are_two_fmus(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, packaging: str
+) -> None:
+    """Of the same component, with the wrench of each; nothing comes from a cache."""
+    monkeypatch.setenv("HAPTICLINK_CACHE", "off")
+    option = f"packaging={packaging}"
+    assert status("build", "two-hands", "--set", option, "--out", tmp_path) == 0
+    built = sorted(p.name for p in tmp_path.iterdir())
+    hands = sorted(open_scene.load("two-hands").hands)
+    assert built == ["hand.fmu", *(f"hand_{n}.fmu" for n in hands), "virtual_mechanism.fmu"]
+    assert len({(tmp_path / name).read_bytes() for name in built}) == len(built)
+
+
+def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from hapticlink.orchestrator.system.fmu_files import fmu_files
+    from hapticlink.orchestrator.system.timeline import timeline
+
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
+
+    def compiled(source: Path, library: Path, platform: str) -> Path:
+        library.write_bytes(platform.encode())
+        return library
+
+    monkeypatch.setattr("hapticlink.fmus.native.archive.compile_library", compiled)
+    scene = open_scene.load("five-bar", ("packaging=native",))
+
+    def built(*platforms: str) -> Path:
+        return fmu_files(scene, timeline(scene), tmp_path, platforms)["virtual_mechanism"]
+
+    assert built("linux64") == built("linux64")
+    paths = {built("linux64"), built("win64"), built("linux64", "win64")}
+    monkeypatch.setattr(compiler, "version", lambda name: "0.0")
+    assert len(paths | {built("linux64")}) == 4
+
+
+def test_without_ziglang_it_is_bad_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def missing(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(compiler, "version", missing)
+    assert status("run", "five-bar", "--set", "packaging=native", "--out", tmp_path / "out") == 2
+    assert "pip install '.[native]'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

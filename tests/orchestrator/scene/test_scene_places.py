@@ -1,0 +1,261 @@
+"""Keys of a scene in every spelling of TOML, and faults told where the key really stands."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.scene import load, overrides
+from hapticlink.orchestrator.ssp import names
+from tests.orchestrator.conftest import status
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_fmus import scene as foreign_scene
+from tests.orchestrator.scene.test_scene import GOOD
+
+CLOSED = 'title = "t"\nextends = "closed-loop"\n'
+
+
+def told(text: str, *options: str, folder: Path | None = None) -> str:
+    with pytest.raises(SceneFault) as refused:
+        load.read(text, options, "scene", folder)
+    return str(refused.value)
+
+
+# --- spellings of a key -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("key", ["e.P_c", '"e.P_c"', "'e.P_c'", ' "e.P_c" '])
+@pytest.mark.parametrize(
+    "text", ["", '[holds]\n"e.P_c" = "foh"\n', 'holds.e.P_c = "foh"\n', '[holds.e]\nP_c = "foh"\n']
+)
+def test_a_name_with_dots_is_one_name_in_every_spelling(key: str, text: str) -> None:
+    whole = text + GOOD if text.startswith("holds") else GOOD + text
+    scene = load.read(whole, [f"holds.{key}=lead"])
+    assert scene.holds == {"e.P_c": "lead"}
+
+
+@pytest.mark.parametrize("option", ['delays."e.P_c".loss=0.5', "delays.e.P_c.loss=0.5"])
+def test_a_part_of_a_delay_is_set_beside_its_others(option: str) -> None:
+    late = load.read(GOOD + '[delays]\n"e.P_c" = { min = 0.1, seed = 3 }\n', [option])
+    found = late.delays["e.P_c"]
+    assert (found.min, found.loss, found.seed) == (0.1, 0.5, 3)  # type: ignore[union-attr]
+
+
+@given(st.lists(st.text(min_size=1), min_size=1, max_size=4))
+def test_any_names_in_quotes_come_back(names: list[str]) -> None:
+    escaped = ("".join(rf"\U{ord(c):08X}" for c in name) for name in names)
+    quoted = ".".join(f'"{name}"' for name in escaped)
+    assert overrides.parse(f"{quoted} = 1") == (tuple(names), 1)
+
+
+def test_names_that_are_no_key_of_toml_go_by_their_dots() -> None:
+    assert overrides.parse("fmu.plant.start.x[1]=a=b") == (("fmu", "plant", "start", "x[1]"), "a=b")
+    slow = "a" * 60 + " b=3"  # no time that grows with 2^60
+    assert overrides.parse(slow) == (("a" * 60 + " b",), 3)
+
+
+def test_connections_that_are_not_there(tmp_path: Path) -> None:
+    for option in ('holds."controller.P_d"=lead', "delays.controller.P_d=0.1"):
+        with pytest.raises(SceneFault) as refused:
+            simulate(str(_file(tmp_path, CLOSED)), tmp_path / "out", [option])
+        assert "is no connection of this scene; did you mean 'controller.P_c'?" in str(
+            refused.value
+        )
+    with pytest.raises(SceneFault, match=r"there are hand\.F -> haptic_device\.F_hand, "):
+        simulate(str(_file(tmp_path, CLOSED)), tmp_path / "out", ["holds.zzz=lead"])
+
+
+# --- messages of shapes -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("hand.mass=0.5", "hand.mass: 0.5 should be three numbers (kg, kg, kg.m2)"),
+        ("hand.mass=[1,2,3,4]", "[1, 2, 3, 4] should be three numbers (kg, kg, kg.m2)"),
+        ("hand.target=1", "hand.target: 1 should be a list of rows of four numbers"),
+        ("hand.type=sprin", "hand.type: no type 'sprin'; did you mean 'spring'?"),
+        ("hand.type=x", "hand.type: no type 'x'; there are constant, profile, arm, spring"),
+        ("hand.type=spring", "hand.mass: `mass` belongs to type 'arm', not 'spring'"),
+        ("hand.wrench=[1,2,3]", "hand.wrench: `wrench` belongs to type 'constant', not 'arm'"),
+        ("haptic.rate=1", "haptic: unknown key; did you mean 'haptics'?"),
+        ("haptics.rate=nan", "haptics.rate: nan: give a finite number"),
+        ("duration=inf", "duration: inf: give a finite number"),
+        (
+            "controller.teleoperation.stiffness=100",
+            "controller.teleoperation.stiffness: 100 should be three numbers (N/m, N/m, N.m/rad)",
+        ),
+        ("get_after_set=m", "get_after_set: 'm' should be a list of texts"),
+        (
+            "delays.a.b={ min = 0.1, max = 0.2, los = 0.05, seed = 3 }",
+            "delays.a.b.los: unknown key; did you mean 'loss'?",
+        ),
+        ('delays."a.b"={ los = 0.05 }', "delays.a.b.los: unknown key; did you mean 'loss'?"),
+        (
+            "linkage.joint.pivot.drive={type='pd',effort=1,table=[[0,0]],stiffness=1,damping=1}",
+            "drive.effort: `effort` belongs to type 'constant', not 'pd'",
+        ),
+    ],
+)  # fmt: skip
+def test_a_shape_is_told_in_words_of_the_scene(option: str, message: str) -> None:
+    arm = GOOD[: GOOD.index("wrench")] + 'type = "arm"\nmass = [1.0, 1.0, 0.002]\n'
+    found = told(arm + "target = [[0.0, 0.0, 0.0, 0.0]]\n", option)
+    assert message in found
+    others = found.count("\n") - 1
+    assert others == (option == "hand.type=spring")  # and its stiffness, which is missing
+
+
+def test_nan_as_a_start_value(tmp_path: Path) -> None:
+    text = '[[fmu]]\nname = "p"\npath = "p.fmu"\nstart.mass = nan\n'
+    assert "line 4: fmu[0] (p).start.mass: nan: give a finite number" in told(text)
+
+
+def test_shape_faults_and_others_are_told_together(tmp_path: Path) -> None:
+    text = CLOSED + 'hold = "zog"\nduration = "1"\n[graphics]\nrate = "fast"\n[[connection]]\n'
+    text += 'from = "handle.F"\n[hand]\ntype = "sprin"\n[holds]\n"controller.x_D" = "zog"\n'
+    found = told(text)
+    for message in (
+        "line 3: hold: no hold 'zog'",
+        "line 4: duration: '1' should be a valid number",
+        "line 6: graphics.rate: 'fast': write a rate",
+        "line 7: connection[0].to: is missing",
+        "line 8: connection[0].from: no FMU 'handle'; did you mean 'hand'?",
+        "line 10: hand.type: no type 'sprin'",
+        "line 12: holds.controller.x_D: no hold 'zog'",
+    ):
+        assert message in found
+    assert found.startswith("scene: 7 faults")
+
+
+def test_an_unknown_type_of_a_joint_hides_nothing() -> None:
+    found = told(GOOD.replace('name = "pivot"', 'name = "pivot"\ntype = "x"'), "haptics.rate=-1")
+    assert "joint[0] (pivot).type: 'x' should be 'revolute'" in found
+    assert "haptics.rate: -1 Hz" in found
+
+
+def test_a_missing_name_makes_no_fault_where_it_is_spoken_of() -> None:
+    assert told(GOOD.replace('name = "bar"\n', "")).startswith("scene: 1 fault\n")
+
+
+# --- places -----------------------------------------------------------------------------------
+
+
+def _file(folder: Path, text: str, name: str = "top.toml") -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def test_extends_is_looked_up_from_the_file_that_says_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _file(tmp_path, GOOD, "a/base/crank.toml")
+    _file(tmp_path, 'extends = "base/crank.toml"\nhold = "foh"\n', "a/middle.toml")
+    top = _file(tmp_path, 'extends = "../a/middle.toml"\ntitle = "top"\n', "b/top.toml")
+    scene = open_scene.load(str(top))
+    assert (scene.title, scene.hold, scene.duration) == ("top", "foh", 1.0)
+    monkeypatch.chdir(tmp_path / "a")  # where base/ is, but not for the file
+    lost = _file(tmp_path, 'title = "x"\nextends = "base/crank.toml"\n', "b/lost.toml")
+    with pytest.raises(InputFault, match=r"lost: 1 fault\n  line 2: extends: base/crank.toml: "):
+        open_scene.load(str(lost))
+
+
+def test_what_a_base_extends_in_vain_names_the_base(tmp_path: Path) -> None:
+    base = _file(tmp_path, 'title = "x"\nextends = "closed-lop"\n', "base.toml")
+    top = _file(tmp_path, 'extends = "base.toml"\n')
+    with pytest.raises(InputFault) as refused:
+        open_scene.load(str(top))
+    assert f"{base}, line 2: extends: closed-lop: neither a file" in str(refused.value)
+    assert "did you mean closed-loop?" in str(refused.value)
+
+
+def test_scenes_in_two_folders_that_extend_each_other_are_a_circle(tmp_path: Path) -> None:
+    _file(tmp_path, 'extends = "../b/two.toml"\n', "a/one.toml")
+    two = _file(tmp_path, 'extends = "../a/one.toml"\n', "b/two.toml")
+    with pytest.raises(InputFault, match="circle"):
+        open_scene.load(str(two))
+
+
+def test_an_inherited_fault_names_the_base_and_its_line(tmp_path: Path) -> None:
+    text = GOOD.replace("mass = 1.0", "mass = -1.0").replace("rate = 30", "rate = -3")
+    base = _file(tmp_path, text, "base.toml")
+    top = _file(tmp_path, 'extends = "base.toml"\nhold = "zog"\n[graphics]\nphase = 0.01\n')
+    found = told(top.read_text(), folder=tmp_path)
+    assert f"{base}, line 6: graphics.rate: -3 Hz" in found
+    assert f"{base}, line 13: linkage.body[0] (bar).mass: -1.0 kg" in found
+    assert "\n  line 2: hold: no hold 'zog'" in found
+
+
+def test_what_replaces_an_array_of_the_base_stands_in_the_file_itself(tmp_path: Path) -> None:
+    _file(tmp_path, GOOD, "base.toml")
+    text = 'extends = "base.toml"\n[[linkage.body]]\nname = "bar"\ninertia = 0.1\n'
+    found = told(text, folder=tmp_path)
+    assert "\n  line 2: linkage.body[0] (bar).mass: is missing" in found
+
+
+@pytest.mark.parametrize(
+    ("trace", "message"),
+    [(None, "cannot be read"), ("t\n0.1\n0.2\n0.1\n", "line 4: 0.1 s does not come after")],
+)
+def test_a_bad_trace_is_told_beside_other_faults(
+    tmp_path: Path, trace: str | None, message: str
+) -> None:
+    if trace:
+        (tmp_path / "frames.csv").write_text(trace)
+    text = GOOD.replace("rate = 30", 'rate = { trace = "frames.csv" }')
+    found = told(text.replace("mass = 1.0", "mass = -1.0"), folder=tmp_path)
+    assert "\n  line 6: graphics.rate: " in found
+    assert message in found
+    assert "line 13: linkage.body[0] (bar).mass" in found
+
+
+def test_a_hold_that_a_connection_asks_for_is_told_there(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "A")
+    python_fmu(tmp_path, "B")
+    text = '[[fmu]]\nname = "a"\npath = "A.fmu"\n[[fmu]]\nname = "b"\npath = "B.fmu"\nrate = 32\n'
+    text += '[[connection]]\nfrom = "b.y"\nto = "a.u"\nhold = "HOLD"\n'
+    for hold, table in (("pspm", "[[spring]]"), ("passive", "[[power]]")):
+        path = foreign_scene(tmp_path, text.replace("HOLD", hold))
+        with pytest.raises(SceneFault) as refused:
+            simulate(str(path), tmp_path / "out")
+        said = str(refused.value)
+        assert f"line 14: connection[0].hold: {hold!r} does not fit b.y -> a.u: " in said
+        assert said.count("b.y -> a.u") == 1
+        assert f"write a {table}" in said
+        assert "docs/holds.md" in said
+
+
+def test_a_default_hold_that_fits_nowhere_is_told_once_with_a_scene_where_it_does(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(SceneFault, match=r": 1 fault\n.*closed-loop-direct"):
+        simulate("closed-loop", tmp_path, ["hold=pspm"])
+
+
+# --- what would do nothing --------------------------------------------------------------------
+
+
+def test_an_ssp_whose_structure_is_to_change(tmp_path: Path) -> None:
+    assert status("export", "pendulum", "--out", tmp_path) == 0
+    path = str(tmp_path / "pendulum.ssp")
+    for key in ("controller.topology=false", "linkage.gravity=[0, 0]", "packaging=native"):
+        with pytest.raises(SceneFault, match="FMUs of an SSP are made: change its scene"):
+            open_scene.load(path, [key])
+    assert open_scene.load(path, ["haptics.rate=64", "duration=0.5"]).duration == 0.5
+    assert names.is_fixed(("graphics", "sync"))
+    assert not names.is_fixed(("graphics", "rate"))
+
+
+def test_iterated_where_no_plants_of_a_rate_are_connected(tmp_path: Path) -> None:
+    with pytest.raises(SceneFault, match=r"coupling: 'iterated' makes connected plants"):
+        simulate("pendulum", tmp_path, ["coupling=iterated"])
+
+
+def test_native_where_no_block_is_ours() -> None:
+    text = 'title = "t"\nduration = 1\npackaging = "native"\n[[fmu]]\nname = "a"\npath = "a.fmu"\n'
+    assert "packaging: 'native' compiles the scene's own blocks" in told(text)

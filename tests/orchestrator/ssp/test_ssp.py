@@ -1,0 +1,155 @@
+"""SSPs: what is written is valid and comes back to the bit; anyone's is read."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy.ssp.ssd import read_ssd
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.commands import main
+from hapticlink.orchestrator.experiment import simulate
+from tests.orchestrator.fmi.test_archives import SSD
+from tests.orchestrator.foreign_fmus import PAIR, python_fmu, scene, with_units
+
+
+def export(source: str, folder: Path, *options: str) -> Path:
+    with pytest.raises(SystemExit) as ended:
+        main(["export", source, "--out", str(folder), *options])
+    assert ended.value.code == 0
+    return folder / f"{Path(source).stem}.ssp"
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("closed-loop", ()),
+        ("closed-loop", ("graphics.rate={ min = 20, max = 60, seed = 3 }", "hold=foh")),
+        (
+            "closed-loop",
+            ("coupling=jacobi", "graphics.align=tick", "holds.virtual_environment.P_c=delayed"),
+        ),
+        ("closed-loop-direct", ("hold=pspm", "holds.virtual_mechanism.F_drift=passive")),
+    ],
+)
+def test_a_shipped_scene_comes_back_to_the_bit(
+    tmp_path: Path, name: str, options: tuple[str, ...]
+) -> None:
+    options = ("duration=0.25", *options)
+    flags = [text for option in options for text in ("--set", option)]
+    path = export(name, tmp_path, *flags)
+    simulate(name, tmp_path / "a", options)
+    again = simulate(str(path), tmp_path / "b")
+    assert again.outcome.fault is None
+    for table in ("haptics.csv", "graphics.csv"):
+        assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()
+
+
+def test_others_read_it_and_the_same_scene_gives_the_same_bytes(tmp_path: Path) -> None:
+    path = export("closed-loop", tmp_path)
+    content = path.read_bytes()
+    ssd = read_ssd(str(path), validate=True)
+    names = [e.name for e in ssd.system.elements]
+    assert "virtual_mechanism" in names
+    wired = {(c.startElement, c.startConnector, c.endElement, c.endConnector)
+             for c in ssd.system.connections}  # fmt: skip
+    assert ("haptic_device", "x[3]", "controller", "x_D[3]") in wired
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        assert {f"resources/{n}.fmu" for n in names} < set(archive.namelist())
+    assert export("closed-loop", tmp_path).read_bytes() == content
+
+
+def test_starts_factors_units_and_own_rates_come_back(tmp_path: Path) -> None:
+    with_units(python_fmu(tmp_path, "Gives", "self.y = 1500.0 * self.gain + time"), y="mm")
+    with_units(python_fmu(tmp_path, "Takes", "self.y = self.u if self.on else 0.0"), u="m")
+    text = PAIR + "factor = -0.1\noffset = 0.3\nhold = 'foh'\n"
+    text = text.replace('"Gives.fmu"\n', '"Gives.fmu"\nrate = "100/3"\nstart.gain = 0.1\n')
+    text = text.replace('"Takes.fmu"\n', '"Takes.fmu"\nstart.on = true\ntiming = "sampled"\n')
+    path = scene(tmp_path, text)
+    simulate(str(path), tmp_path / "a")
+    again = simulate(str(export(str(path), tmp_path / "ssp")), tmp_path / "b")
+    assert again.outcome.fault is None
+    for table in ("haptics.csv", "100_3hz.csv"):
+        assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()
+    assert abs(again.results.haptics["takes.y"][-1]) > 0.1
+
+
+LINE = '<ssd:Connection startElement="a b" startConnector="y" endElement="c" endConnector="u"{}>'
+FOREIGN = SSD.replace(
+    '<ssd:Component name="a" source="resources/a.fmu"/>\n</ssd:Elements>',
+    """<ssd:Component name="a b" source="resources/Gives.fmu"><ssd:Connectors>
+<ssd:Connector name="y" kind="output"><ssc:Real unit="mm"/></ssd:Connector></ssd:Connectors>
+<ssd:ParameterBindings><ssd:ParameterBinding source="resources/a.ssv"/></ssd:ParameterBindings>
+</ssd:Component>
+<ssd:Component name="c" source="resources/Takes.fmu"><ssd:Connectors>
+<ssd:Connector name="u" kind="input"><ssc:Real/></ssd:Connector></ssd:Connectors></ssd:Component>
+</ssd:Elements><ssd:Connections>"""
+    + LINE.format("")
+    + '<ssc:LinearTransformation factor="2.0" offset="1.0"/></ssd:Connection></ssd:Connections>',
+)
+SSV = """<ssv:ParameterSet version="1.0" name="p"
+ xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"><ssv:Parameters>
+<ssv:Parameter name="gain"><ssv:Real value="0.5"/></ssv:Parameter></ssv:Parameters>
+</ssv:ParameterSet>"""
+
+
+def foreign(folder: Path, text: str = FOREIGN) -> str:
+    with_units(python_fmu(folder, "Gives", "self.y = 1000.0 * self.gain"), y="mm")
+    with_units(python_fmu(folder, "Takes", "self.y = self.u"), u="m")
+    with zipfile.ZipFile(folder / "their.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", text)
+        archive.writestr("resources/a.ssv", SSV)
+        for name in ("Gives.fmu", "Takes.fmu"):
+            archive.write(folder / name, f"resources/{name}")
+    return str(folder / "their.ssp")
+
+
+def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path: Path) -> None:
+    options = ["haptics.rate=50", "duration=0.2", "fmu.c.rate=25"]
+    ended = simulate(foreign(tmp_path), tmp_path / "out", options)
+    assert ended.outcome.fault is None
+    # gain .5 of 1000 mm is .5 m; times 2, plus 1
+    np.testing.assert_allclose(ended.results.tables["25hz"]["c.y"][-1], 2.0, rtol=1e-15)
+    assert len(ended.results.haptics["a_b.y"]) == 11
+
+
+def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path: Path) -> None:
+    with pytest.raises(SceneFault) as refused:
+        open_scene.load(foreign(tmp_path))
+    keys = {f.key for f in refused.value.findings}
+    assert keys == {"duration", "haptics.rate"}
+    assert "--set haptics.rate=100" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('endConnector="u"', 'endConnector="w"', "names c.w, which is not there"),
+        ('startElement="a b"', 'startElement="ab"', "names ab.y, which is not there"),
+        ('kind="input"', 'kind="inward"', "is no SSP 1.0"),
+        ("fmu\"><ssd", "fmu\" type=\"application/x-ssp-package\"><ssd", "system of another"),
+        ("resources/a.ssv", "resources/b.ssv", "holds no resources/b.ssv"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(InputFault, match=message):
+        open_scene.load(foreign(tmp_path, FOREIGN.replace(old, new)))
+
+
+def test_with_the_cache_off_no_folder_stays(tmp_path: Path) -> None:
+    import subprocess
+    import sys
+
+    path = foreign(tmp_path)
+    (tmp_path / "temporary").mkdir()
+    code = (
+        "from hapticlink.orchestrator.commands import main; import sys; "
+        f"main(['run', {path!r}, '--out', {str(tmp_path / 'out')!r}, "
+        "'--set', 'haptics.rate=50', '--set', 'duration=0.1'])"
+    )
+    environment = {"HAPTICLINK_CACHE": "off", "TMPDIR": str(tmp_path / "temporary")}
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True)
+    assert not list((tmp_path / "temporary").glob("hapticlink*"))

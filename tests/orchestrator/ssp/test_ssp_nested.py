@@ -1,0 +1,177 @@
+"""SSPs with systems in systems: every number follows from SSP 1.0 by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy.ssp.simulation import simulate_ssp
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.experiment import simulate
+from tests.orchestrator.foreign_fmus import edited, python_fmu
+from tests.orchestrator.run.test_bonds import fmus
+from tests.orchestrator.ssps import (
+    ON,
+    TABLE,
+    TAIL,
+    component,
+    connectors,
+    line,
+    linear,
+    ssp,
+    system,
+)
+
+
+def ended(path: str, folder: Path) -> dict[str, float]:
+    """The outputs at the end of a run at 50 Hz."""
+    experiment = simulate(path, folder / "out", ["haptics.rate=50"])
+    assert experiment.outcome.fault is None
+    table = experiment.results.haptics
+    return {name: float(np.ravel(column)[-1]) for name, column in table.items()}
+
+
+GIVER = system(
+    "left",
+    connectors(out="output"),
+    system("inner", connectors(out="output"), component("g", "Gives"), line("out", "g.y", "2 3")),
+    line("inner.out", "out", "1 100"),
+)
+TAKER = system(
+    "right",
+    connectors(u="input"),
+    component("t", "Takes", ON) + component("p", "Plain"),
+    line("u", "t.u", "-1 0.25") + line("p.u", "u"),
+)
+CHAIN = system("top", "", GIVER + TAKER, line("left.out", "right.u", "10 1"))
+
+
+def test_a_chain_through_the_borders_of_systems_is_one_connection(tmp_path: Path) -> None:
+    found = ended(ssp(tmp_path, CHAIN), tmp_path)
+    # 1000 mm; 2 y + 3, y + 100 in mm inside left. right.u has the unit of what it feeds: m for t,
+    # none for p, so p gets mm.
+    assert found["left_inner_g.y"] == 1000.0
+    assert found["right_t.y"] == pytest.approx(-(10 * 2.103 + 1) + 0.25, rel=1e-14)
+    assert found["right_p.y"] == pytest.approx(10 * 2103.0 + 1, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("between", "how", "expected"),
+    [
+        ("output cm", "", -(10 * 2.103 + 1) + 0.25),
+        # The second line adds 100 to a number in mm as if that were cm.
+        ("output cm", 'suppressUnitConversion="true"', -(10 * 21.03 + 1) + 0.25),
+        ("output", 'suppressUnitConversion="true"', -(10 * 2.103 + 1) + 0.25),
+    ],
+)
+def test_units_between_systems(tmp_path: Path, between: str, how: str, expected: float) -> None:
+    root = CHAIN.replace(connectors(out="output"), connectors(out=between), 1)
+    old = line("inner.out", "out", "1 100")
+    # Where left.out is in cm, 100 mm are added as 10 cm.
+    added = "1 10" if between.endswith("cm") and not how else "1 100"
+    path = ssp(tmp_path, root.replace(old, line("inner.out", "out", added, how)))
+    assert ended(path, tmp_path)["right_t.y"] == pytest.approx(expected, rel=1e-14)
+
+
+def test_units_of_two_kinds_across_a_border_are_refused(tmp_path: Path) -> None:
+    root = CHAIN.replace(connectors(u="input"), connectors(u="input N"))
+    with pytest.raises(InputFault, match=r"units of left\.out and right\.u do not fit: m is not"):
+        open_scene.load(ssp(tmp_path, root), ["haptics.rate=50"])
+
+
+def test_a_loop_through_borders_runs_as_in_fmpy(tmp_path: Path) -> None:
+    """FMPy traces connections through borders too, for Jacobi and without transformations."""
+    python_fmu(tmp_path, "Wave", "self.y = 50 * (time + size) - 5 * self.u")
+    python_fmu(tmp_path, "Lag", "self.y += size * (3 * self.u - self.y)")
+    made = {f"{n}_fmu": (tmp_path / f"{n}.fmu").read_bytes() for n in ("Wave", "Lag")}
+    both = connectors(u="input", y="output")
+    deep = system("deep", both, component("w", "Wave", both), line("u", "w.u") + line("w.y", "y"))
+    left = system("left", both, deep, line("deep.y", "y") + line("u", "deep.u"))
+    lags = component("a", "Lag", both) + component("b", "Lag", both)
+    right = system("right", both, lags, line("u", "a.u") + line("a.y", "b.u") + line("b.y", "y"))
+    root = system("top", "", left + right, line("left.y", "right.u") + line("right.y", "left.u"))
+    path = ssp(tmp_path, root, **made)
+    theirs = simulate_ssp(path, stop_time=0.199, step_size=0.01)
+    ours = simulate(path, tmp_path / "out", ["haptics.rate=100", "coupling=jacobi"])
+    for name, connector in (("left_deep_w", "left.deep.w"), ("right_b", "right.b")):
+        found = ours.results.haptics[f"{name}.y"]
+        assert np.abs(found).max() > 0.1
+        np.testing.assert_allclose(found[1:], theirs[f"{connector}.y"], rtol=1e-12)
+
+
+def test_a_vector_through_borders_stays_one(tmp_path: Path) -> None:
+    entries = {f"x[{i}]": "output m" for i in (1, 2)}
+    inner = "".join(line(f"m.x[{i}]", f"x[{i}]", "3 0") for i in (1, 2))
+    box = system("box", connectors(**entries), component("m", "Moves"), inner)
+    across = "".join(line(f"box.x[{i}]", f"s.d[{i}]") for i in (1, 2))
+    root = system("top", "", box + component("s", "Spring"), across)
+    fmus(tmp_path, "mm")
+    made = {f"{n}_fmu": (tmp_path / f"{n}.fmu").read_bytes() for n in ("Moves", "Spring")}
+    (only,) = open_scene.load(ssp(tmp_path, root, **made), ["haptics.rate=50"]).connection
+    assert (only.from_, only.to) == ("box_m.x", "s.d")
+    assert (only.factor, only.offset, only.convert) == (pytest.approx(0.003, rel=1e-15), 0.0, False)
+
+
+def test_names_stay_apart(tmp_path: Path) -> None:
+    inner = system("a", connectors(u="input"), component("b", "Plain"), line("u", "b.u"))
+    root = system(
+        "top",
+        "",
+        component("a_b", "Plain") + inner + component("a b", "Gives"),
+        line("a b.y", "a.u") + line("a b.y", "a_b.u"),
+    )
+    read = open_scene.load(ssp(tmp_path, root), ["haptics.rate=50", "fmu.a_b_2.rate=25"])
+    assert [f.name for f in read.fmu] == ["a_b", "a_b_2", "a_b_3"]
+    assert {(c.from_, c.to) for c in read.connection} == {
+        ("a_b_3.y", "a_b_2.u"),
+        ("a_b_3.y", "a_b.u"),
+    }
+    assert read.fmu[1].rate == 25
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name="inner"', 'name="outer"', r"names left\.inner\.out, which is not there"),
+        (line("p.u", "u"), line("p.y", "u"), r"right\.p\.y and right\.u are connected, and both g"),
+        (line("p.u", "u"), line("u", "t.u"), r"right\.t\.u is fed by right\.u and by right\.u"),
+        ('name="p" source', 'name="t" source', r"right has two elements named 't'"),
+        (linear(-1, 0.25), TABLE, "BooleanMappingTransformation is not read"),
+        ('source="resources/Plain', 'implementation="ModelExchange" source="resources/Plain',
+         r"right\.p is a Component for model exchange"),
+        ('startTime="0.0"', 'startTime="1.0"', "starts at 1.0 s; runs start at 0"),
+        ('kind="input"', 'kind="inout"', r"right\.u is inout"),
+        (component("p", "Plain"), '<ssd:SignalDictionaryReference name="p" dictionary="d"/>',
+         r"right\.p is a SignalDictionaryReference"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_wired_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in CHAIN + TAIL
+    path = ssp(tmp_path, CHAIN.replace(old, new), TAIL.replace(old, new))
+    with pytest.raises(InputFault, match=message):
+        open_scene.load(path, ["haptics.rate=50"])
+
+
+def test_text_is_not_connected(tmp_path: Path) -> None:
+    edited(python_fmu(tmp_path, "Text"), lambda text: text.replace("<Boolean", "<String"))
+    root = system("top", "", component("p", "Plain") + component("t", "Text"), line("p.y", "t.on"))
+    made = {"Text_fmu": (tmp_path / "Text.fmu").read_bytes()}
+    with pytest.raises(InputFault, match=r"names t\.on, which is text"):
+        open_scene.load(ssp(tmp_path, root, **made), ["haptics.rate=50"])
+
+
+def test_a_circle_without_an_fmu_is_refused(tmp_path: Path) -> None:
+    loop = system(
+        "loop",
+        connectors(a="input", b="output"),
+        component("p", "Plain"),
+        line("a", "b"),
+    )
+    root = system(
+        "top", "", loop + component("q", "Plain"), line("loop.b", "loop.a") + line("q.u", "loop.b")
+    )
+    with pytest.raises(InputFault, match=r"in a circle without an FMU: loop\.b -> loop\.a"):
+        open_scene.load(ssp(tmp_path, root), ["haptics.rate=50"])

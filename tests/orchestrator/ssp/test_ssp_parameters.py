@@ -1,0 +1,153 @@
+"""Parameters of SSPs: bindings, mappings and units, every value by hand from SSP 1.0."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault
+from tests.orchestrator.ssps import (
+    ON,
+    TABLE,
+    binding,
+    bindings,
+    component,
+    connectors,
+    line,
+    linear,
+    mapping,
+    ssp,
+    system,
+    values,
+)
+
+PARAMETERS = system(
+    "top",
+    connectors(lid="input m"),
+    system(
+        "box",
+        connectors(strength="parameter", u="input"),
+        component("p", "Plain", bindings(binding(values(("gain", "7"), ("u", "3")))))
+        + component("q", "Plain"),
+        line("strength", "p.gain", "2 1") + line("strength", "q.gain") + line("u", "p.u"),
+        "{box}",
+    )
+    + component("t", "Takes", ON)
+    + component("g", "Gives", "{gives}"),
+    line("lid", "t.u"),
+    "{top}",
+)
+
+
+def starts(
+    folder: Path, box: str = "", top: str = "", gives: str = "", **entries: str
+) -> dict[str, dict[str, object]]:
+    root = PARAMETERS.replace("{box}", box).replace("{top}", top).replace("{gives}", gives)
+    read = open_scene.load(ssp(folder, root, **entries), ["haptics.rate=50"])
+    return {f.name: dict(f.start) for f in read.fmu}
+
+
+def test_bindings_of_a_system_reach_its_parts_and_go_before_theirs(tmp_path: Path) -> None:
+    found = starts(
+        tmp_path, box=bindings(binding(values(("p.u", "4"))), binding(values(("p.u", "5"))))
+    )
+    assert found["box_p"] == {"gain": 7.0, "u": 5.0}
+    found = starts(
+        tmp_path,
+        box=bindings(binding(values(("strength", "0.5"), ("u", "4")))),
+        top=bindings(
+            binding(values(("u", "6")), about='prefix="box."'),
+            binding(values(("box.q.u", "9"), ("t.on", "false"))),
+        ),
+    )
+    assert found["box_p"] == {"gain": 2 * 0.5 + 1, "u": 6.0}
+    assert found["box_q"] == {"gain": 0.5, "u": 9.0}
+    assert found["t"] == {"on": False}
+
+
+def test_a_mapping_renames_scales_and_leaves_out(tmp_path: Path) -> None:
+    given = values(("stiff", "0.5"), ("start", "3"), ("t.on", "false"))
+    mapped = mapping(
+        ("x.stiff", "box.strength", linear(4, 1)),
+        ("x.stiff", "box.q.u", ""),
+        ("x.start", "box.p.u", linear(-1, 0)),
+    )
+    bound = binding(given, mapped, about='prefix="x."')
+    found = starts(tmp_path, top=bindings(bound))
+    assert found["box_p"] == {"gain": 2 * (4 * 0.5 + 1) + 1, "u": -3.0}
+    assert found["box_q"] == {"gain": 3.0, "u": 0.5}
+    assert found["t"] == {"on": True}
+    external = binding(
+        about='source="resources/v.ssv" prefix="x."', map_about='source="resources/m.ssm"'
+    )
+    assert starts(tmp_path, top=bindings(external), v_ssv=given, m_ssm=mapped) == found
+
+
+def test_a_value_in_a_unit_is_converted_to_that_of_its_variable(tmp_path: Path) -> None:
+    inch = (
+        '<ssv:Units><ssc:Unit xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" '
+        'name="inch"><ssc:BaseUnit m="1" factor="0.0254"/></ssc:Unit></ssv:Units>'
+    )
+    found = starts(
+        tmp_path,
+        top=bindings(binding(values(("lid", "50 cm")))),
+        gives=bindings(binding(values(("gain", "2 inch"), units=inch))),
+    )
+    assert found["t"]["u"] == 0.5
+    assert found["g"]["gain"] == pytest.approx(0.0508, rel=1e-15)
+    # Plain says no unit, so that of its connector counts.
+    bound = connectors(gain="parameter cm") + bindings(binding(values(("gain", "30 mm"))))
+    root = component("p", "Plain", bound) + component("q", "Plain")
+    root = system("top", "", root, line("p.y", "q.u"))
+    plain, _ = open_scene.load(ssp(tmp_path, root), ["haptics.rate=50"]).fmu
+    assert plain.start["gain"] == pytest.approx(3.0, rel=1e-15)
+    scaled = binding(values(("gain", "30 mm")), mapping(("gain", "gain", linear(2, 1))))
+    raw = scaled.replace("<ssm:MappingEntry", '<ssm:MappingEntry suppressUnitConversion="true"')
+    assert starts(tmp_path, gives=bindings(scaled))["g"]["gain"] == pytest.approx(1.06, rel=1e-15)
+    assert starts(tmp_path, gives=bindings(raw))["g"]["gain"] == 61.0
+
+
+def test_what_omsimulator_leaves_out_of_an_inner_mapping_is_not_asked_for(tmp_path: Path) -> None:
+    inner = binding(values(("a", "2")), mapping(("a", "u", ""), version=""))
+    assert starts(tmp_path, box=bindings(inner))["box_p"]["u"] == 2.0
+
+
+def test_an_item_of_an_enumeration_goes_by_its_name(tmp_path: Path) -> None:
+    item = values(("gain", "2")).replace("ssv:Real", "ssv:Enumeration")
+    assert starts(tmp_path, gives=bindings(binding(item)))["g"]["gain"] == "2"
+
+
+def test_values_that_match_nothing_are_passed_over_and_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    bound = binding(
+        values(("gain", "2"), ("lost", "1")), mapping(("lost", "away", ""), ("no", "u", ""))
+    )
+    assert starts(tmp_path, box=bindings(bound))["box_p"]["gain"] == 7.0
+    assert "passed over: box.no, box.away" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("bound", "message"),
+    [
+        (binding(values(("gain", "1 N"))), r"parameter g\.gain does not fit: kg\.m\.s-2 is not m"),
+        (binding(values(("gain", "true")), mapping(("gain", "gain", linear(2, 0)))), "no number"),
+        (binding(values(("gain", "1")), mapping(("gain", "gain", TABLE))), "is not read"),
+        (binding(values(("a", "1"), ("b", "1")), mapping(("a", "gain", ""), ("b", "gain", ""))),
+         r"two parameters are mapped to g\.gain"),
+        (binding(values(("gain", "much"))), "is no SSP 1.0"),
+        (binding(about='source="resources/no.ssv"'), "holds no resources/no.ssv"),
+        (binding(about='source="../v.ssv"'), r"holds no \.\./v\.ssv"),
+        (binding(about='source="v.ssv" sourceBase="component"'), "stands inside an FMU"),
+        (binding(), "neither source nor content"),
+        (binding(about='source="resources/v.ssv"'), "declares a document type"),
+    ],
+)  # fmt: skip
+def test_parameters_that_cannot_be_read_are_refused(
+    tmp_path: Path, bound: str, message: str
+) -> None:
+    bomb = '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
+    with pytest.raises(InputFault, match=message):
+        starts(tmp_path, gives=bindings(bound), v_ssv=bomb)

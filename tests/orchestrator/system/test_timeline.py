@@ -1,0 +1,188 @@
+"""Rates of every FMU: exact ticks, shared clocks, stamps on real FMUs, SSP, faults."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.ticks import Timeline, exact
+from hapticlink.orchestrator.commands import main
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import uses
+from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.scene.records import VariableRate
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import clocks, timeline
+from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
+from tests.orchestrator.timelines import LOOP, scene_of, scenes
+
+Make = Callable[[Timeline, str], System]
+
+
+@given(scenes())
+def test_every_fmu_steps_at_the_times_that_its_rate_and_phase_say(scene: Scene) -> None:
+    time = timeline(scene)
+    haptic = 1 / exact(scene.haptics.rate)
+    for fmu in scene.fmu:
+        at = [start * time.base for start in time.clock(time.of[fmu.name]).starts]
+        assert at[0] == 0
+        assert at[-1] > time.end * time.base
+        if isinstance(fmu.rate, VariableRate):
+            assert all(Fraction(1, 60) <= b - a <= Fraction(1, 10) for a, b in pairwise(at))
+            assert all(t % haptic == 0 for t in at)
+        elif isinstance(fmu.rate, tuple):
+            times = [math.ceil(exact(t) / haptic) * haptic for t in fmu.rate]
+            assert at[1:-1] == times
+        else:
+            period = haptic if fmu.rate == "haptics" else 1 / exact(fmu.rate)
+            first = exact(scene.phases.get(fmu.name, str(period)))
+            assert at[1:] == [first + k * period for k in range(len(at) - 1)]
+
+
+@given(scenes())
+def test_fmus_share_a_clock_where_they_step_together(scene: Scene) -> None:
+    of, time = clocks(scene).of, timeline(scene)
+    pace = {}
+    for fmu in scene.fmu:
+        period = None
+        rate = scene.haptics.rate if fmu.rate == "haptics" else fmu.rate
+        if not isinstance(rate, VariableRate | tuple):
+            period, rate = 1 / exact(rate), exact(rate)
+        pace[fmu.name] = rate, exact(scene.phases.get(fmu.name, str(period))) if period else None
+    for a in LOOP:
+        for b in LOOP:
+            assert (of[a] == of[b]) == (pace[a] == pace[b])
+    assert all(re.fullmatch(r"[\w.+-]+", clock.name) for clock in time.clocks)
+
+
+@pytest.mark.parametrize("coupling", sorted(CAUSAL))
+def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(
+    stamped: Make, tmp_path: Path, coupling: str
+) -> None:
+    rates = {
+        "device": "haptics",
+        "controller": "haptics",
+        "hand": VariableRate(min=10, max=60, seed=5),
+        "mechanism": "1000/3",
+        "graphics": 30,
+    }
+    shares = {"controller": Fraction(1, 4), "mechanism": Fraction(2, 3), "graphics": Fraction(1, 7)}
+    time = timeline(scene_of(Fraction(512), 200, rates, shares))
+    system = stamped(time, coupling)
+    assert run(Plan(system), tmp_path).fault is None
+    tables = {c.name: read_table(tmp_path / f"{c.name}.csv") for c in time.clocks}
+    assert len(tables) == 5
+    said = list(uses(Plan(system)))
+    for c in system.connections:
+        seen = tables[time.of[c.target]][f"{c.target}.seen_{c.target_port}"]
+        stamps = [time.seconds(use.stamp) for use in said if use.connection == c.name]
+        if not system.fmu[c.target].sampled:  # a row holds what the step that ends there has read
+            stamps = [0.0, *stamps]
+        np.testing.assert_allclose(seen, stamps, rtol=0, atol=1e-12)
+    for clock in time.clocks:
+        at = [time.seconds(start) for start in clock.starts if start <= time.end]
+        np.testing.assert_array_equal(tables[clock.name]["time"], at)
+
+
+def test_rates_of_an_fmu_are_what_graphics_takes(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Gives")
+    python_fmu(tmp_path, "Takes", "self.y = self.u")
+    (tmp_path / "stamps.csv").write_text("time\n7.00\n7.10\n7.26\n7.50")
+    gives = '"Gives.fmu"\nrate = { trace = "stamps.csv" }\n'
+    takes = '"Takes.fmu"\nrate = { min = 8, max = 32, seed = 3 }\n'
+    text = PAIR.replace('"Gives.fmu"\n', gives).replace('"Takes.fmu"\n', takes)
+    path = scene(tmp_path, text)
+    ended = simulate(str(path), tmp_path / "out")
+    assert ended.outcome.fault is None
+    found = ended.results
+    given = found.tables["times_of_gives"]["time"]
+    np.testing.assert_array_equal(given, np.array([0, 7, 17, 32]) / 64)
+    taken = found.tables["8to32hz_seed3"]["time"]
+    assert len(taken) > 4
+    assert set(np.diff(taken) * 64) <= set(range(2, 9))
+    assert found.run["seeds"]["fmu.takes.rate"] == 3
+    assert found.run["scene"]["fmu"][0]["rate"] == [0.1, 0.26, 0.5]
+    # Each step of `takes` has had the newest frame of `gives`, which puts out its time.
+    seen = found.tables["8to32hz_seed3"]["takes.y"][1:]
+    newest = given[np.searchsorted(given, taken[:-1], side="right") - 1]
+    np.testing.assert_array_equal(seen, newest)
+    by_list = simulate(str(path), tmp_path / "again", ["fmu.gives.rate=[0.1, 0.26, 0.5]"])
+    assert by_list.results.tables.keys() == found.tables.keys()
+
+
+def test_variable_rates_of_fmus_survive_an_ssp(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Gives")
+    python_fmu(tmp_path, "Takes", "self.y = self.u")
+    gives = '"Gives.fmu"\nrate = { min = 8, max = 32, seed = 3 }\n'
+    takes = '"Takes.fmu"\nrate = [0.125, 0.3, 0.5]\n'
+    text = PAIR.replace('"Gives.fmu"\n', gives).replace('"Takes.fmu"\n', takes)
+    path = scene(tmp_path, text)
+    with pytest.raises(SystemExit, match="0"):
+        main(["export", str(path), "--out", str(tmp_path)])
+    simulate(str(path), tmp_path / "a")
+    simulate(str(tmp_path / "scene.ssp"), tmp_path / "b")
+    tables = json.loads((tmp_path / "a" / "run.json").read_text())["rates"]
+    assert set(tables) == {"haptics", "8to32hz_seed3", "times_of_takes"}
+    for table in tables:
+        a, b = ((tmp_path / run / f"{table}.csv").read_bytes() for run in "ab")
+        assert a == b
+
+
+@pytest.mark.parametrize(
+    ("rate", "why"),
+    [
+        ("{ min = 60, max = 10 }", "swap them"),
+        ("[0.1, 0.2]", "the times end before duration = 0.5 s"),
+        ("[0.3, 0.2, 0.5]", "times must rise"),
+        ("'often'", "write 'haptics', 'graphics', or a rate as 30"),
+        ("'graphics'", "add .graphics."),
+        ("{ trace = 'none.csv' }", "cannot be read as a trace"),
+    ],
+)
+def test_rates_of_an_fmu_that_make_no_sense_are_told(tmp_path: Path, rate: str, why: str) -> None:
+    python_fmu(tmp_path, "Gives")
+    text = f'[[fmu]]\nname = "gives"\npath = "Gives.fmu"\nrate = {rate}\n'
+    with pytest.raises(InputFault, match=why):
+        open_scene.load(str(scene(tmp_path, text)))
+
+
+def test_rates_without_a_whole_tick_are_told_where_they_stand(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Gives")
+    text = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\nrate = { min = 60, max = 61 }\n'
+    with pytest.raises(SceneFault, match="is a whole haptic tick") as refused:
+        simulate(str(scene(tmp_path, text)), tmp_path / "out")
+    assert refused.value.findings[0].key == "fmu[0] (gives).rate"
+
+
+@pytest.mark.parametrize(
+    ("line", "where"),
+    [
+        ("phases.gives = 0.01", "phases.gives"),
+        ("rate = { min = 8, max = 32 }", "fmu[0] (gives).rate"),
+    ],
+)
+def test_an_fmu_of_one_step_size_is_refused_where_steps_differ(
+    tmp_path: Path, line: str, where: str
+) -> None:
+    flag = 'canHandleVariableCommunicationStepSize="true"'
+    edited(python_fmu(tmp_path, "Gives"), lambda text: text.replace(flag, ""))
+    head = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
+    text = f"{line}\n{head}" if "phases" in line else head + line
+    with pytest.raises(SceneFault, match="gives takes steps of one size only") as refused:
+        simulate(str(scene(tmp_path, text)), tmp_path / "out")
+    assert refused.value.findings[0].key == where
