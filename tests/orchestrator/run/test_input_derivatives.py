@@ -25,7 +25,7 @@ from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from tests.orchestrator import coupled, oscillator
 from tests.orchestrator.native_mass import FLAGS, native
-from tests.orchestrator.plan.test_dependency_order import error, growth
+from tests.orchestrator.holds.test_order_of_accuracy import error, growth
 
 Fmus = Mapping[str, Description]
 
