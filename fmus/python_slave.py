@@ -67,13 +67,13 @@ class HapticlinkSlave(Fmi2Slave):
         self._settable, self._n_inputs = n_u + n_p, n_u
         self._fixed = frozenset(about["fixed"])
         self._sampled, self._substeps = about["timing"] == "sampled", about["substeps"]
-        # time, substep, and three flags: initialised, x0 to be computed, y to be computed
-        clock = _doubles([0.0, 0.0, 0.0, 1.0, 1.0])
+        # due: to be computed before it is read
+        self._initialized, self._start_due, self._output_due = False, True, True
+        t, h = _doubles([0.0]), _doubles([0.0])
         x, trial, after = (_doubles([0.0] * n_x) for _ in range(3))
         values = _doubles(about["starts"] + [0.0] * n_y)
         u, p, y = values[:n_u], values[n_u : n_u + n_p], values[n_u + n_p :]
-        t, h = clock[0:1], clock[1:2]
-        self._clock, self._values = clock, values
+        self._time, self._substep, self._values = t, h, values
         self._state, self._trial, self._after = x, trial, after
         self._buffers: list = []
         self._blocks: dict = {}
@@ -145,19 +145,19 @@ class HapticlinkSlave(Fmi2Slave):
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        self._clock[0] = start_time
+        self._time[0] = start_time
 
     @_surviving
     def exit_initialization_mode(self) -> None:
         self._refresh()
         if not all(map(math.isfinite, self._state)):
-            raise ValueError(self._not_finite(self._state, self._clock[0]))
-        self._clock[2] = 1.0
+            raise ValueError(self._not_finite(self._state, self._time[0]))
+        self._initialized = True
 
     @_surviving
     def get_real(self, vrs: list) -> list:
         block, last = self._block(vrs)
-        if self._clock[4] and last >= self._settable:
+        if self._output_due and last >= self._settable:
             self._refresh()
         values = self._values
         return values[block].tolist() if block else [values[vr] for vr in vrs]
@@ -165,7 +165,6 @@ class HapticlinkSlave(Fmi2Slave):
     @_surviving
     def set_real(self, vrs: list, values: list) -> None:
         block, last = self._block(vrs)
-        clock = self._clock
         if last >= self._n_inputs:
             self._refuse_unsettable(vrs)
         if block:
@@ -173,10 +172,10 @@ class HapticlinkSlave(Fmi2Slave):
         else:
             for vr, value in zip(vrs, values):  # noqa: B905 - pythonfmu sends pairs
                 self._values[vr] = value
-        if not clock[2]:
-            clock[3] = clock[4] = 1.0
-        elif not self._sampled:
-            clock[4] = 1.0
+        if not self._initialized:
+            self._start_due = True
+        if not self._initialized or not self._sampled:
+            self._output_due = True
 
     def _block(self, vrs: list) -> tuple:
         """(slice where the value references are a run, else None; the largest), remembered."""
@@ -198,20 +197,19 @@ class HapticlinkSlave(Fmi2Slave):
             name = self._about["names"][vr]
             if vr >= self._settable:
                 raise ValueError(f"{name} is an output; it cannot be set")
-            if self._clock[2] and vr in self._fixed:
+            if self._initialized and vr in self._fixed:
                 raise ValueError(
                     f"parameter {name} is fixed; set it before the end of initialisation mode"
                 )
 
     def _refresh(self) -> None:
         """Bring x0 and y up to date with what was set."""
-        clock = self._clock
-        if clock[3]:
+        if self._start_due:
             self._evaluate_x0()
-            clock[3] = 0.0
-        if clock[4]:
+            self._start_due = False
+        if self._output_due:
             self._evaluate_y()
-            clock[4] = 0.0
+            self._output_due = False
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """True is fmi2OK, False fmi2Discard; nothing is raised. The state moves on success."""
@@ -222,27 +220,27 @@ class HapticlinkSlave(Fmi2Slave):
             return False
 
     def _advance(self, start: float, step_size: float) -> bool:
-        clock, x, trial, after = self._clock, self._state, self._trial, self._after
-        if clock[3]:
+        time, x, trial, after = self._time, self._state, self._trial, self._after
+        if self._start_due:
             self._refresh()
         n = self._substeps
-        clock[1] = step_size / n
+        self._substep[0] = step_size / n
         trial[:] = x
         for k in range(n):
-            clock[0] = start + k * step_size / n
+            time[0] = start + k * step_size / n
             self._evaluate_step()
             trial[:] = after
         if not all(map(math.isfinite, trial)):
-            clock[0] = start
+            time[0] = start
             message = self._not_finite(trial, start + step_size)
             self.log(f"{message}; the state stays at t = {start!r}", enums.Fmi2Status.error)
             return False
         if self._sampled:
-            clock[0] = start
+            time[0] = start
             self._evaluate_y()
         x[:] = trial
-        clock[0] = start + step_size
-        clock[4] = 0.0 if self._sampled else 1.0
+        time[0] = start + step_size
+        self._output_due = not self._sampled
         return True
 
     def _not_finite(self, state: memoryview, time: float) -> str:
@@ -261,16 +259,18 @@ class HapticlinkSlave(Fmi2Slave):
     # --- FMU state: bytes, so that saving and serialising are the same, bit for bit -------
 
     def _get_fmu_state(self) -> bytes:
-        parts = (self._clock, self._values, self._state)
-        return self._about["digest"].encode() + b"".join(part.tobytes() for part in parts)
+        flags = bytes((self._initialized, self._start_due, self._output_due))
+        parts = (self._time, self._values, self._state)
+        return self._about["digest"].encode() + flags + b"".join(p.tobytes() for p in parts)
 
     @_surviving
     def _set_fmu_state(self, state: bytes) -> None:
-        digest, parts = self._about["digest"].encode(), (self._clock, self._values, self._state)
-        size = len(digest) + sum(8 * len(part) for part in parts)
-        if not state.startswith(digest) or len(state) != size:
+        digest, parts = self._about["digest"].encode(), (self._time, self._values, self._state)
+        offset = len(digest) + 3
+        if not state.startswith(digest) or len(state) != offset + sum(p.nbytes for p in parts):
             raise ValueError("this FMU state was not saved by this FMU")
-        offset = len(digest)
+        flags = state[len(digest) : offset]
+        self._initialized, self._start_due, self._output_due = map(bool, flags)
         for part in parts:
             end = offset + 8 * len(part)
             part[:] = array.array("d", state[offset:end])
