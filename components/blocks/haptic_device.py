@@ -150,23 +150,23 @@ def haptic_device(device: specs.Device) -> Component:
         M, C = pantograph.dynamics(measured, x2, p)
         at_start, at_end = measure(p["x_start"], p["x_start"]), measure(motion[:3], measured)
         F_motor = pantograph.jacobian(measured, p).T @ tau
-        x1_next, x2_next = observer.step(
+        after = observer.step(
             device.observer.rule,
-            x1,
-            x2,
-            measured,
-            at_end,
-            F_motor,
-            M,
-            C,
-            p["omega_n"],
-            p["k_D"],
-            h,
+            x1=x1,
+            x2=x2,
+            pose=measured,
+            pose_next=at_end,
+            F_motor=F_motor,
+            M=M,
+            C=C,
+            omega_n=p["omega_n"],
+            k_D=p["k_D"],
+            period=h,
         )
-        step |= {"x_measured": at_end, "x_observer": x1_next, "v_observer": x2_next}
+        step |= {"x_measured": at_end, "x_observer": after.x1, "v_observer": after.x2}
         initial |= {"x_measured": at_start, "x_observer": at_start, "v_observer": ca.SX.zeros(3)}
-        v = observer.velocity(x1, x2, measured, p["k_D"])
-        F_hand = observer.force(x1, measured, M, p["omega_n"])
+        v = observer.velocity(x1=x1, x2=x2, pose=measured, k_D=p["k_D"])
+        F_hand = observer.force(x1=x1, pose=measured, M=M, omega_n=p["omega_n"])
     else:
         v, F_hand = velocity, u["F_hand"]
 

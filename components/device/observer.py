@@ -15,13 +15,23 @@ At the start x1 is the measured pose and x2 zero: no velocity, no force.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import casadi as ca
 
 from hapticlink.components.device import discretisation
 
 
+class State(NamedTuple):
+    """x1 (m, m, rad) and x2 (m/s, m/s, rad/s), each (n,)."""
+
+    x1: ca.SX
+    x2: ca.SX
+
+
 def step(
     rule: str,
+    *,
     x1: ca.SX,
     x2: ca.SX,
     pose: ca.SX,
@@ -32,8 +42,8 @@ def step(
     omega_n: ca.SX,
     k_D: ca.SX,
     period: ca.SX,
-) -> tuple[ca.SX, ca.SX]:
-    """(x1, x2) at the end of a period (s) with the pose measured at both ends.
+) -> State:
+    """The state at the end of a period (s) with the pose measured at both ends.
 
     F_motor is the wrench held between; M and C are (n, n), the rest (n,) or scalar.
     """
@@ -51,15 +61,15 @@ def step(
         ca.vertcat(pose_next, push),
         period,
     )
-    return x[:n], x[n:]
+    return State(x[:n], x[n:])
 
 
-def force(x1: ca.SX, pose: ca.SX, M: ca.SX, omega_n: ca.SX) -> ca.SX:
+def force(*, x1: ca.SX, pose: ca.SX, M: ca.SX, omega_n: ca.SX) -> ca.SX:
     """Observed hand wrench K_p e (N, N, N.m)."""
     return omega_n**2 * (M @ (pose - x1))
 
 
-def velocity(x1: ca.SX, x2: ca.SX, pose: ca.SX, k_D: ca.SX) -> ca.SX:
+def velocity(*, x1: ca.SX, x2: ca.SX, pose: ca.SX, k_D: ca.SX) -> ca.SX:
     """Observed velocity x1' = x2 + k_D e (m/s, m/s, rad/s).
 
     Not x2, which a force that the observer is not told of biases by k_D K_p^-1 F.

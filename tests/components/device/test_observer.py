@@ -80,9 +80,9 @@ def test_unity_gain_at_dc(rule, period):
     x1, x2 = ca.DM(0), ca.DM(0)
     for _ in range(1000):
         x1, x2 = f(x1, x2, 0, 0, -F, MASS, 0, OMEGA_N, K_D, period)
-    M = ca.SX(MASS)
-    force = float(ca.DM(observer.force(ca.SX(x1), ca.SX(0), M, ca.SX(OMEGA_N))))
-    velocity = float(ca.DM(observer.velocity(ca.SX(x1), ca.SX(x2), ca.SX(0), ca.SX(K_D))))
+    at = {"x1": ca.SX(x1), "pose": ca.SX(0)}
+    force = float(ca.DM(observer.force(**at, M=ca.SX(MASS), omega_n=ca.SX(OMEGA_N))))
+    velocity = float(ca.DM(observer.velocity(**at, x2=ca.SX(x2), k_D=ca.SX(K_D))))
     assert force == pytest.approx(F, rel=1e-9)
     assert velocity == pytest.approx(0, abs=1e-10)
     # the trap: x2 itself is biased by k_D F / K_p
