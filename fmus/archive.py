@@ -28,7 +28,6 @@ from hapticlink.components.component import Component, Variable
 from hapticlink.fmus import python_slave
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
-from hapticlink.fmus.icon import icon
 from hapticlink.fmus.model_description import model_description
 from hapticlink.fmus.straight_line import program
 
@@ -78,6 +77,11 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
         "resources/slavemodule.txt": f"{module}\n".encode(),
     }
     return files
+
+
+def icon(timing: str) -> bytes:
+    """model.png: a smooth wave for a continuous block, its samples held for a sampled one."""
+    return (Path(__file__).parent / "icons" / f"{timing}.png").read_bytes()
 
 
 def write(files: Mapping[str, bytes], target: BinaryIO) -> None:

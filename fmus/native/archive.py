@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.archive import check_functions, digest
+from hapticlink.fmus.archive import check_functions, digest, icon
 from hapticlink.fmus.documentation import documentation
-from hapticlink.fmus.icon import icon
 from hapticlink.fmus.model_description import model_description
 from hapticlink.fmus.native.compiler import (
     FLAGS,
