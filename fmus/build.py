@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import uuid
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,6 +9,7 @@ from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Component
 from hapticlink.fmus.archive import entries, require_platform, write
+from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.errors import FmuError
 
 
@@ -62,14 +61,10 @@ def _publish(name: str, files: Mapping[str, bytes], folder: Path | str) -> Path:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / f"{name}.fmu"
-    unfinished = folder / f".{name}.{uuid.uuid4().hex}.fmu"
-    try:
+    with atomic_file(target) as unfinished:
         with unfinished.open("xb") as file:
             write(files, file)
         findings = validate_fmu(str(unfinished))
         if findings:
             raise FmuError(f"`{name}` fails validation:\n  " + "\n  ".join(findings))
-        os.replace(unfinished, target)
-    finally:
-        unfinished.unlink(missing_ok=True)
     return target

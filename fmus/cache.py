@@ -7,7 +7,6 @@ import json
 import os
 import sys
 import tempfile
-import uuid
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -51,11 +50,11 @@ def key(material: Mapping[str, Any]) -> str:
 
 @cache
 def sources(*packages: ModuleType) -> str:
-    """sha256 of the Python and C files of `packages`."""
+    """sha256 of the Python and C files of `packages`, and of the icons."""
     sha = hashlib.sha256()
     for package in packages:
         root = Path(next(iter(package.__path__)))
-        for path in sorted((*root.rglob("*.py"), *root.rglob("*.c"))):
+        for path in sorted(p for p in root.rglob("*") if p.suffix in (".py", ".c", ".png")):
             sha.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return sha.hexdigest()
 
@@ -76,17 +75,9 @@ def cached(key_material: Mapping[str, Any], build_function: Callable[[Path], Pat
             return path
     place.mkdir(parents=True, exist_ok=True)
     # Built beside its final place and moved in whole, so a reader never sees half a file.
-    room = place / f".{uuid.uuid4().hex}"
-    room.mkdir()
-    try:
-        built = build_function(room)
-        target = place / built.name
-        os.replace(built, target)
-    finally:
-        for left in room.iterdir():
-            left.unlink()
-        room.rmdir()
-    return target
+    with tempfile.TemporaryDirectory(prefix=".", dir=place) as room:
+        built = build_function(Path(room))
+        return built.replace(place / built.name)
 
 
 def _is_whole(path: Path) -> bool:

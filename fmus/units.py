@@ -8,9 +8,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 
+from hapticlink.components.base_units import BASES
 from hapticlink.fmus.errors import InvalidUnit
-
-BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 DERIVED: dict[str, dict[str, int]] = {
     "N": {"kg": 1, "m": 1, "s": -2},

@@ -9,7 +9,6 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from xml.etree import ElementTree
 from xml.parsers import expat
 
 from hapticlink.orchestrator.base.faults import InputFault
@@ -72,8 +71,3 @@ def read_xml(archive: zipfile.ZipFile, entry: str) -> bytes:
     except expat.ExpatError as error:
         raise InputFault(f"{path}: {entry} is not well-formed XML: {error}") from error
     return text
-
-
-def xml_tree(archive: zipfile.ZipFile, entry: str) -> ElementTree.Element:
-    """The root element of an XML entry, read as `read_xml` does."""
-    return ElementTree.fromstring(read_xml(archive, entry))

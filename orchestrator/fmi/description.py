@@ -13,9 +13,10 @@ from xml.etree import ElementTree
 
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
+from hapticlink.components.base_units import BASES
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
-from hapticlink.orchestrator.fmi.units import BASES, Unit
+from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar, differences, numbers, text
 
 if TYPE_CHECKING:  # a word of the contract, whose module loads casadi

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from hapticlink.components.base_units import BASES
+
 
 @dataclass(frozen=True)
 class Unit:
@@ -19,9 +21,6 @@ class Unit:
     base: tuple[int, ...] | None = None
     factor: float = 1.0
     offset: float = 0.0
-
-
-BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic_core import to_json
 
+from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.results.tables import Vector
 
 
@@ -57,12 +58,8 @@ def _quoted(name: str) -> str:
 
 def write_json(path: Path, content: Mapping[str, Any], room: int = 0) -> None:
     """Write whole or not at all; `room` bytes of spaces after it are for `write_over`."""
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with atomic_file(path) as unfinished:
         unfinished.write_bytes(_text(content) + b" " * room)
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def write_over(path: Path, *contents: Mapping[str, Any]) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.linkage import GraphicsCopy
+from hapticlink.orchestrator.scene.records import AnyRate
 from hapticlink.orchestrator.scene.scene import Scene
 
 
@@ -62,6 +63,11 @@ def blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
         }
         found.append(BlockPlan("virtual_environment", "graphics", settings))
     return tuple(found)
+
+
+def fmu_rates(scene: Scene) -> dict[str, AnyRate]:
+    """The rate of each FMU by its name: of the scene's blocks, then of [[fmu]]."""
+    return {b.name: b.rate for b in blocks(scene)} | {f.name: f.rate for f in scene.fmu}
 
 
 def impedance(scene: Scene) -> bool:

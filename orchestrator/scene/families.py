@@ -5,11 +5,11 @@ What the table says besides is laid over what the family gives.
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable
 from typing import Any
 
+from hapticlink.orchestrator.base.faults import near
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 ARGUMENTS = ("family", "n")
@@ -73,9 +73,7 @@ def members(arguments: dict[str, Any]) -> dict[str, Any]:
     """The tables of the linkage that `family` and `n` name. Raises FamilyError."""
     family, n = arguments.get("family"), arguments.get("n")
     if family not in FAMILIES:
-        near = difflib.get_close_matches(str(family), FAMILIES, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(FAMILIES)}"
-        raise FamilyError("family", f"no family {family!r}; {hint}")
+        raise FamilyError("family", f"no family {family!r}; {near(str(family), FAMILIES)}")
     if not isinstance(n, int) or isinstance(n, bool) or n < 1:
         raise FamilyError("n", f"{n!r}: how many members? write a whole number of at least 1")
     return FAMILIES[family](n)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib.resources
 from pathlib import Path as FilePath
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.faults import InputFault, near
 
 
 def shipped() -> dict[str, Any]:
@@ -28,9 +27,7 @@ def find(scene: str, folder: FilePath | None = None) -> tuple[str, str]:
             raise InputFault(f"{scene}: cannot be read as text: {error}") from error
     if scene in known:
         return scene, known[scene].read_text(encoding="utf-8")
-    near = difflib.get_close_matches(scene, known, 1)
-    hint = f"did you mean {near[0]}?" if near else f"shipped scenes: {', '.join(known)}"
-    raise InputFault(f"{scene}: neither a file nor a shipped scene; {hint}")
+    raise InputFault(f"{scene}: neither a file nor a shipped scene; {near(scene, known)}")
 
 
 def folder_of(scene: str, folder: FilePath | None = None) -> FilePath | None:

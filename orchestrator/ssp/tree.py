@@ -12,8 +12,9 @@ from xml.etree.ElementTree import Element, fromstring
 from fmpy.ssp.ssd import validate_tree
 from lxml import etree
 
+from hapticlink.components.base_units import BASES
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.fmi.units import BASES, SAME, Linear, Unit
+from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
 from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD
 
 Place = tuple[str, ...]

@@ -7,8 +7,6 @@ the standard does not know, stand in an annotation as JSON with the keys of a sc
 from __future__ import annotations
 
 import json
-import os
-import uuid
 import zipfile
 from dataclasses import asdict, fields
 from functools import partial
@@ -18,10 +16,11 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 
 import pydantic
 
-from hapticlink.orchestrator.fmi.units import BASES
+from hapticlink.components.base_units import BASES
+from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
-from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.blocks import fmu_rates
 from hapticlink.orchestrator.scene.records import AnyRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.ssp.names import (
@@ -43,15 +42,10 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 def write(scene: Scene, system: System, target: Path) -> Path:
     """Write `target`, whole or not at all; the same scene gives the same bytes."""
     folders.made(target.parent)
-    unfinished = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
-    try:
-        with zipfile.ZipFile(unfinished, "w") as archive:
-            _add(archive, STRUCTURE, structure(scene, system))
-            for unit in system.fmus:
-                _add(archive, f"resources/{unit.name}.fmu", unit.description.path.read_bytes())
-        os.replace(unfinished, target)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with atomic_file(target) as unfinished, zipfile.ZipFile(unfinished, "w") as archive:
+        _add(archive, STRUCTURE, structure(scene, system))
+        for unit in system.fmus:
+            _add(archive, f"resources/{unit.name}.fmu", unit.description.path.read_bytes())
     return target
 
 
@@ -150,8 +144,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
     found["holds"] = {**scene.holds, **own}
     found["spring"] = [asdict(spring) for spring in system.springs]
-    rates: dict[str, AnyRate] = {b.name: b.rate for b in blocks(scene)}
-    rates |= {f.name: f.rate for f in scene.fmu}
+    rates = fmu_rates(scene)
     if scene.graphics and "graphics" in rates.values():
         graphics = pydantic.TypeAdapter(type(scene.graphics))
         found["graphics"] = graphics.dump_python(

@@ -9,14 +9,14 @@ import csv
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.scene.toml_keys import flat
 
 Point = dict[str, str]
 
@@ -135,15 +135,8 @@ def _toml(path: Path, text: str) -> Iterator[Point]:
     if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
         raise InputFault(f"--runs {path}: `run` is no array of tables; write [[run]]")
     for run in runs:
-        yield dict(_flat(run))
-
-
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield prefix + key, value if isinstance(value, str) else json.dumps(value)
+        said = {key: value for key, value in flat(run) if value != {}}
+        yield {k: v if isinstance(v, str) else json.dumps(v) for k, v in said.items()}
 
 
 def number(text: str) -> float | None:

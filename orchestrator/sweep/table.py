@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.results.files import write_json
 from hapticlink.orchestrator.sweep.row import Row
 
@@ -47,6 +47,5 @@ def write(path: Path, rows: Sequence[Row]) -> None:
     writer = csv.DictWriter(text, columns(rows), restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    unfinished.write_text(text.getvalue(), encoding="utf-8")
-    os.replace(unfinished, path)
+    with atomic_file(path) as unfinished:
+        unfinished.write_text(text.getvalue(), encoding="utf-8")

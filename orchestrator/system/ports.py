@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
+from hapticlink.components.base_units import BASES
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.units import BASES
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import PowerPort
 from hapticlink.orchestrator.system.haptic_loop import DERIVATIVES

@@ -18,7 +18,7 @@ from hapticlink.orchestrator.base.ticks import (
     periodic,
     variable,
 )
-from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.blocks import fmu_rates
 from hapticlink.orchestrator.scene.records import AnyRate, VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path
@@ -85,9 +85,9 @@ class Clocks:
 
 def clocks(scene: Scene) -> Clocks:
     """The clocks of `scene`: `graphics` and others only where an FMU runs at them."""
-    rates: dict[str, tuple[AnyRate, Path]] = {b.name: (b.rate, ()) for b in blocks(scene)}
-    rates |= {fmu.name: (fmu.rate, ("fmu", i, "rate")) for i, fmu in enumerate(scene.fmu)}
-    found = {fmu: _of(fmu, rate, path, scene) for fmu, (rate, path) in rates.items()}
+    paths: dict[str, Path] = {fmu.name: ("fmu", i, "rate") for i, fmu in enumerate(scene.fmu)}
+    rates = fmu_rates(scene).items()
+    found = {fmu: _of(fmu, rate, paths.get(fmu, ()), scene) for fmu, rate in rates}
     paces = {"haptics": _pace("haptics", (), scene)}
     for name, pace in sorted(found.values(), key=lambda clock: clock[0] != "graphics"):
         paces.setdefault(name, pace)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from hapticlink.orchestrator.base.faults import unknown
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.blocks import fmu_rates
 from hapticlink.orchestrator.scene.records import AnyRate, Rate, Seconds, VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
@@ -60,8 +60,7 @@ def _rate(path: Path, rate: AnyRate, scene: Scene, others: str = "") -> Iterator
 
 
 def _phases(scene: Scene) -> Iterator[Problem]:
-    known: dict[str, AnyRate] = {b.name: b.rate for b in blocks(scene)}
-    known |= {fmu.name: fmu.rate for fmu in scene.fmu}
+    known = fmu_rates(scene)
     for fmu, phase in scene.phases.items():
         path: Path = ("phases", fmu)
         if fmu not in known:

@@ -128,7 +128,7 @@ def test_every_shipped_scene_is_good_and_found_by_name() -> None:
     assert "closed-loop" in find.shipped()
     for name in find.shipped():
         assert open_scene.load(name).title
-    with pytest.raises(InputFault, match="did you mean closed-loop"):
+    with pytest.raises(InputFault, match="did you mean 'closed-loop'"):
         open_scene.load("closed-lop")
 
 

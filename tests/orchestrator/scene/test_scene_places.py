@@ -171,7 +171,7 @@ def test_what_a_base_extends_in_vain_names_the_base(tmp_path: Path) -> None:
     with pytest.raises(InputFault) as refused:
         open_scene.load(str(top))
     assert f"{base}, line 2: extends: closed-lop: neither a file" in str(refused.value)
-    assert "did you mean closed-loop?" in str(refused.value)
+    assert "did you mean 'closed-loop'?" in str(refused.value)
 
 
 def test_scenes_in_two_folders_that_extend_each_other_are_a_circle(tmp_path: Path) -> None:
