@@ -2,9 +2,13 @@
 
 import math
 
+import casadi as ca
 import numpy as np
 from hypothesis import strategies as st
 
+from hapticlink.components.component import Signals
+from hapticlink.components.dynamics.variables import parameters
+from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop, OperationalPoint
 
 TABLE_6_1 = {
@@ -45,6 +49,18 @@ def open_arm(linkage):
         operational_point=linkage.operational_point,
         start=linkage.start,
     )
+
+
+def terms(linkage, *names):
+    """Numpy-valued terms of a linkage at (q, qd), with its own parameter values."""
+    variables = parameters(linkage)
+    p = Signals("p", variables)
+    n = sum({"free": 3}.get(j.type, 1) for j in linkage.joint)
+    q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
+    model = LinkageModel(linkage, p, q, qd)
+    f = ca.Function("f", [q, qd, p.vector], [getattr(model, name) for name in names])
+    values = [s for v in variables for s in v.starts]
+    return lambda q, qd: [np.array(a) for a in f.call([ca.DM(q), ca.DM(qd), ca.DM(values)])]
 
 
 @st.composite

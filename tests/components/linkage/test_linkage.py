@@ -15,28 +15,16 @@ from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, OperationalPoint
 from tests.components import appendix_a
-from tests.mechanisms import TABLE_6_1, five_bar, linkages
+from tests.mechanisms import TABLE_6_1, five_bar, linkages, terms
 
 F_CM = (0.3, 0.6, 0.45, 0.7)
-
-
-def functions(linkage, *names):
-    """Numpy-valued terms of a linkage at (q, qd), with its own parameter values."""
-    variables = parameters(linkage)
-    p = Signals("p", variables)
-    n = sum({"free": 3}.get(j.type, 1) for j in linkage.joint)
-    q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
-    model = LinkageModel(linkage, p, q, qd)
-    f = ca.Function("f", [q, qd, p.vector], [getattr(model, name) for name in names])
-    values = [s for v in variables for s in v.starts]
-    return lambda q, qd: [np.array(a) for a in f.call([ca.DM(q), ca.DM(qd), ca.DM(values)])]
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_terms_meet_appendix_a(seed):
     rng = np.random.default_rng(seed)
     m, l, J = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"]  # noqa: E741
-    at = functions(five_bar(f=F_CM), "D", "C_qd", "W", "w", "h", "x_h", "J_h")
+    at = terms(five_bar(f=F_CM), "D", "C_qd", "W", "w", "h", "x_h", "J_h")
     q, qd = rng.uniform(-3, 3, 4), rng.uniform(-5, 5, 4)
     D, C_qd, W, w, h, x_h, J_h = at(q, qd)
     tight = {"rtol": 1e-13, "atol": 1e-15}
@@ -71,7 +59,7 @@ def test_laws_of_any_linkage(drawn):
     """D is symmetric positive definite, T = 1/2 qd' D qd, C qd = Ddot qd - dT/dq; loops are closed
     and regular."""
     linkage, q, qd = drawn
-    at = functions(linkage, "D", "C_qd", "kinetic_energy", "h", "W")
+    at = terms(linkage, "D", "C_qd", "kinetic_energy", "h", "W")
     D, C_qd, T, h, W = at(q, qd)
     np.testing.assert_allclose(D, D.T, atol=1e-14)
     assert np.linalg.eigvalsh(D).min() > 0
@@ -94,7 +82,7 @@ def test_free_body_is_its_own_inertia():
         operational_point=OperationalPoint(body="b", at=(0.3, -0.2)),
     )
     q, qd = np.array([0.1, -0.2, 0.7]), np.array([1.0, 2.0, 3.0])
-    D, J_h, T = functions(linkage, "D", "J_h", "kinetic_energy")(q, qd)
+    D, J_h, T = terms(linkage, "D", "J_h", "kinetic_energy")(q, qd)
     v = J_h @ qd
     np.testing.assert_allclose(J_h.T @ np.diag([2.0, 2.0, 0.1]) @ J_h, D, atol=1e-15)
     np.testing.assert_allclose(T.item(), 0.5 * (2 * v[0] ** 2 + 2 * v[1] ** 2 + 0.1 * v[2] ** 2))
@@ -111,7 +99,7 @@ def test_a_tree_without_a_root_is_refused():
         operational_point=OperationalPoint(body="a"),
     )
     with pytest.raises(ValueError, match="no chain of joints leads to `ground`"):
-        functions(linkage, "x_h")
+        terms(linkage, "x_h")
 
 
 @settings(max_examples=30, deadline=None)
