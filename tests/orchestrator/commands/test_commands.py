@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from hapticlink.orchestrator.results import tables
 from tests.orchestrator.conftest import status
@@ -24,7 +25,7 @@ def test_a_mechanism_alone_runs_at_the_haptic_rate(
     assert found.run["end"] == {"reason": "duration", "time": 0.25}
     assert found.run["energies"] == "none"
     assert found.run["fault"] is None
-    assert (tmp_path / "out" / "trajectories.png").stat().st_size > 0
+    assert imread(tmp_path / "out" / "trajectories.png").min() < 0.5  # ink on it
     assert "done at 0.25 s" in capsys.readouterr().out
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.study import cases, errors, page
+from hapticlink.orchestrator.study import cases, errors, figures, page
 from hapticlink.orchestrator.study.grids import COLUMNS, best, grid, lasting, short
 from hapticlink.orchestrator.sweep.row import Row
 
@@ -78,8 +78,24 @@ def test_numbers_are_short() -> None:
     ]  # fmt: skip
 
 
+@pytest.fixture
+def cells(monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[str, list[str]]]:
+    """What the cells of each map's first panel say, by file name and hold, a rate after another."""
+    found: dict[str, dict[str, list[str]]] = {}
+    save = figures.save
+
+    def keep(figure: Any, folder: Path, name: str) -> str:
+        texts = np.reshape([text.get_text() for text in figure.axes[0].texts], (-1, len(COLUMNS)))
+        holds = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+        found[name] = {h: row.tolist() for h, row in zip(holds, texts, strict=True)}
+        return save(figure, folder, name)
+
+    monkeypatch.setattr(figures, "save", keep)
+    return found
+
+
 def test_the_page_names_the_hold_of_the_least_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cells: dict[str, dict[str, list[str]]]
 ) -> None:
     """Rows of every case, as if the mean were right and the second-order hold lost everywhere."""
     monkeypatch.setattr(cases, "job", lambda scene, options, point: point)
@@ -106,6 +122,9 @@ def test_the_page_names_the_hold_of_the_least_error(
         assert f"| {rate} | `foh, mean` | 1 | 5" in text
     assert "| `second-order` | none | | | |" in text
     assert "| those of the last frame (B.15) | the pose | left out | 64 of 64 |  |  |   |" in text
-    for name in ("direct_tracking", "direct_energy", "printed_gains", "loop_coupling"):
+    best = {"direct_tracking": "1", "direct_energy": "-2", "printed_gains": "1"}
+    for name, value in (best | {"loop_coupling": "1"}).items():
         assert f"({name}.png)" in text
-        assert (tmp_path / f"{name}.png").stat().st_size > 10000
+        assert (tmp_path / f"{name}.png").is_file()
+        assert cells[f"{name}.png"]["foh, mean"] == [value] * len(COLUMNS)
+        assert cells[f"{name}.png"]["second-order"] == ["1.2 s"] * len(COLUMNS)  # when it was lost

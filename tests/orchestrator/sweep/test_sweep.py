@@ -180,7 +180,7 @@ def test_one_table_whatever_the_processes(bar: Path, tmp_path: Path) -> None:
     for jobs in (1, 3):
         out = tmp_path / str(jobs)
         assert status("sweep", bar, "--vary", vary, "--out", out, "--jobs", jobs) == 0
-        assert (out / "sweep.png").stat().st_size > 0
+        assert (out / "sweep.png").is_file()
         assert not (out / ".running").exists()
         tables.append([{k: v for k, v in r.items() if k != "run_time_s"} for r in read(out)])
     assert tables[0] == tables[1]
@@ -347,9 +347,28 @@ def test_rows_that_are_broken_are_made_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "keys", [("a", "h"), ("h", "a"), ("h",), ("a",), ("a", "b"), ("h", "a", "b")]
+    ("keys", "lines", "bars", "maps"),
+    [
+        (("a", "h"), 2, 0, 0),
+        (("h", "a"), 2, 0, 0),
+        (("h",), 0, 2, 0),
+        (("a",), 1, 0, 0),
+        (("a", "b"), 3, 0, 0),
+        (("b", "a"), 0, 0, 1),
+        (("h", "a", "b"), 6, 0, 0),
+    ],
 )
-def test_every_shape_of_a_sweep_has_a_figure(tmp_path: Path, keys: tuple[str, ...]) -> None:
+def test_every_shape_of_a_sweep_has_a_figure(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    keys: tuple[str, ...],
+    lines: int,
+    bars: int,
+    maps: int,
+) -> None:
+    """It shows the numbers of all runs that have one and lasted."""
+    drawn, axes_of = [], figure._axes
+    monkeypatch.setattr(figure, "_axes", lambda wide: drawn.append(axes_of(wide)) or drawn[-1])
     values = {"a": [str(i) for i in range(12)], "b": ["1", "2.5", "4"], "h": ["zoh", "foh"]}
     rows: list[row.Row] = [
         {**p, "end": "stop_when" if i == 1 else "duration", "tracking_max_mm": 10.0**i}
@@ -357,7 +376,15 @@ def test_every_shape_of_a_sweep_has_a_figure(tmp_path: Path, keys: tuple[str, ..
     ]
     del rows[0]["tracking_max_mm"]
     assert figure.draw(rows, keys, tmp_path, None) == "sweep.png"
-    assert (tmp_path / "sweep.png").stat().st_size > 5000
+    assert (tmp_path / "sweep.png").is_file()
+    axes = drawn[0][1]
+    curves = [line.get_ydata() for line in axes.lines if line.get_marker() == "."]
+    widths, cells = [bar.get_width() for bar in axes.patches], axes.collections
+    assert (len(curves), len(widths), len(cells)) == (lines, bars, maps)
+    values_of = [np.ma.filled(c.get_array(), np.nan).ravel() for c in cells]
+    shown = np.concatenate([*curves, widths, *values_of])
+    expected = [r["tracking_max_mm"] for r in rows[1:] if r["end"] == "duration"]
+    assert sorted(shown[np.isfinite(shown)]) == sorted(expected)
     with pytest.raises(InputFault, match="there are tracking_max_mm"):
         figure.draw(rows, keys, tmp_path, "tracking")
     assert figure.draw([row.failed("died", "")], (), tmp_path, None) is None
