@@ -1,4 +1,4 @@
-"""The parts that blocks of every scheme are made of."""
+"""Sequences of operations that all schemes share: publish, feed, step, record."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def firing(system: System, event: Event) -> tuple[list[Fmu], list[Fmu]]:
-    """(sampled, continuous) FMUs whose clocks fire."""
+    """The FMUs whose clocks fire at this event, as (sampled, continuous)."""
     clocks = {f.clock for f in event.firings}
     due = [u for u in system.fmus if u.clock in clocks]
     return [u for u in due if u.sampled], [u for u in due if not u.sampled]
 
 
 def without_steps(event: Event, clocks: Container[str] | None = None) -> Event:
-    """The same instant, at which no plant, or none of some clocks, starts a step."""
+    """The event with the steps of all plants, or of those of `clocks`, left out."""
     firings = (
         f._replace(final=f.final or clocks is None or f.clock in clocks) for f in event.firings
     )
@@ -36,13 +36,13 @@ def without_steps(event: Event, clocks: Container[str] | None = None) -> Event:
 
 
 def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:
-    """The plants that start a step; a step past the end of the run is not started."""
+    """The plants that start a step; no step is started that would pass the end of the run."""
     started = {f.clock for f in event.firings if not f.final}
     return [u for u in continuous if u.clock in started]
 
 
 def publish(system: System, fmu: Fmu, ahead: int = 0) -> Iterator[Operation]:
-    """Read the outputs, and hand them to the holds behind them."""
+    """Read the outputs of an FMU and push them into the holds of its connections."""
     yield Get(fmu.name, ahead)
     for connection in system.out_of(fmu.name):
         if connection.hold:
@@ -50,10 +50,9 @@ def publish(system: System, fmu: Fmu, ahead: int = 0) -> Iterator[Operation]:
 
 
 def publish_ended(system: System, event: Event, continuous: list[Fmu]) -> Iterator[Operation]:
-    """The outputs of the plants whose steps end here; initialisation has read the first.
-
-    Those that may be read after new inputs are set show their feed-through of this tick.
-    """
+    """Publish the outputs of the plants whose steps end at this event (initialisation has read
+    those of t = 0). Plants in `get_after_set` take their new inputs and are read once more, so that
+    direct feed-through acts within the tick."""
     if not event.first:
         for fmu in continuous:
             yield from publish(system, fmu)
@@ -64,9 +63,12 @@ def publish_ended(system: System, event: Event, continuous: list[Fmu]) -> Iterat
 
 
 def feed(system: System, event: Event, fmu: Fmu, part: int = 0) -> Iterator[Operation]:
-    """Set the inputs. A plant takes them over its whole step or substep, so it gets what a hold
-    gives for the middle of it, or for its beginning with the derivatives there; a sampled block
-    what it gives for this tick."""
+    """Evaluate the holds in front of an FMU and set its inputs.
+
+    A plant keeps an input constant over its step or substep, so it gets the hold's value at the
+    middle of it, or, where it interpolates inputs, the value and the derivatives at the beginning.
+    A sampled block gets the value at this tick.
+    """
     incoming = system.into(fmu.name)
     width = Fraction(0)
     if not fmu.sampled:
@@ -86,7 +88,7 @@ def dticks(event: Event, fmu: Fmu) -> int:
 
 
 def step(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
-    """The step of an FMU that has been fed, with the substeps that a plant is asked to take."""
+    """Step an FMU whose inputs are set; a plant renews its inputs before each substep."""
     parts = 1 if fmu.sampled else system.substeps.get(fmu.name, 1)
     for part in range(parts):
         if part:
@@ -95,7 +97,7 @@ def step(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
 
 
 def record(system: System, event: Event) -> Iterator[Operation]:
-    """One row for each clock that fires, then the question whether the run is over."""
+    """Record a row for each clock that fires, then test the stop condition."""
     for f in event.firings:
         yield Record(f.clock)
     condition = system.ends_when

@@ -1,4 +1,4 @@
-"""The order that dependencies give, and the loops in which they give none."""
+"""The order of FMUs by their connections and direct feed-through, and the algebraic loops."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 @dataclass(frozen=True)
 class AlgebraicLoop:
-    """FMUs that feed each other, in the order that they step in, and a way round among them."""
+    """FMUs that feed each other, in the order in which they step, and one cycle among them."""
 
     fmus: tuple[str, ...]
     ring: str
@@ -39,8 +39,8 @@ def direct(system: System, units: Iterable[Fmu]) -> dict[str, set[str]]:
 
 
 def plants(system: System, units: Iterable[Fmu]) -> Iterator[list[Fmu]]:
-    """The groups in order; in a loop direct dependencies order, and what they leave the system's
-    order."""
+    """Plants in the order in which they step. Within an algebraic loop, topologically by direct
+    feed-through; ties keep the declaration order."""
     for group in groups(system, units):
         parts = components(direct(system, group))
         yield [system.fmu[name] for part in parts for name in part]
@@ -97,7 +97,7 @@ def components(feeds: Mapping[str, Collection[str]]) -> list[list[str]]:
 
 
 def ring(feeds: Mapping[str, Collection[str]], group: Collection[str]) -> str:
-    """A way round inside a loop, as `a -> b -> a`."""
+    """One cycle inside a loop, as `a -> b -> a`."""
     path = [next(iter(group))]
     while True:
         before = sorted(n for n in feeds[path[-1]] if n in group)[0]

@@ -114,7 +114,8 @@ def _lines(block: Iterable[Operation], indent: str) -> Iterator[str]:
 
 
 def _line(operation: Operation) -> str:
-    """`step virtual_mechanism dticks 15`: the operation, what it works on, what is not usual."""
+    """`step virtual_mechanism dticks 15`: the operation, its FMU or connection, and every argument
+    that differs from its default."""
     first, *others = vars(operation).items() or [("", "")]
     usual = {f.name: f.default for f in fields(operation)}
     given = [f"{name} {value}" for name, value in others if value != usual[name]]

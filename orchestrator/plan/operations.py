@@ -49,8 +49,8 @@ class Push:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Ask a hold, by what is known at this tick, for its value `ahead` of it: the middle of the
-    step over which a plant takes it, 0 for a sampled block.
+    """Evaluate a hold from the samples known at this tick for the instant `ahead` of it: the middle
+    of the step for a plant, 0 for a sampled block.
 
     A plant that takes inputs that vary gets the value at the beginning of its step of `width`, and
     its derivatives up to `order`."""
@@ -95,7 +95,7 @@ class StopWhen:
 
 @dataclass(frozen=True)
 class Blend:
-    """Ask a hold for a weighted sum of its values: each (weight, `ahead` of this tick)."""
+    """Evaluate a weighted sum of a hold's values: each (weight, `ahead` of this tick)."""
 
     connection: str
     points: tuple[tuple[float, Fraction], ...]
@@ -117,8 +117,12 @@ class Rollback:
 
 @dataclass(frozen=True)
 class Repeat:
-    """Carry out `guess` and `body` until the outputs at the end of the step of `dticks` are those
-    that `guess` has handed to the `connections`; `again` goes before every repetition."""
+    """Fixed-point iteration over one co-simulation step of `dticks`.
+
+    guess: push trial outputs into the holds of `connections`. body: the step itself. again:
+    restore the FMU states before a repetition. Ends when the outputs at the end of the step are
+    those that were pushed.
+    """
 
     connections: tuple[str, ...]
     dticks: int

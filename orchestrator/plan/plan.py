@@ -2,7 +2,7 @@
 
 An event is an instant at which clocks fire. Events of one kind run the same block of
 operations, so a plan is a finite set of blocks and an iterator of (tick, event). A scheme
-orders a block; `run` carries it out; `stamps` reads causality off it.
+orders a block; `run` carries it out; `sample_ages` reads causality off it.
 """
 
 from __future__ import annotations

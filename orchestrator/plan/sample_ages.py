@@ -1,4 +1,4 @@
-"""Causality read off a plan: which sample each input was made from, without running an FMU."""
+"""Causality of a plan without running an FMU: the stamp of the sample behind each input."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""A process beside a run with FMUs of others in its own process: where one of them takes the run
-with it, this one writes how it ended into run.json and removes the temporary folders."""
+"""A watchdog process for runs that load foreign FMUs into their own process: where such an FMU
+crashes the run, it records the end in run.json and removes the temporary folders."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base import temporary_folders
 
 @contextmanager
 def beside(folder: Path) -> Iterator[None]:
-    """Within, a crash of this process is told in `folder`/run.json."""
+    """Context in which a crash of this process is recorded in `folder`/run.json."""
     command = [sys.executable, "-P", "-m", __name__, str(folder.resolve()), str(os.getpid())]
     # A session of its own: Ctrl-C is for the run. Its input ends when this process does.
     with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
@@ -27,7 +27,7 @@ def beside(folder: Path) -> Iterator[None]:
 
 
 def finish(folder: Path, process: int) -> None:
-    """What the run in `process`, which is gone, could not do any more."""
+    """Complete run.json and remove the temporary folders for the dead run in `process`."""
     from hapticlink.orchestrator.results.files import write_json
     from hapticlink.orchestrator.results.tables import load
 

@@ -1,4 +1,4 @@
-"""The operation Repeat carried out: plants step until their outputs are those that were guessed."""
+"""Fixed-point iteration of an algebraic loop: the operation Repeat carried out."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def total(counts: Iterable[Iterations]) -> Iterations | None:
 
 
 class Unconverged(Fault):
-    """Plants that do not agree; names the connection that differs most."""
+    """The iteration did not converge; names the connection with the largest residual."""
 
 
 class FixedPoint:

@@ -23,7 +23,7 @@ TOLERANCE = 1e-12
 
 
 def initialize(system: System, instances: Mapping[str, Instance], signals: SignalVector) -> None:
-    """Leave every instance in step mode, and the outputs of t = 0 on the signals.
+    """Initialise every instance; the outputs of t = 0 are in the signal vector afterwards.
 
     Sweeps over all FMUs carry values through connections, parameters set from outputs among
     them. Raises FmuFault where they don't agree to 1e-12 within 50 sweeps and 50 steps of Newton,
@@ -99,7 +99,7 @@ def _jacobian(
     system: System, instances: Mapping[str, Instance], signals: SignalVector, places: list[int]
 ) -> Callable[[], Matrix | None]:
     """The Jacobian of a sweep's residual by the FMUs' directional derivatives, where all on the way
-    give them: the fmu changes of the places, carried from FMU to FMU as the sweep goes."""
+    give them: the unit changes of the places, carried from FMU to FMU as the sweep goes."""
     moved = [c for c in system.connections if {*places} & {*signals.sources(c)}]
     found = jacobians.ways(system, signals, instances, moved, places)
     held = [(signals.hold(c.name), signals.sources(c)) for c in moved if c.hold]

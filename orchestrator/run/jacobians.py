@@ -1,10 +1,10 @@
-"""Jacobians of maps that go through FMUs, from the FMUs' directional derivatives.
+"""Jacobians of a chain of FMUs from their directional derivatives.
 
 fmi2GetDirectionalDerivative gives dy = (dh/du) du of what the FMU computes in its mode, y = h(u)
 (FMI 2.0.5 section 2.1.9, FMI 3.0 section 2.2.11): in initialisation the outputs by inputs of the
 instant; in step mode h is the step, f_doStep of the table in section 4.1.2, so it is the outputs
 at its end by inputs that were held over it. Not every FMU reads the standard so, and none is
-taken at its word: `fixed_points.Newton` falls back to differences.
+taken at its word: `solvers.Newton` falls back to differences.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from hapticlink.orchestrator.system.system import Connection, System
 
 @dataclass(frozen=True)
 class Through:
-    """The way through one FMU: from inputs that stand at `columns` of a signals to outputs at
-    `rows`."""
+    """Partial derivatives of one FMU: of the outputs at `rows` of the signal vector with respect to
+    the inputs whose sources stand at `columns`."""
 
     instance: Instance
     outputs: tuple[Scalar, ...]
@@ -50,8 +50,8 @@ def ways(
     connections: Iterable[Connection],
     places: Sequence[int],
 ) -> list[Through] | None:
-    """The ways of `connections` to outputs at `places`, in the order of the system's FMUs; None
-    where an FMU on them gives no derivatives, or numbers that have none."""
+    """Per FMU on the loop, the partial derivatives of the outputs at `places` with respect to the
+    connected inputs, in the system's order; None where an FMU gives none."""
     found = []
     connections = list(connections)
     for fmu in system.fmus:

@@ -1,8 +1,7 @@
-"""Steps of isolated FMUs that follow one another in a block run at the same time.
+"""Consecutive doSteps of isolated FMUs run concurrently; any other operation is a barrier.
 
-Each of a round is started in turn; where the plan wants anything else than to start the next one,
-all are waited for, in their order. So what a run does, and the fault that it tells, are those of
-one step after the other.
+Steps are started and awaited in the plan's order, so results and faults are those of sequential
+execution.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ def bound(
     bind: Callable[[Operation], Call],
     isolated: Mapping[str, Isolated],
 ) -> list[Call]:
-    """The calls of a block's operations, with a wait where a round ends."""
+    """The calls of a block's operations, with a barrier after each group of concurrent steps."""
     calls: list[Call] = []
     stepping: list[str] = []
 

@@ -1,6 +1,7 @@
-"""Python FMUs of one process share one interpreter, so of two modules with one name the first
-that is imported serves both FMUs, silently. Who would get another's module runs in a process of
-its own.
+"""Module names of Python FMUs that clash.
+
+Python FMUs of one process share an interpreter: of two modules with one name, the first imported
+serves both FMUs, silently. An FMU that would get another's module runs in a process of its own.
 
 pythonfmu and pythonfmu3 put an FMU's resources/ on sys.path; what can be imported from there
 are its top-level modules and packages. Two are the same where their files have equal CRC-32s.

@@ -1,5 +1,5 @@
-"""One vector with all outputs, clock by clock and FMU by FMU, and after them all held values, with
-the derivatives and the mean of those that vary within a step."""
+"""All signals of a run in one vector: outputs by clock and FMU, then held values, then the
+derivatives and means of held values that vary within a step."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Vector = NDArray[np.float64]
 
 
 class SignalVector:
-    """Where each signal of a system stands in `values`."""
+    """The vector `values` and the index of each signal in it."""
 
     def __init__(self, system: System) -> None:
         self._of_fmu: dict[str, slice] = {}

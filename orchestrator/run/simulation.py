@@ -1,4 +1,4 @@
-"""The simulation side of a system: instances, signals, holds, meters and recorders."""
+"""The running counterpart of a system: FMU instances, signals, holds, meters and recorders."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Simulation:
                 made.dismiss()
 
     def start(self) -> None:
-        """Initialise; every hold gets its sample of t = 0, every FMU its way to set inputs."""
+        """Initialise the FMUs, push the samples of t = 0 into the holds, and bind the setters."""
         initialize(self.system, self.instances, self.signals)
         values = self.signals.values
         for c in self.system.connections:
@@ -101,7 +101,7 @@ class Simulation:
         return [r[0] for r in rows], [r[1] for r in rows], [r[2] for r in rows]
 
     def links(self) -> dict[str, dict[str, int]]:
-        """What became of the samples of connections with a latency."""
+        """Per connection with a latency, the number of samples sent, lost and overtaken."""
         links = {n: getattr(h, "link", None) for n, h in self.holds.items()}
         return {
             n: {"sent": k.sent, "lost": k.lost, "overtaken": k.overtaken}

@@ -1,4 +1,4 @@
-"""Points w that a map g leaves where they are: r(w) = g(w) - w = 0, by values of g alone.
+"""Fixed points of a map, r(w) = g(w) - w = 0, from values of g alone.
 
 Each solver keeps what it has learned (relaxation, Jacobian) for the next call.
 """

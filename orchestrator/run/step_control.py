@@ -1,4 +1,4 @@
-"""The operation Advance carried out: the plants of a clock, step by step, to its next tick."""
+"""Step-size control during a run: the operation Advance carried out."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class Advancer:
         return size
 
     def _both(self, tick: int, size: int, saved: Any) -> float:
-        """The error of a step, in fmus of the tolerance; its two halves stand."""
+        """The error of a step, in units of the tolerance; its two halves stand."""
         self._step(tick, size)
         self._read(tick + size)
         whole = self._values[self._outputs]
@@ -208,7 +208,7 @@ ORDER = {"lead": 2, "foh": 2, "foh-derivative": 2, "second-order": 3, "hermite":
 
 
 def integral(error: float, order: int) -> float:
-    """The factor from the step taken to the next, where the error, in fmus of the tolerance, was
+    """The factor from the step taken to the next, where the error, in units of the tolerance, was
     `error` and grows with the step to the power `order`."""
     return 0.9 * error ** (-1 / order) if error else inf
 

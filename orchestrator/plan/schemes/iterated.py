@@ -1,4 +1,4 @@
-"""Iterated: the step of plants that feed each other is repeated until its end agrees with itself.
+"""Iterated coupling: the step of an algebraic loop of plants is repeated to a fixed point.
 
 Sampled blocks come first, as in Gauss-Seidel. Then the plants of a rate, each after those that
 feed it. A loop of them steps together on a guess of its outputs at the end of the step, given to

@@ -1,4 +1,5 @@
-"""Step control laid over a scheme: sampled blocks as they are, plants in steps found as they go."""
+"""Step-size control on top of a scheme: sampled blocks keep their rate, plants take steps whose
+size is chosen during the run."""
 
 from __future__ import annotations
 

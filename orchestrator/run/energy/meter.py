@@ -67,7 +67,7 @@ class Meter:
         self._full = ROWS
 
     def sample(self, stamp: int) -> None:
-        """The source has put out a value stamped `stamp`."""
+        """Book the source's new sample, stamped `stamp`."""
         if self._stamps and self._stamps[-1] == stamp:
             self._samples[-1] = self._source()
             return
@@ -75,7 +75,7 @@ class Meter:
         self._samples.append(self._source())
 
     def move(self, tick: int) -> None:
-        """The target stands at `tick`."""
+        """Book the target's displacement at `tick`."""
         if self._ticks and self._ticks[-1] == tick:
             return
         if len(self._ticks) >= self._full:
@@ -84,7 +84,7 @@ class Meter:
         self._moves.append(self._x())
 
     def hold(self, share: float) -> None:
-        """The target has got what it takes over `share` of its step."""
+        """Book the effort that the target holds over `share` of its step."""
         effort = self._held() if share == 1.0 else self._held() * share
         if len(self._efforts) < len(self._moves):
             self._efforts.append(effort)
@@ -92,13 +92,13 @@ class Meter:
             self._efforts[-1] += effort
 
     def mark(self, room: int) -> Mark:
-        """Where `back` leads, from up to `room` rows on."""
+        """Checkpoint for `back` (rollback); keeps at least `room` rows."""
         if len(self._ticks) + room >= self._full:
             self._fold()
         return len(self._stamps), len(self._ticks), len(self._efforts)
 
     def back(self, mark: Mark) -> None:
-        """Forget what was told since the mark."""
+        """Roll back to the checkpoint `mark`."""
         stamps, ticks, efforts = mark
         del self._stamps[stamps:], self._samples[stamps:]
         del self._ticks[ticks:], self._moves[ticks:], self._efforts[efforts:]
@@ -139,7 +139,7 @@ class Meter:
         )
 
     def _fold(self) -> None:
-        """Forget the rows that are summed up; where a slow source keeps them, allow for more."""
+        """Drop rows that are in the sums; grow the buffer where a slow source still needs them."""
         if self._stamps:
             book = self._book()
             self._work, self._ideal, self._most = book.work_at_row, book.ideal, book.most

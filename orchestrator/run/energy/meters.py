@@ -1,4 +1,4 @@
-"""Energy meters on the power connections of a system, read beside the calls of the plan."""
+"""One energy meter per power connection, updated by the get, set and step calls of a run."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class Meters:
             self._targets.setdefault(c.target, []).append(meter)
 
     def start(self) -> None:
-        """Everything stands at 0, initialised."""
+        """Start all accounts at the initialised state."""
         for meter in self._meters.values():
             meter.sample(0)
             meter.move(0)
 
     def read(self, fmu: str, ahead: int, get: Callable[[], object]) -> Call:
-        """The call of a read, and what the meters learn from it."""
+        """The get call of an FMU, wrapped to update the meters of its outputs."""
         given = [m.sample for m in self._sources.get(fmu, [])]
         moved = [m.move for m in self._targets.get(fmu, [])]
         told = given + moved
@@ -64,7 +64,7 @@ class Meters:
         return read
 
     def fed(self, fmu: str, set_inputs: Call) -> Call:
-        """The call of a set, and what the meters learn from it."""
+        """The set call of an FMU, wrapped to update the meters of its inputs."""
         held = [m.hold for m in self._targets.get(fmu, [])]
         if not held:
             return set_inputs
@@ -78,7 +78,7 @@ class Meters:
         return feed
 
     def mark(self, deep: bool = False) -> list[Mark]:
-        """Where `back` leads, when steps are taken again; other marks may stand on a deep one."""
+        """Checkpoint of all meters for `back` (rollback); `deep` checkpoints may enclose others."""
         room = 16 if deep else 4
         return [meter.mark(room) for meter in self._meters.values()]
 
