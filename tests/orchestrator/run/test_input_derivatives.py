@@ -24,8 +24,8 @@ from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from tests.orchestrator import coupled, oscillator
-from tests.orchestrator.native_mass import FLAGS, native
 from tests.orchestrator.holds.test_order_of_accuracy import error, growth
+from tests.orchestrator.native_mass import FLAGS, native
 
 Fmus = Mapping[str, Description]
 
