@@ -20,6 +20,8 @@ from typing import Literal
 
 import casadi as ca
 
+from hapticlink.components.ports import Kind, Power, Spring
+
 Timing = Literal["continuous", "sampled"]
 Variability = Literal["fixed", "tunable"]
 
@@ -29,7 +31,8 @@ class Variable:
     """A named scalar, vector or matrix signal; flat storage is row by row.
 
     unit is an SI unit as FMI writes it ("m", "N.m", "rad/s", "1/kg"; "1" has none);
-    start one value for all entries or one for each; variability is for parameters.
+    start one value for all entries or one for each; variability is for parameters. kind and
+    derivative_of, the output that it is the time derivative of, are for outputs; power for inputs.
     """
 
     name: str
@@ -38,6 +41,9 @@ class Variable:
     start: float | tuple[float, ...] = 0.0
     description: str = ""
     variability: Variability = "tunable"
+    kind: Kind | None = None
+    derivative_of: str | None = None
+    power: Power | None = None
 
     @property
     def size(self) -> int:
@@ -133,7 +139,8 @@ def pack(variables: Iterable[Variable], values: Mapping[str, ca.SX]) -> ca.SX:
 @dataclass(frozen=True)
 class Component:
     """An immutable block. `step` is called `substeps` times for each communication step;
-    state_notes say, by its name, what a state that is not finite means."""
+    state_notes say, by its name, what a state that is not finite means; springs are those that its
+    inputs set."""
 
     name: str
     description: str
@@ -147,6 +154,7 @@ class Component:
     output: ca.Function
     substeps: int = 1
     documentation: str = ""
+    springs: tuple[Spring, ...] = ()
     state_notes: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
@@ -201,6 +209,7 @@ class Block:
         substeps: int = 1,
         documentation: str = "",
         state_notes: Mapping[str, str] | None = None,
+        springs: Iterable[Spring] = (),
         shared: bool = False,
     ) -> Component:
         """step and output are expressions in this block's symbols; initial in u and p only.
@@ -236,4 +245,5 @@ class Block:
             substeps=substeps,
             documentation=documentation,
             state_notes=state_notes or {},
+            springs=tuple(springs),
         )

@@ -16,12 +16,15 @@ variability "discrete".
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from importlib.metadata import version
 from xml.etree import ElementTree as ET
 
 import casadi as ca
 
 from hapticlink.components.component import Component, Variable
+from hapticlink.components.ports import Power, Spring
+from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.units import base_unit
 
 CAPABILITIES = {
@@ -70,12 +73,30 @@ def model_description(
         stopTime=repr(float(stop_time)),
         stepSize=repr(float(step_size)),
     )
-    tool = ET.SubElement(ET.SubElement(root, "VendorAnnotations"), "Tool", name="hapticlink")
-    ET.SubElement(tool, "Block", timing=component.timing, substeps=str(component.substeps))
+    _annotation(root, component)
     _model_variables(root, component)
     _model_structure(root, component)
     ET.indent(root)
     return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def _annotation(root: ET.Element, component: Component) -> None:
+    """What couples blocks beyond FMI: timing, and the meaning of ports (`components.ports`)."""
+    tool = ET.SubElement(ET.SubElement(root, "VendorAnnotations"), "Tool", name="hapticlink")
+    about = {"timing": component.timing, "substeps": str(component.substeps)}
+    block = ET.SubElement(tool, "Block", about)
+    for v in component.inputs:
+        if v.power:
+            ET.SubElement(block, "Port", {"name": v.name} | _attributes(v.power))
+    for v in component.outputs:
+        if v.kind:
+            ET.SubElement(block, "Port", name=v.name, kind=v.kind)
+    for spring in component.springs:
+        ET.SubElement(block, "Spring", _attributes(spring))
+
+
+def _attributes(record: Power | Spring) -> dict[str, str]:
+    return {name: str(value) for name, value in asdict(record).items() if value != ""}
 
 
 def _unit_definitions(root: ET.Element, component: Component) -> None:
@@ -118,6 +139,22 @@ def _model_variables(root: ET.Element, component: Component) -> None:
     kind = "discrete" if component.timing == "sampled" else "continuous"
     for v, name, unit, _ in scalars(component.outputs):
         add(v, name, unit, None, causality="output", variability=kind, initial="calculated")
+    _derivatives(parent, component)
+
+
+def _derivatives(variables: ET.Element, component: Component) -> None:
+    """Which output is the derivative of which (FMI 2.0.5 section 2.2.7)."""
+    index = {scalar.get("name"): i for i, scalar in enumerate(variables)}
+    outputs = {v.name: v for v in component.outputs}
+    for v in (v for v in component.outputs if v.derivative_of):
+        of = outputs.get(v.derivative_of or "")
+        if of is None or of.shape != v.shape:
+            raise FmuError(
+                f"`{component.name}`: `{v.name}` is declared the derivative of "
+                f"`{v.derivative_of}`, which is no output of its shape"
+            )
+        for name, whole in zip(v.names, of.names, strict=True):
+            variables[index[name]][0].set("derivative", str(index[whole] + 1))
 
 
 def _model_structure(root: ET.Element, component: Component) -> None:

@@ -26,6 +26,10 @@ from hapticlink.components.component import (
     Variable,
 )
 from hapticlink.components.control import impedance, teleoperation, topology
+from hapticlink.components.ports import Spring
+
+_DRIFT = Spring("x_S", "x_D", stiffness="K_pc", damping="B_pc", set_velocity="v_S")
+"""F_drift between the operational point and the handle."""
 
 
 def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variable]:
@@ -143,4 +147,5 @@ def controller(spec: specs.Controller, length_scale: float) -> Component:
         step={},
         output=output,
         documentation=controller.__doc__ or "",
+        springs=[_DRIFT] if spec.teleoperation else [],
     )

@@ -22,6 +22,7 @@ from hapticlink.components.component import (
     Variable,
 )
 from hapticlink.components.device import observer, pantograph
+from hapticlink.components.ports import Power
 
 _FIXED = (
     ("proximal_length", "m", "length of the link next to each motor"),
@@ -103,20 +104,46 @@ def haptic_device(device: specs.Device) -> Component:
         ]
     block = Block(
         inputs=[
-            Variable("F_motor", (3,), WRENCH, description="wrench asked of the motors"),
-            Variable("F_hand", (3,), WRENCH, description="wrench of the hand on the handle"),
+            Variable(
+                "F_motor",
+                (3,),
+                WRENCH,
+                description="wrench asked of the motors",
+                power=Power("x_true"),
+            ),
+            Variable(
+                "F_hand",
+                (3,),
+                WRENCH,
+                description="wrench of the hand on the handle",
+                power=Power("x_true"),
+            ),
         ],
         parameters=_parameters(device),
         states=states,
         outputs=[
             Variable("x", (3,), POSE, description="measured pose of the handle"),
-            Variable("v", (3,), TWIST, description="measured velocity of the handle"),
+            Variable(
+                "v", (3,), TWIST, description="measured velocity of the handle", derivative_of="x"
+            ),
             Variable("F_hand_observed", (3,), WRENCH, description="observed wrench of the hand"),
-            Variable("M", (3, 3), INERTIA, description="inertia of the device at the handle"),
+            Variable(
+                "M",
+                (3, 3),
+                INERTIA,
+                description="inertia of the device at the handle",
+                kind="semidefinite",
+            ),
             Variable("c", (3,), WRENCH, description="velocity term C_d v at the handle"),
             Variable("workspace_margin", (), "m", description="least distance to a stop"),
             Variable("x_true", (3,), POSE, description="true pose of the handle"),
-            Variable("v_true", (3,), TWIST, description="true velocity of the handle"),
+            Variable(
+                "v_true",
+                (3,),
+                TWIST,
+                description="true velocity of the handle",
+                derivative_of="x_true",
+            ),
         ],
     )
     x, u, p, t, h = block.x, block.u, block.p, block.t, block.h

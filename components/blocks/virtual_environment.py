@@ -146,7 +146,7 @@ def _direction_parameters(linkage: Linkage, directions: Directions) -> list[Vari
 def _outputs(linkage: Linkage, units: tuple[str, ...]) -> list[Variable]:
     return [
         Variable("x", (3,), POSE, description="pose of the copy's operational point"),
-        Variable("v", (3,), TWIST, description="its velocity"),
+        Variable("v", (3,), TWIST, description="its velocity", derivative_of="x"),
         Variable("q", (len(units),), units, description="the copy's coordinates"),
     ]
 

@@ -38,6 +38,7 @@ from hapticlink.components.formulations import independent_coordinates
 from hapticlink.components.formulations.embedding import Embedding
 from hapticlink.components.formulations.partitioning import Partitioning
 from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.ports import Power
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 
@@ -148,8 +149,14 @@ def _block(
     """The variables of the parts."""
     linkage, directions, contacts = parts.linkage, parts.directions, parts.contacts
     inputs = [
-        Variable("F_hand", (3,), WRENCH, description="wrench of the hand"),
-        Variable("F_drift", (3,), WRENCH, description="drift wrench; acts here as -"),
+        Variable("F_hand", (3,), WRENCH, description="wrench of the hand", power=Power("x")),
+        Variable(
+            "F_drift",
+            (3,),
+            WRENCH,
+            description="drift wrench; acts here as -",
+            power=Power("x", sign=-1.0),
+        ),
     ]
     baumgarte, period = method.baumgarte, step_s
     if parts.frame_s:

@@ -45,7 +45,7 @@ def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
     """The contact geometry that the virtual environment hands to the mechanism, a row a place."""
     rows = places(linkage, contacts)
     text = "active, point in the body, point and normal of the obstacle's plane, a row a contact"
-    return Variable("contacts", (rows, len(COLUMNS)), COLUMNS, description=text)
+    return Variable("contacts", (rows, len(COLUMNS)), COLUMNS, description=text, kind="table")
 
 
 def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:

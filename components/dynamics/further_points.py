@@ -12,12 +12,19 @@ import casadi as ca
 from hapticlink.components.component import MOBILITY, POSE, TWIST, WRENCH, Signals, Variable
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.ports import Power
 from hapticlink.components.specs.linkage import Linkage
 
 
 def inputs(linkage: Linkage) -> list[Variable]:
     return [
-        Variable(f"{point.name}.F_hand", (3,), WRENCH, description=f"wrench at {point.name}")
+        Variable(
+            f"{point.name}.F_hand",
+            (3,),
+            WRENCH,
+            description=f"wrench at {point.name}",
+            power=Power(f"{point.name}.x"),
+        )
         for point in linkage.point
     ]
 
@@ -25,12 +32,13 @@ def inputs(linkage: Linkage) -> list[Variable]:
 def outputs(linkage: Linkage, mobility: bool) -> list[Variable]:
     found = []
     for point in linkage.point:
-        name = point.name
-        found.append(Variable(f"{name}.x", (3,), POSE, description=f"pose of {name}"))
-        found.append(Variable(f"{name}.v", (3,), TWIST, description=f"velocity of {name}"))
+        x, v, mobile = (f"{point.name}.{port}" for port in ("x", "v", "Lambda_inv"))
+        found.append(Variable(x, (3,), POSE, description=f"pose of {point.name}"))
+        text = f"velocity of {point.name}"
+        found.append(Variable(v, (3,), TWIST, description=text, derivative_of=x))
         if mobility:
-            text = f"mobility at {name}"
-            found.append(Variable(f"{name}.Lambda_inv", (3, 3), MOBILITY, description=text))
+            text = f"mobility at {point.name}"
+            found.append(Variable(mobile, (3, 3), MOBILITY, description=text, kind="semidefinite"))
     return found
 
 

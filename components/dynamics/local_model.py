@@ -40,7 +40,8 @@ def ports(linkage: Linkage) -> list[Variable]:
     inertias = {("m", "m"): "kg.m2", ("m", "1"): "kg.m", ("1", "m"): "kg.m", ("1", "1"): "kg"}
     D_units = tuple(inertias[a, b] for a in lengths for b in lengths)
     at = _at_start(linkage)
-    found = [Variable("D", (n, n), D_units, at["D"], "joint-space inertia")]
+    text = "joint-space inertia"
+    found = [Variable("D", (n, n), D_units, at["D"], text, kind="semidefinite")]
     if m:
         found.append(Variable("W", (m, n), lengths, at["W"], "Jacobian of the loop closures"))
         found.append(Variable("w", (m,), "m/s2", at["w"], "Wdot qd"))

@@ -69,10 +69,22 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
     n = (len(units),)
     found = [
         Variable("x", (3,), POSE, description="pose of the operational point"),
-        Variable("v", (3,), TWIST, description="its velocity"),
+        Variable("v", (3,), TWIST, description="its velocity", derivative_of="x"),
         Variable("q", n, units, description="joint coordinates"),
-        Variable("qd", n, tuple(f"{u}/s" for u in units), description="joint rates"),
-        Variable("qdd", n, tuple(f"{u}/s2" for u in units), description="joint accelerations"),
+        Variable(
+            "qd",
+            n,
+            tuple(f"{u}/s" for u in units),
+            description="joint rates",
+            derivative_of="q",
+        ),
+        Variable(
+            "qdd",
+            n,
+            tuple(f"{u}/s2" for u in units),
+            description="joint accelerations",
+            derivative_of="qd",
+        ),
         Variable("a_bias", (3,), ACCELERATION, description="operational acceleration at no wrench"),
         Variable("energy", (), "J", description="kinetic and potential energy"),
     ]
@@ -83,11 +95,13 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
 
 
 def mobility_output() -> Variable:
-    return Variable("Lambda_inv", (3, 3), MOBILITY, description="mobility at the operational point")
+    text = "mobility at the operational point"
+    return Variable("Lambda_inv", (3, 3), MOBILITY, description=text, kind="semidefinite")
 
 
 def direction_outputs() -> list[Variable]:
+    text = "projector on the resisted directions, scaled"
     return [
-        Variable("P_c", (3, 3), "1", description="projector on the resisted directions, scaled"),
+        Variable("P_c", (3, 3), "1", description=text, kind="projector"),
         Variable("n_constraints", (), "1", description="number of resisted directions"),
     ]

@@ -1,4 +1,5 @@
-"""What an FMU says of itself: ports (scalars grouped into vectors and matrices) and timing."""
+"""What an FMU says of itself: ports (scalars grouped into vectors and matrices), what they mean,
+and timing."""
 
 from __future__ import annotations
 
@@ -14,10 +15,19 @@ from xml.etree import ElementTree
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
 from hapticlink.components.base_units import BASES
+from hapticlink.components.ports import Kind, Power, Spring
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi import annotation
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.units import Unit
-from hapticlink.orchestrator.fmi.variables import TYPES, Scalar, differences, numbers, text
+from hapticlink.orchestrator.fmi.variables import (
+    TYPES,
+    Scalar,
+    derivatives,
+    differences,
+    numbers,
+    text,
+)
 
 if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
     from hapticlink.components.component import Timing
@@ -44,6 +54,12 @@ class Description:
     on every input."""
     strings: tuple[Scalar, ...] = ()
     """Variables that are text: they are set at the start, never connected."""
+    derivatives: Mapping[str, str] = field(default_factory=dict)
+    """By output: the output that is its derivative with respect to time."""
+    kinds: Mapping[str, Kind] = field(default_factory=dict)
+    power: Mapping[str, Power] = field(default_factory=dict)
+    springs: tuple[Spring, ...] = ()
+    """What the FMU declares of its ports, by port (`annotation`)."""
 
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
         """The entries of vector `name` (or the scalar of that very name), in the order of their
@@ -57,6 +73,12 @@ class Description:
             inputs = (s for s in self.scalars if s.causality == "input")
         declared = self.dependencies.get(output.name, self.dependencies.get(output.port))
         return declared is None or any(s.name in declared or s.port in declared for s in inputs)
+
+    def derivative(self, outputs: Iterable[Scalar]) -> tuple[Scalar, ...] | None:
+        """The outputs that are the derivatives of `outputs`, all or none."""
+        by_name = {s.name: s for s in self.outputs}
+        found = [by_name.get(self.derivatives.get(s.name, "")) for s in outputs]
+        return None if None in found else tuple(s for s in found if s)
 
     def unit(self, scalar: Scalar) -> Unit | None:
         return None if scalar.unit is None else self.units.get(scalar.unit, Unit(scalar.unit))
@@ -83,26 +105,26 @@ def describe(path: Path) -> Description:
             )
         try:
             model = read_model_description(_only_xml(content), validate=False)
-            relative = differences(tree)
+            relative, units = differences(tree), {u.name: _unit(u) for u in model.unitDefinitions}
             scalars = tuple(
                 s for v in model.modelVariables for s in numbers(v, version[0], v.name in relative)
             )
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
         _require_binary(archive, model.coSimulation.modelIdentifier, version[0])
-    block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
-    timing: Timing = "continuous"
-    if block is not None and block.get("timing") == "sampled":
-        timing = "sampled"
+    try:
+        declared = annotation.read(tree, scalars, units)
+    except ValueError as error:
+        raise InputFault(f"{path}: its hapticlink annotation cannot be used: {error}") from error
     capable = {k for k, value in tree.find("CoSimulation").items() if value == "true"}  # type: ignore[union-attr]
     return Description(
         path,
         model.guid,
         model.coSimulation.modelIdentifier,
-        timing,
+        declared.timing,
         scalars,
         version[0],
-        {u.name: _unit(u) for u in model.unitDefinitions},
+        units,
         frozenset(capable),
         model.defaultExperiment and model.defaultExperiment.stepSize,
         dependencies={
@@ -111,6 +133,10 @@ def describe(path: Path) -> Description:
             if output.dependencies is not None
         },
         strings=tuple(text(v) for v in model.modelVariables if v.type == "String" and not v.shape),
+        derivatives=derivatives(model),
+        kinds=declared.kinds,
+        power=declared.power,
+        springs=declared.springs,
     )
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from math import prod
 from typing import Any
 from xml.etree import ElementTree
 
@@ -21,6 +20,7 @@ TYPES = (
 """The FMI types that are numbers, by the name in their get and set functions: FMI 2.0's two,
 FMI 3.0's ten, and Boolean of both."""
 _CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
+_DERIVATIVE = re.compile(r"der\((.+)\)((?:\[[\d, ]+\])?)")
 _ENTRY = re.compile(r"\[[\d, ]+\]$")
 
 
@@ -85,12 +85,10 @@ def numbers(variable: Any, fmi: str, relative: bool) -> Iterator[Scalar]:
     kind = _CALLED.get((fmi, variable.type), variable.type)
     if kind not in TYPES:
         return
-    shape = tuple(variable.shape or ())
+    names = _names(variable)
     starts = [_number(text) for text in (variable.start or "").split()] or [0.0]
     if len(starts) == 1:
-        starts *= prod(shape)
-    places = product(*(range(1, n + 1) for n in shape))
-    names = [f"{variable.name}[{','.join(map(str, p))}]" if p else variable.name for p in places]
+        starts *= len(names)
     declared = variable.declaredType
     for i, (name, start) in enumerate(zip(names, starts, strict=True)):
         yield Scalar(
@@ -107,6 +105,25 @@ def numbers(variable: Any, fmi: str, relative: bool) -> Iterator[Scalar]:
             initial=variable.initial,
             items=tuple((i.name, int(i.value)) for i in declared.items) if declared else (),
         )
+
+
+def derivatives(model: Any) -> dict[str, str]:
+    """By name, that of the derivative with respect to time: as the attribute says, or der(y), which
+    means the derivative of y where names are structured (FMI 2.0.5 sections 2.2.7 and 2.2.9)."""
+    structured = model.variableNamingConvention == "structured"
+    found: dict[str, str] = {}
+    for variable in model.modelVariables:
+        names = _names(variable)
+        if variable.derivative is not None:
+            found |= dict(zip(_names(variable.derivative), names, strict=False))
+        elif structured:
+            found |= {y[1] + y[2]: name for name in names if (y := _DERIVATIVE.fullmatch(name))}
+    return found
+
+
+def _names(variable: Any) -> list[str]:
+    places = product(*(range(1, n + 1) for n in variable.shape or ()))
+    return [f"{variable.name}[{','.join(map(str, p))}]" if p else variable.name for p in places]
 
 
 def _nominal(variable: Any) -> float:

@@ -174,7 +174,7 @@ def _constant(c: Connection, system: System) -> bool:
         and held_polynomials.order(system, c) == 0
         and c.target not in system.get_after_set
         and c.latency is None
-        and c.kind is None
+        and c.kind in (None, "table")
     )
 
 
@@ -182,6 +182,6 @@ def _read(c: Connection, system: System, signals: SignalVector) -> list[int]:
     """What the target of `c` is made from: the source's outputs, and where its hold wants them
     their derivatives."""
     places = signals.sources(c)
-    if c.hold and HOLDS[c.hold].needs == "derivative" and (name := derivative(c, system.fmu)):
-        places = places + signals.port(system.fmu[c.source], name)
+    if c.hold and HOLDS[c.hold].needs == "derivative" and (slope := derivative(c, system.fmu)):
+        places = places + [signals.scalar(c.source, s.name) for s in slope]
     return places

@@ -47,8 +47,8 @@ def make_hold(
         hold = Unwrapped(lambda: kind(context), list(turned), list(turned.values()))
     if connection.latency:
         hold = Late(hold, Link(connection.latency, system.timeline.base))
-    if kind.needs == "derivative" and (name := derivative(connection, system.fmu)):
-        slopes = signals.port(system.fmu[connection.source], name)
+    if kind.needs == "derivative" and (slope := derivative(connection, system.fmu)):
+        slopes = [signals.scalar(connection.source, s.name) for s in slope]
         hold = _Beside(hold, _reader(signals, slopes))
     return hold
 

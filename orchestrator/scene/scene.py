@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Tag, TypeAdapter
 
+from hapticlink.components.ports import Kind
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
@@ -89,11 +90,11 @@ class Scene:
     a fast one, downsampling from a fast to a slow; holds gives others by source
     (`virtual_environment.P_c`), target or `source -> target`. delays by the same names: a latency
     in s, or one drawn from a seed, and losses. phases: by FMU, the end of its first step (s), after
-    which come whole periods. kinds says what a matrix or angle is where its name does not. power
-    pairs efforts with displacements of FMUs that are not the report's, spring says which inputs
-    set a spring within one. substeps: steps of a plant between two reads, its held inputs renewed
-    at each. get_after_set: plants whose feed-through may be read after new inputs are set, which
-    FMI forbids between two steps.
+    which come whole periods. kinds says what a signal is where its FMU does not, or "none" for
+    what it does say. power pairs efforts with displacements of FMUs that do not declare them,
+    spring says which inputs set a spring within one. substeps: steps of a plant between two reads,
+    its held inputs renewed at each. get_after_set: plants whose feed-through may be read after new
+    inputs are set, which FMI forbids between two steps.
     stop_when, a signal against a number, ends the run in good order: None takes the device's
     workspace where there is a device, "" is never. isolate runs every FMU in a process of its own.
     packaging "native" compiles the scene's own blocks, which then need no Python.
@@ -110,7 +111,7 @@ class Scene:
     holds: Mapping[str, str] = field(default_factory=dict)
     delays: Mapping[str, float | Latency] = field(default_factory=dict)
     phases: Mapping[str, Seconds] = field(default_factory=dict)
-    kinds: Mapping[str, Literal["projector", "semidefinite", "angle"]] = field(default_factory=dict)
+    kinds: Mapping[str, Kind | Literal["none"]] = field(default_factory=dict)
     power: tuple[PowerPort, ...] = ()
     spring: tuple[SetSpring, ...] = ()
     substeps: Mapping[str, int] = field(default_factory=dict)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from dataclasses import asdict, fields
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -125,7 +125,7 @@ def _units(root: Element, system: System) -> None:
         return
     units = SubElement(root, f"{{{SSD}}}Units")
     for name in sorted(named):
-        one = SubElement(units, f"{{{SSC}}}Fmu", name=name)
+        one = SubElement(units, f"{{{SSC}}}Unit", name=name)
         unit = named[name]
         powers = zip(BASES, unit.base or (0,) * len(BASES), strict=True)
         base = {b: str(n) for b, n in powers if n}
@@ -143,7 +143,6 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     found["stop_when"] = scene.ends_when
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
     found["holds"] = {**scene.holds, **own}
-    found["spring"] = [asdict(spring) for spring in system.springs]
     rates = fmu_rates(scene)
     if scene.graphics and "graphics" in rates.values():
         graphics = pydantic.TypeAdapter(type(scene.graphics))

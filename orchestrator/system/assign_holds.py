@@ -10,16 +10,15 @@ account of energy goes, as a default, to every connection across clocks that car
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import INTERPOLATING, Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system import haptic_loop, springs
-from hapticlink.orchestrator.system.haptic_loop import DERIVATIVES, KINDS, UNMIXED
-from hapticlink.orchestrator.system.ports import carries_power, derivative, names
+from hapticlink.orchestrator.system import declared, springs
+from hapticlink.orchestrator.system.ports import carries_power, derivative, kind, names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 
@@ -66,7 +65,7 @@ def _assign(
         source, target = (fmus[n].clock for n in (c.source, c.target))
         key = next((k for k in names(c) if k in rules.holds), None)
         latency = next((rules.delays[k] for k in names(c) if k in rules.delays), None)
-        hold = rules.holds[key] if key else c.hold
+        hold = rules.holds[key] if key else None
         if not key and source != target:
             longest, other = (timeline.clock(name).longest for name in (source, target))
             if longest > other or HOLDS[rules.hold].needs == "power":
@@ -75,19 +74,15 @@ def _assign(
                 hold = rules.downsampling if longest < other else "zoh"
         elif latency and not hold:
             hold = "zoh"
+        named = (rules.kinds[k] for k in names(c) if k in rules.kinds)
+        c = replace(c, latency=latency, kind=next(named, kind(c, fmus)))
         iterated = rules.between_plants if _between_plants(c, fmus) else None
         hold = hold or iterated
         reason = hold and _misfit(hold, c, fmus, rules.power, iterated is not None)
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
-            hold = "foh" if iterated else "zoh"
-        named = (k for k in names(c) if k in rules.kinds)
-        kind = next((rules.kinds[k] for k in named), KINDS.get(c.source_port))
-        if kind in ("projector", "semidefinite") and round(len(c.inputs) ** 0.5) ** 2 != len(
-            c.inputs
-        ):
-            kind = None
-        yield replace(c, hold=hold, latency=latency, kind=kind if hold else None)
+            hold = "foh" if iterated and c.kind != "table" else "zoh"
+        yield replace(c, hold=hold, kind=c.kind if hold and c.kind != "none" else None)
 
 
 def _with_springs(
@@ -124,13 +119,13 @@ def _misfit(
     needs = HOLDS[hold].needs
     if iterated and hold not in INTERPOLATING:
         return f"coupling = 'iterated' interpolates here; take one of {', '.join(INTERPOLATING)}"
-    if c.source_port in UNMIXED and not HOLDS[hold].gives_samples:
-        return f"rows of {c.source_port} name bodies, points and normals: between two there is none"
+    if c.kind == "table" and not HOLDS[hold].gives_samples:
+        return f"rows of {c.source_port} name things: between two samples there is none"
     if needs == "derivative" and derivative(c, fmus) is None:
-        known = DERIVATIVES.get(c.source_port, f"der({c.source_port})")
         return (
-            f"{c.source} does not put out the derivative of {c.source_port} ({known}); "
-            "take 'foh', which makes it from two samples"
+            f"{c.source} does not put out the derivative of {c.source_port} (an output whose "
+            f"`derivative` it is, or der({c.source_port})); take 'foh', which makes it from two "
+            "samples"
         )
     if needs == "power" and not carries_power(c, power):
         return (
@@ -141,8 +136,9 @@ def _misfit(
     return None
 
 
-def rules_of(scene: Scene, own: Mapping[str, str]) -> Rules:
-    """The rules of `scene`; `own` are holds that a [[connection]] asks for itself, by name."""
+def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connection]) -> Rules:
+    """The rules of `scene`, whose words go before what its FMUs declare."""
+    own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
     delays = {
         key: d if isinstance(d, Latency) else Latency(min=d) for key, d in scene.delays.items()
     }
@@ -152,7 +148,7 @@ def rules_of(scene: Scene, own: Mapping[str, str]) -> Rules:
         {**scene.holds, **own},
         delays,
         scene.kinds,
-        (*scene.power, *haptic_loop.BLOCKS),
+        (*scene.power, *declared.power(fmus)),
         scene.iteration.interpolation if scene.coupling == "iterated" else None,
-        haptic_loop.springs_of(scene),
+        (*scene.spring, *declared.springs(fmus, connections)),
     )

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from hapticlink.orchestrator.base.faults import Finding, near
+from hapticlink.orchestrator.base.faults import near
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
+from hapticlink.orchestrator.fmi.kinds import misfit
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene import records
+from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml_keys import Path
-from hapticlink.orchestrator.system import haptic_loop, springs
-from hapticlink.orchestrator.system.ports import names, turns
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+from hapticlink.orchestrator.system import springs
+from hapticlink.orchestrator.system.ports import names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 from hapticlink.orchestrator.system.timeline import clocks
 
@@ -22,7 +23,8 @@ def unfit(
     units: Iterable[Fmu],
     connections: Iterable[Connection],
     refused: Iterable[Refused],
-) -> Iterator[Finding]:
+    sets: Iterable[SetSpring],
+) -> Iterator[Problem]:
     """What these tables say of things that are not there, or that cannot be."""
     by_name = {u.name: u for u in units}
     found = [c for c in connections if not c.initial]
@@ -33,26 +35,23 @@ def unfit(
                 hint = near(key, known)
                 if hint.startswith("there are"):
                     hint = f"there are {', '.join(c.name for c in found) or 'none'}"
-                yield scene.place((table, key), f"is no connection of this scene; {hint}")
+                yield (table, key), f"is no connection of this scene; {hint}"
     for key, kind in scene.kinds.items():
-        for c in (c for c in found if kind == "angle" and key in names(c)):
-            if not turns(c, by_name):
-                units_of = ", ".join(dict.fromkeys(str(s.unit) for s in c.outputs))
-                message = (
-                    f"{c.source}.{c.source_port} is in {units_of}, which is no angle: give the "
-                    "unit a BaseUnit of rad alone, or leave the kind out"
-                )
-                yield scene.place(("kinds", key), message)
-    yield from _refused(scene, refused)
+        for c in (c for c in found if key in names(c)):
+            source = by_name[c.source].description
+            if why := misfit(kind, [source.unit(s) for s in c.outputs]):
+                message = f"{c.source}.{c.source_port} {why}; take another kind, or leave it out"
+                yield ("kinds", key), message
+    yield from _refused(scene, refused, sets)
     for name in scene.substeps:
         if name not in by_name or by_name[name].sampled:
             plants = ", ".join(u.name for u in by_name.values() if not u.sampled)
-            yield scene.place(("substeps", name), f"is no plant of this scene; there are {plants}")
+            yield ("substeps", name), f"is no plant of this scene; there are {plants}"
     for name in scene.get_after_set:
         if name not in by_name or by_name[name].sampled:
             plants = ", ".join(u.name for u in by_name.values() if not u.sampled)
             message = f"{name!r} is no plant of this scene; there are {plants}"
-            yield scene.place(("get_after_set",), message)
+            yield ("get_after_set",), message
     for i, p in enumerate(scene.power):
         yield from _power(scene, i, p, by_name)
     yield from springs.unfit(scene, by_name)
@@ -67,11 +66,13 @@ NOWHERE = {
 }
 
 
-def _refused(scene: Scene, refused: Iterable[Refused]) -> Iterator[Finding]:
+def _refused(
+    scene: Scene, refused: Iterable[Refused], sets: Iterable[SetSpring]
+) -> Iterator[Problem]:
     """Holds that do not fit, each where the scene asks for it. A default that fits nowhere is told
     where it nearly does, or else once."""
     wires = {f"{w.from_} -> {w.to}": i for i, w in enumerate(scene.connection) if w.hold}
-    sets = haptic_loop.springs_of(scene)
+    sets = tuple(sets)
     asked = [r for r in refused if r.key]
     default = [r for r in asked if r.key == "hold" and HOLDS[r.hold].needs in NOWHERE]
     nearly = [
@@ -79,33 +80,31 @@ def _refused(scene: Scene, refused: Iterable[Refused]) -> Iterator[Finding]:
     ]
     if default and not nearly:
         hold, needs = default[0].hold, HOLDS[default[0].hold].needs
-        yield scene.place(("hold",), f"{hold!r} fits nowhere here: {NOWHERE[needs or '']}")
+        yield ("hold",), f"{hold!r} fits nowhere here: {NOWHERE[needs or '']}"
     for r in asked:
         if r in nearly or r not in default:
             path: Path = ("hold",) if r.key == "hold" else ("holds", r.key or "")
             path = ("connection", wires[r.key], "hold") if r.key in wires else path
-            yield scene.place(path, f"{r.hold!r} does not fit {r.connection.name}: {r.reason}")
+            yield path, f"{r.hold!r} does not fit {r.connection.name}: {r.reason}"
 
 
-def _power(
-    scene: Scene, i: int, p: records.PowerPort, units: Mapping[str, Fmu]
-) -> Iterator[Finding]:
+def _power(scene: Scene, i: int, p: PowerPort, units: Mapping[str, Fmu]) -> Iterator[Problem]:
     sizes = {}
     for end, causality in (("effort", "input"), ("displacement", "output")):
         fmu, _, name = getattr(p, end).partition(".")
         entries = units[fmu].description.port(name, causality) if fmu in units else ()
         sizes[end] = len(entries)
         if not entries:
-            yield scene.place(("power", i, end), f"there is no {causality} {getattr(p, end)}")
+            yield ("power", i, end), f"there is no {causality} {getattr(p, end)}"
     if p.displacement.partition(".")[0] != p.fmu:
         message = "effort and displacement are of one FMU: give the motion of the FMU it acts on"
-        yield scene.place(("power", i), message)
+        yield ("power", i), message
     elif all(sizes.values()) and len(set(sizes.values())) > 1:
         message = f"{sizes['effort']} efforts on {sizes['displacement']} displacements"
-        yield scene.place(("power", i), message)
+        yield ("power", i), message
 
 
-def step_sizes(scene: Scene, units: Iterable[Fmu], timeline: Timeline) -> Iterator[Finding]:
+def step_sizes(scene: Scene, units: Iterable[Fmu], timeline: Timeline) -> Iterator[Problem]:
     """A finding for each FMU that takes steps of one size only, where its clock's differ."""
     paces, seconds = clocks(scene).paces, timeline.seconds
     for unit in units:
@@ -113,7 +112,7 @@ def step_sizes(scene: Scene, units: Iterable[Fmu], timeline: Timeline) -> Iterat
         if clock.first == clock.period or varies_step(unit.description):
             continue
         least = seconds(min(clock.first, clock.shortest))
-        yield scene.place(
+        yield (
             paces[clock.name].path,
             f"{unit.name} takes steps of one size only ({VARIABLE_STEP} is not true), and here "
             f"they are of {least:.6g} to {seconds(clock.longest):.6g} s: take a fixed rate, with "
@@ -123,7 +122,7 @@ def step_sizes(scene: Scene, units: Iterable[Fmu], timeline: Timeline) -> Iterat
 
 def iterated(
     scene: Scene, units: Iterable[Fmu], connections: Iterable[Connection]
-) -> Iterator[Finding]:
+) -> Iterator[Problem]:
     """That nothing is there for `coupling = "iterated"` to iterate or interpolate."""
     plants = {u.name: u.clock for u in units if not u.sampled}
     between = any(
@@ -131,7 +130,7 @@ def iterated(
         for c in connections
     )
     if scene.coupling == "iterated" and not between:
-        yield scene.place(
+        yield (
             ("coupling",),
             "'iterated' makes connected plants of one rate agree at the end of their step, and "
             "there are none: take it out (docs/coupling.md)",

@@ -8,7 +8,10 @@ the measured one; without a device it holds the operational point itself.
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
+from collections.abc import Mapping
+
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 
 Row = tuple[str, str]
@@ -39,7 +42,21 @@ _LOOP: tuple[Row, ...] = (
 )
 
 
-def connections(scene: Scene) -> tuple[Row, ...]:
+def wires(scene: Scene, described: Mapping[str, Description]) -> tuple[Wire, ...]:
+    """The rows whose two ends the scene's blocks, `described` by name, have."""
+
+    def has(end: str, *causalities: str) -> bool:
+        block, port = end.split(".", 1)
+        return block in described and bool(described[block].port(port, *causalities))
+
+    return tuple(
+        Wire(from_=source, to=target)
+        for source, target in _rows(scene)
+        if has(source, "output") and has(target, "input", "parameter")
+    )
+
+
+def _rows(scene: Scene) -> tuple[Row, ...]:
     """(source, target) as `fmu.variable`, of every connection that the scene may have."""
     felt = "hand.F" if scene.sensing == "ideal" else "haptic_device.F_hand_observed"
     directions = {"graphics": "virtual_environment", "mechanism": "virtual_mechanism"}
@@ -65,41 +82,3 @@ def connections(scene: Scene) -> tuple[Row, ...]:
         (f"{giver}.Lambda_inv", "controller.Lambda_inv"),
         (f"{giver}.P_c", "controller.P_c"),
     )
-
-
-KINDS = {"P_c": "projector"} | dict.fromkeys(("Lambda_inv", "M", "D"), "semidefinite")
-"""By the port of the source. A scene's [kinds] says it for other FMUs."""
-
-
-DERIVATIVES = {"x": "v", "v": "a", "q": "qd", "qd": "qdd", "x_true": "v_true"}
-"""The port of a source that is the derivative of another; `der(y)` is that of any y."""
-
-
-UNMIXED = frozenset({"contacts"})
-"""Ports whose samples stand for themselves: no value is made of two of them."""
-
-
-BLOCKS = (
-    PowerPort(effort="virtual_mechanism.F_hand", displacement="virtual_mechanism.x"),
-    PowerPort(effort="virtual_mechanism.F_drift", displacement="virtual_mechanism.x", sign=-1.0),
-    PowerPort(effort="haptic_device.F_hand", displacement="haptic_device.x_true"),
-    PowerPort(effort="haptic_device.F_motor", displacement="haptic_device.x_true"),
-)
-"""Ports of the report's blocks; F_drift acts on the mechanism as -."""
-
-
-def springs_of(scene: Scene) -> tuple[SetSpring, ...]:
-    """Those of [[spring]], and F_drift of the scene's own controller."""
-    own: tuple[SetSpring, ...] = ()
-    if scene.controller and scene.controller.teleoperation:
-        gains = scene.controller.teleoperation
-        own = (
-            SetSpring(
-                set_position="controller.x_S",
-                position="controller.x_D",
-                stiffness=gains.stiffness,
-                damping=gains.damping,
-                set_velocity="controller.v_S",
-            ),
-        )
-    return (*scene.spring, *own)

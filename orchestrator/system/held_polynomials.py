@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.fmi.capabilities import takes_input_derivatives
+from hapticlink.orchestrator.fmi.kinds import MATRICES
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -26,7 +27,7 @@ def degree(system: System, connection: Connection) -> int:
     kept what they are, which is no polynomial."""
     if not connection.hold or connection.initial or system.fmu[connection.target].sampled:
         return 0
-    if connection.kind in ("projector", "semidefinite"):
+    if connection.kind in MATRICES:
         return 0
     return HOLDS[connection.hold].degree
 

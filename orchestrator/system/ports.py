@@ -1,15 +1,13 @@
-"""What a connection is by its ports: its names, its power, its angles, its derivative."""
+"""What a connection is by its ports: its names, its kind, its power, its derivative."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 
-from hapticlink.components.base_units import BASES
-from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.components.ports import Kind
+from hapticlink.orchestrator.fmi.kinds import MATRICES, turn
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import PowerPort
-from hapticlink.orchestrator.system.haptic_loop import DERIVATIVES
 from hapticlink.orchestrator.system.system import Connection, Fmu
 
 
@@ -30,27 +28,22 @@ def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
     return any(paired(c, entry, power) for entry in c.inputs)
 
 
-def turns(c: Connection, units: Mapping[str, Fmu]) -> dict[int, float]:
-    """A whole turn in the unit of each entry of a connection that is an angle: 2 pi / factor, where
-    its only base unit is rad; 2 pi where the source tells no unit."""
-    source = units[c.source].description
-    found = {i: source.unit(s) for i, s in enumerate(c.outputs)}
-    angle = tuple(int(b == "rad") for b in BASES)
-    return {
-        i: math.tau / (unit.factor if unit else 1.0)
-        for i, unit in found.items()
-        if unit is None or unit.base == angle or (unit.base is None and unit.name == "rad")
-    }
+def kind(c: Connection, fmus: Mapping[str, Fmu]) -> Kind | None:
+    """What the source declares of the connection's port; an entry of a matrix is no matrix."""
+    source = fmus[c.source].description
+    port = c.outputs[0].port
+    found = source.kinds.get(port)
+    whole = len(c.outputs) == len(source.port(port, "output"))
+    return found if whole or found not in MATRICES else None
 
 
-def derivative(c: Connection, units: Mapping[str, Fmu]) -> str | None:
-    """The port of the source that is the derivative of what the connection carries."""
-    return slope(units[c.source].description, c.source_port, len(c.outputs))
+def turns(c: Connection, fmus: Mapping[str, Fmu]) -> dict[int, float]:
+    """A whole turn in the unit of each entry of a connection that is an angle."""
+    source = fmus[c.source].description
+    found = {i: turn(source.unit(s)) for i, s in enumerate(c.outputs)}
+    return {i: whole for i, whole in found.items() if whole}
 
 
-def slope(description: Description, port: str, size: int) -> str | None:
-    """The port of `size` outputs that is the derivative of another."""
-    for name in (f"der({port})", DERIVATIVES.get(port)):
-        if name and len(description.port(name, "output")) == size:
-            return name
-    return None
+def derivative(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...] | None:
+    """The outputs of the source that are the derivatives of what the connection carries."""
+    return fmus[c.source].description.derivative(c.outputs)

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
-from hapticlink.orchestrator.base.faults import Finding
 from hapticlink.orchestrator.fmi.units import SAME
 from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.system import Connection, Fmu
 
 
@@ -36,6 +36,8 @@ def misfit(
         return f"the near end of its spring, {found.position}, is connected to nothing"
     if near and (near.hold or units[near.source].clock != units[near.target].clock):
         return f"{found.position} is held too: the near end of its spring has to be at hand"
+    if any(gain < 0 for gain in (*found.stiffness, *found.damping)):
+        return f"a gain of its spring is below 0: {[*found.stiffness]}, {[*found.damping]}"
     if any(s.conversion != SAME for k in (c, near) if k for s in k.inputs):
         return f"a connection to its spring converts units: give them in those of {fmu}"
     for other in connections:
@@ -45,7 +47,7 @@ def misfit(
     return None
 
 
-def unfit(scene: Scene, units: Mapping[str, Fmu]) -> Iterator[Finding]:
+def unfit(scene: Scene, units: Mapping[str, Fmu]) -> Iterator[Problem]:
     """What [[spring]] says of ports that are not there, or that do not fit together."""
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]
@@ -56,21 +58,21 @@ def unfit(scene: Scene, units: Mapping[str, Fmu]) -> Iterator[Finding]:
             if not port and end == "set_velocity":
                 continue
             if not (entries := _size(port, units, *kinds)):
-                yield scene.place(("spring", i, end), f"there is no {' or '.join(kinds)} {port}")
+                yield ("spring", i, end), f"there is no {' or '.join(kinds)} {port}"
             elif port.partition(".")[0] != fmu:
                 message = f"{port} is not of {fmu}: the ends of a spring are ports of one FMU"
-                yield scene.place(("spring", i, end), message)
+                yield ("spring", i, end), message
             elif size and entries != size:
                 message = f"{port} has {entries} entries, {s.set_position} {size}"
-                yield scene.place(("spring", i, end), message)
+                yield ("spring", i, end), message
         for gain in ("stiffness", "damping"):
             values = getattr(s, gain)
             if size and len(values) != size and (values or gain == "stiffness"):
                 message = f"{len(values)} gains for the {size} of {s.set_position}"
-                yield scene.place(("spring", i, gain), message)
+                yield ("spring", i, gain), message
             if any(v < 0 for v in values):
                 message = f"{list(values)}: a gain below 0 stores or takes no energy; 0 or more"
-                yield scene.place(("spring", i, gain), message)
+                yield ("spring", i, gain), message
 
 
 def _end(c: Connection) -> str:

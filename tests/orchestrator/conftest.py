@@ -15,8 +15,8 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.system.assemble import connect
 from hapticlink.orchestrator.system.system import Fmu, System
+from tests.orchestrator.systems import connected
 
 
 @pytest.fixture(autouse=True)
@@ -87,7 +87,7 @@ def stamped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Timeline, str
             Fmu(n, d, timeline.of.get(n, "graphics" if n == "graphics" else "haptics"))
             for n, d in described.items()
         )
-        return System(units, tuple(connect(units, ROWS, "zoh", {})), timeline, coupling)
+        return System(units, connected(units, ROWS, timeline)[0], timeline, coupling)
 
     return make
 

@@ -18,10 +18,10 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
-from hapticlink.orchestrator.system.assemble import connect
-from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator import oscillator
+from tests.orchestrator.systems import connected
 
 ROWS = oscillator.ROWS
 HERMITE = [*ROWS, ("one.a", "two.a1")]
@@ -36,7 +36,7 @@ def with_derivative() -> Component:
         states=[Variable("x", (), "m"), Variable("v", (), "m/s")],
         outputs=[
             Variable("x", (), "m"),
-            Variable("v", (), "m/s"),
+            Variable("v", (), "m/s", derivative_of="x"),
             Variable("F", (), "N"),
             Variable("der(F)", (), "N/s"),
         ],
@@ -155,7 +155,7 @@ def system(
     rows = list(rows)
     holds = {source: hold for source, _ in rows} if hold else {}
     rules = Rules(holds=holds, between_plants=between)
-    connections, _ = assign(units, tuple(connect(units, rows, "zoh", {})), timeline, rules)
+    connections, _ = connected(units, rows, timeline, rules)
     return System(
         units,
         connections,

@@ -28,6 +28,7 @@ OUTPUTS = {
     "one": {"x": "x", "v": "v", "acc": "a", "calls": "calls"},
     "two": {"x": "x", "v": "v", "F": "F", "dF": "der(F)", "calls": "calls"},
 }
+DERIVATIVE_OF = {"v": "x", "a": "v"}
 FEEDS = {"a": ["F"], "F": ["x1", "v1"], "der(F)": ["x1", "v1", "a1"]}
 """What an output depends on directly."""
 K, C, K_C, C_C = oscillator.K, oscillator.C, oscillator.K_C, oscillator.C_C
@@ -68,6 +69,8 @@ def _description(
             what, text = 'causality="input"', f'<Real start="{start[real]}"/>'
         elif real in outputs:
             size = f' nominal="{nominal[called]}"' if called in nominal else ""
+            of = places.get(DERIVATIVE_OF.get(called, ""))
+            size += f' derivative="{of}"' if of else ""
             what, text = 'causality="output"', f"<Real{size}/>"
         elif real in REALS[8:-1]:
             what = 'causality="parameter" variability="fixed"'
@@ -86,7 +89,8 @@ def _description(
     )
     capable = " ".join(f'{flag}="true"' for flag in flags)
     return f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="mass">
+<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="mass"
+ variableNamingConvention="structured">
 <CoSimulation modelIdentifier="mass" {capable}/>
 <ModelVariables>{"".join(rows)}</ModelVariables>
 <ModelStructure><Outputs>{unknowns}</Outputs></ModelStructure>

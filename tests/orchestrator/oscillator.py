@@ -24,9 +24,9 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
 from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
-from hapticlink.orchestrator.system.assemble import connect
-from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Fmu, System
+from tests.orchestrator.systems import connected
 
 K, C, K_C, C_C = 100.0, 1.0, 100.0, 1.0
 START = np.array([0.0, 1.0, 1.0, 0.0])
@@ -78,7 +78,11 @@ def one() -> Component:
     block = Block(
         inputs=[Variable("F", (), "N")],
         states=[Variable("x", (), "m"), Variable("v", (), "m/s")],
-        outputs=[Variable("x", (), "m"), Variable("v", (), "m/s"), Variable("a", (), "m/s2")],
+        outputs=[
+            Variable("x", (), "m"),
+            Variable("v", (), "m/s", derivative_of="x"),
+            Variable("a", (), "m/s2", derivative_of="v"),
+        ],
     )
     x, v, force = block.x["x"], block.x["v"], block.u["F"]
     moved = driven(x, v, force, K, C, block.h)
@@ -98,7 +102,11 @@ def two() -> Component:
     block = Block(
         inputs=[Variable("x1", (), "m"), Variable("v1", (), "m/s")],
         states=[Variable("x", (), "m"), Variable("v", (), "m/s")],
-        outputs=[Variable("x", (), "m"), Variable("v", (), "m/s"), Variable("F", (), "N")],
+        outputs=[
+            Variable("x", (), "m"),
+            Variable("v", (), "m/s", derivative_of="x"),
+            Variable("F", (), "N"),
+        ],
     )
     x, v, x1, v1 = block.x["x"], block.x["v"], block.u["x1"], block.u["v1"]
     pull = K_C * x1 + C_C * v1
@@ -146,7 +154,7 @@ def system(
     units = tuple(Fmu(name, fmu, "haptics") for name, fmu in fmus.items())
     one_for_all = {source: hold for source, _ in ROWS} if isinstance(hold, str) else hold
     rules = Rules(holds=one_for_all, power=POWER, springs=SPRINGS)
-    connections, refused = assign(units, tuple(connect(units, ROWS, "zoh", {})), timeline, rules)
+    connections, refused = connected(units, ROWS, timeline, rules)
     assert not refused
     return System(
         units,

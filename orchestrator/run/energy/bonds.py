@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.ports import paired, slope
+from hapticlink.orchestrator.system.ports import paired
 from hapticlink.orchestrator.system.system import Connection, System
 
 Vector = NDArray[np.float64]
@@ -80,13 +80,7 @@ def _moving(
     target: Description, name: str, moved: Sequence[Scalar], signals: SignalVector
 ) -> tuple[int, ...]:
     """The places of the derivatives, all or none."""
-    found = []
-    for x in moved:
-        entries = [s.name for s in target.port(x.port, "output")]
-        if derivative := slope(target, x.port, len(entries)):
-            rows = target.port(derivative, "output")
-            found.append(signals.scalar(name, rows[entries.index(x.name)].name))
-    return tuple(found) if len(found) == len(moved) else ()
+    return tuple(signals.scalar(name, s.name) for s in target.derivative(moved) or ())
 
 
 def _factor(target: Description, scalar: Scalar) -> float:

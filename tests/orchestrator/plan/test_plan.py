@@ -14,9 +14,9 @@ from hapticlink.orchestrator.plan.operations import Get, Record, Set, Step
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays, uses
 from hapticlink.orchestrator.plan.schemes import CAUSAL, SCHEMES
-from hapticlink.orchestrator.system.assemble import connect
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline as timeline_of
+from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed, scenes, single, varying
 
 Make = Callable[[Timeline, str], System]
@@ -118,9 +118,9 @@ def test_an_event_of_one_kind_shares_its_block(stamped: Make) -> None:
 
 
 def test_a_ring_of_sampled_blocks_is_named(stamped: Make) -> None:
-    units = stamped(single(512, 4), "gauss-seidel").units[:3]
+    units = stamped(fixed(Fraction(512), Fraction(30), 4), "gauss-seidel").fmus[:3]
     rows = [("controller.stamp", "hand.d"), ("hand.stamp", "controller.d")]
-    ring = System(units, tuple(connect(units, rows, "zoh", {})), single(512, 4), "gauss-seidel")
+    ring = System(units, connected(units, rows, single(512, 4))[0], single(512, 4), "gauss-seidel")
     with pytest.raises(InputFault, match="ring: controller -> hand -> controller"):
         list(delays(Plan(ring)))
     as_jacobi = System(units, ring.connections, ring.timeline, "jacobi")

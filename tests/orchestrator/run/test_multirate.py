@@ -25,9 +25,9 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
-from hapticlink.orchestrator.system.assemble import connect
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator.oscillator import driven
+from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed
 
 X, V, F = Variable("x", (), "m"), Variable("v", (), "m/s"), Variable("F", (), "N")
@@ -120,7 +120,7 @@ def forces(
         unit("spring", "spring", "haptics"),
         unit("linkage", linkage, "graphics"),
     )
-    connections = tuple(connect(units, [*FAST, *ROWS[linkage]], "zoh", {}))
+    connections = connected(units, [*FAST, *ROWS[linkage]], timeline)[0]
     outcome = run(Plan(System(units, connections, timeline, "gauss-seidel")), folder)
     assert outcome.fault is None
     return np.abs(read_table(folder / "haptics.csv")["spring.F"])

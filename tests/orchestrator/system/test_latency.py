@@ -69,7 +69,7 @@ def test_no_input_is_stamped_later_than_its_step_less_the_latency(
 def test_what_the_plan_says_is_what_the_fmus_see(
     stamped: Make, tmp_path: Path, coupling: str
 ) -> None:
-    from .timelines import fixed
+    from tests.orchestrator.timelines import fixed
 
     timeline = fixed(Fraction(512), Fraction(60), 256)
     delays = {
@@ -93,7 +93,7 @@ def test_what_the_plan_says_is_what_the_fmus_see(
 def test_extrapolated_stamps_are_the_time_itself(stamped: Make, tmp_path: Path, rate: int) -> None:
     """A stamp is a straight line: from exact ticks, first order gives it back at any rate, and
     with any latency."""
-    from .timelines import fixed
+    from tests.orchestrator.timelines import fixed
 
     timeline = fixed(Fraction(512), Fraction(rate), 256)
     for delays in ({}, {LATE: Latency(min=0.001, max=0.04, loss=0.2, seed=1)}):

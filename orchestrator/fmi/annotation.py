@@ -1,0 +1,123 @@
+"""The vendor annotation of an FMU: what its ports mean beyond FMI.
+
+    <Tool name="hapticlink">
+      <Block timing="sampled" substeps="1">
+        <Port name="F" displacement="x" sign="-1.0"/>
+        <Port name="P" kind="projector"/>
+        <Spring set_position="x_S" position="x_D" stiffness="K" damping="B" set_velocity="v_S"/>
+      </Block>
+    </Tool>
+
+The attributes are those of the records in `components.ports`. An FMU without this annotation
+declares none of it, whatever its ports are called; any FMU may carry it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, get_args
+from xml.etree.ElementTree import Element
+
+from hapticlink.components.ports import Kind, Power, Spring
+from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.fmi.kinds import misfit
+from hapticlink.orchestrator.fmi.units import Unit
+from hapticlink.orchestrator.fmi.variables import Scalar
+
+if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
+    from hapticlink.components.component import Timing
+
+TIMINGS = ("continuous", "sampled")
+
+
+@dataclass(frozen=True)
+class Annotation:
+    """kinds by output port, power by input port."""
+
+    timing: Timing = "continuous"
+    kinds: Mapping[str, Kind] = field(default_factory=dict)
+    power: Mapping[str, Power] = field(default_factory=dict)
+    springs: tuple[Spring, ...] = ()
+
+
+def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> Annotation:
+    """Raises ValueError for what is malformed, or does not fit the variables and their units."""
+    block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
+    if block is None:
+        return Annotation()
+    timing: Any = _one_of(block.get("timing", TIMINGS[0]), "timing", TIMINGS)
+    ports = _Ports(scalars, units)
+    kinds: dict[str, Kind] = {}
+    power: dict[str, Power] = {}
+    springs: list[Spring] = []
+    for element in block:
+        _one_of(element.tag, "element", ("Port", "Spring"))
+        name = element.get("name", "")
+        if element.tag == "Spring":
+            springs.append(ports.spring(element))
+        elif "kind" in element.attrib:
+            kinds[name] = ports.kind(element)
+        else:
+            power[name] = ports.power(element)
+    return Annotation(timing, kinds, power, tuple(springs))
+
+
+class _Ports:
+    """The ports of an FMU, and what each may be declared as."""
+
+    def __init__(self, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> None:
+        self._scalars, self._units = tuple(scalars), units
+
+    def kind(self, element: Element) -> Kind:
+        given = _attributes(element, "name kind")
+        entries = self._entries(given["name"], "output")
+        kind: Any = _one_of(given["kind"], "kind", get_args(Kind))
+        names = [s.unit for s in entries]
+        if why := misfit(kind, [self._units.get(n, Unit(n)) if n else None for n in names]):
+            raise ValueError(f"{given['name']} {why}")
+        return kind
+
+    def power(self, element: Element) -> Power:
+        given = _attributes(element, "name displacement", "sign")
+        size = len(self._entries(given["name"], "input"))
+        self._entries(given["displacement"], "output", size=size)
+        sign = float(given.get("sign", "1"))
+        if abs(sign) != 1.0:
+            raise ValueError(f"{given['name']}: sign {sign:g} is neither 1 nor -1")
+        return Power(given["displacement"], sign)
+
+    def spring(self, element: Element) -> Spring:
+        needed = "set_position position stiffness"
+        found = Spring(**_attributes(element, needed, "damping set_velocity"))
+        size = len(self._entries(found.set_position, "input"))
+        self._entries(found.position, "input", "output", size=size)
+        for parameter in filter(None, (found.stiffness, found.damping)):
+            self._entries(parameter, "parameter", size=size)
+        if found.set_velocity:
+            self._entries(found.set_velocity, "input", size=size)
+        return found
+
+    def _entries(self, name: str, *causalities: str, size: int = 0) -> list[Scalar]:
+        found = [s for s in self._scalars if s.port == name and s.causality in causalities]
+        if not found:
+            raise ValueError(f"there is no {' or '.join(causalities)} {name!r}")
+        if size and len(found) != size:
+            raise ValueError(f"{name} has {len(found)} entries, and {size} are needed")
+        return found
+
+
+def _attributes(element: Element, needed: str, further: str = "") -> dict[str, str]:
+    given, known = dict(element.attrib), f"{needed} {further}".split()
+    for name in given:
+        _one_of(name, "attribute", known)
+    for name in needed.split():
+        if name not in given:
+            raise ValueError(f"{element.tag} {given}: {name} is missing")
+    return given
+
+
+def _one_of(value: str, what: str, known: Iterable[str]) -> str:
+    if value not in known:
+        raise ValueError(unknown(what, value, known))
+    return value

@@ -1,0 +1,41 @@
+"""What FMUs declare of their own ports, by the names that they have in a system."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+
+from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
+from hapticlink.orchestrator.system.system import Connection, Fmu
+
+
+def power(fmus: Iterable[Fmu]) -> Iterator[PowerPort]:
+    """The inputs that carry power."""
+    for fmu in fmus:
+        for port, declared in fmu.description.power.items():
+            displacement = f"{fmu.name}.{declared.displacement}"
+            yield PowerPort(
+                effort=f"{fmu.name}.{port}", displacement=displacement, sign=declared.sign
+            )
+
+
+def springs(fmus: Iterable[Fmu], connections: Collection[Connection]) -> Iterator[SetSpring]:
+    """The springs within FMUs, with the gains that they start with; not those whose gains a
+    connection sets, which are known only when the run begins."""
+    fed = {(c.target, s.port) for c in connections if c.initial for s in c.inputs}
+    for fmu in fmus:
+        for declared in fmu.description.springs:
+            if not {(fmu.name, declared.stiffness), (fmu.name, declared.damping)} & fed:
+                velocity = declared.set_velocity
+                yield SetSpring(
+                    set_position=f"{fmu.name}.{declared.set_position}",
+                    position=f"{fmu.name}.{declared.position}",
+                    stiffness=_values(fmu, declared.stiffness),
+                    damping=_values(fmu, declared.damping),
+                    set_velocity=f"{fmu.name}.{velocity}" if velocity else "",
+                )
+
+
+def _values(fmu: Fmu, parameter: str) -> tuple[float, ...]:
+    given = {scalar.name: value for scalar, value in fmu.starts}
+    entries = fmu.description.port(parameter, "parameter")
+    return tuple(float(given.get(s.name, s.start)) for s in entries)

@@ -1,0 +1,67 @@
+"""[[fmu]] tables against the FMUs that they name: descriptions and start values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from operator import attrgetter
+from pathlib import Path as FilePath
+
+from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.fmi.start_values import Starts, fitting
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.scene.records import ForeignFmu, Value
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Problem
+
+
+def fmus(scene: Scene, problems: list[Problem]) -> Iterator[tuple[ForeignFmu, Description, Starts]]:
+    """Each FMU that can be used, with its start values; what is wrong goes to `problems`."""
+    for i, fmu in enumerate(scene.fmu):
+        try:
+            found = describe(FilePath(fmu.path))
+        except InputFault as fault:
+            problems.append((("fmu", i, "path"), str(fault)))
+            continue
+        if fmu.timing:
+            found = replace(found, timing=fmu.timing)
+        starts: list[Starts] = []
+        for name, value in fmu.start.items():
+            try:
+                starts.append(_start(found, name, value))
+            except ValueError as error:
+                problems.append((("fmu", i, "start", name), str(error)))
+        yield fmu, found, sum(starts, ())
+
+
+def _start(found: Description, name: str, value: Value) -> Starts:
+    """Raises ValueError for a name that takes no start, and values that do not fit it."""
+    scalars = settable(found, name, start=True)
+    values = value if isinstance(value, tuple) else (value,)
+    if len(values) != len(scalars):
+        raise ValueError(f"{len(values)} values for the {len(scalars)} of {name}")
+    return tuple((s, fitting(s, given)) for s, given in zip(scalars, values, strict=True))
+
+
+def settable(found: Description, name: str, start: bool = False) -> tuple[Scalar, ...]:
+    """The entries of `name`, where a value may come in: once, at the `start`, or always. Raises
+    ValueError where there are none."""
+    able = attrgetter("startable" if start else "settable")
+    every = (*found.scalars, *found.strings)
+    named = [s for s in every if name in (s.name, s.port)]
+    if not named:
+        known = dict.fromkeys(s.port for s in filter(able, every))
+        raise ValueError(unknown("input or parameter", name, known))
+    if scalars := sorted(filter(able, named), key=lambda s: s.indices):
+        return tuple(scalars)
+    what = named[0].causality
+    what = what if named[0].variability != "constant" else f"constant {what}"
+    hint = ""
+    if start:
+        others = ", ".join(dict.fromkeys(s.port for s in found.scalars if able(s))) or "none"
+        hint = (
+            ", and the FMU gives it no start of its own (initial exact or approx); what takes a "
+            f"start: {others}"
+        )
+    raise ValueError(f"{name} cannot be set: its causality is {what}{hint}")

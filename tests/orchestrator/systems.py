@@ -1,0 +1,26 @@
+"""Connections of small systems for tests, made and held as those of a run are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.scene.records import Wire
+from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.connections import connect
+from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
+
+
+def connected(
+    fmus: Sequence[Fmu],
+    rows: Iterable[tuple[str, str]],
+    timeline: Timeline,
+    rules: Rules | None = None,
+) -> tuple[tuple[Connection, ...], tuple[Refused, ...]]:
+    """The connections of `rows` (source, target), and the holds that were refused."""
+    problems: list[Problem] = []
+    wires = [((), Wire(from_=source, to=target)) for source, target in rows]
+    made = [c for _, c in connect(wires, {u.name: u.description for u in fmus}, problems)]
+    assert not problems
+    return assign(fmus, made, timeline, rules or Rules())
