@@ -14,7 +14,7 @@ from hapticlink.orchestrator.plan.schemes import CAUSAL
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.event_loop import Outcome
 from hapticlink.orchestrator.scene.blocks import blocks
-from hapticlink.orchestrator.scene.records import VariableRate
+from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.ports import carries_power

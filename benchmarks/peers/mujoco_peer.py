@@ -15,7 +15,8 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 import numpy as np
 
-from hapticlink.components.specs.linkage import Linkage, Point
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import Point
 
 NAME = "MuJoCo"
 METHODS = ("Euler", "implicitfast", "RK4")

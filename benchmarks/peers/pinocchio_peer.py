@@ -17,7 +17,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pinocchio as pin
 
-from hapticlink.components.specs.linkage import Joint, Linkage, Point
+from hapticlink.components.specs.linkage import Joint, Linkage
+from hapticlink.components.specs.quantities import Point
 
 NAME = "Pinocchio"
 METHODS = ("rk4, projected (Python loop)", "rk4, four calls only")

@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 
 from hapticlink.components.specs.contacts import Contacts, Pair, pairs
-from hapticlink.components.specs.linkage import Linkage, Point
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import Point
 
 ORIGIN = (0.0, 0.0)
 

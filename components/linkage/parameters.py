@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs.linkage import Linkage, Point
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import Point
 
 
 def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:

@@ -3,47 +3,61 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
-from hapticlink.components.specs.linkage import Linkage, Point
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import (
+    Length,
+    LinearDamping,
+    LinearStiffness,
+    Point,
+    Quantity,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Disc:
-    """A fixed disc: centre and radius (m)."""
+    """A fixed disc."""
 
     center: Point
-    radius: float
+    """Its centre."""
+    radius: Length
+    """Its radius."""
     name: str | None = None
+    """Its name in messages and FMU parameters; disc1, disc2, ... where left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Polygon:
-    """A fixed convex polygon by its corners (m), in either sense."""
+    """A fixed convex polygon."""
 
     corners: tuple[Point, ...]
+    """Its corners, three or more, in either sense."""
     name: str | None = None
+    """Its name in messages and FMU parameters; polygon1, polygon2, ... where left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Contacts:
-    """What the links can touch, and how hard it is.
-
-    enclosure: corners (m) of a rigid convex polygon with the linkage inside. stiffness (N/m) and
-    damping (N.s/m) are k_contact and b_contact of section B.6. detection "graphics" finds the
-    contact geometry in the virtual environment and holds it between frames (the report's local
-    model), for gaps up to `margin` (m); "haptics" finds it in the mechanism at every evaluation.
-    broad_phase leaves out the pairs of a body and an obstacle that it can never reach.
-    """
+    """What the links can touch, and how hard it is."""
 
     enclosure: tuple[Point, ...] | None = None
+    """Corners of a rigid convex polygon with the linkage inside."""
     disc: tuple[Disc, ...] = ()
+    """Fixed discs."""
     polygon: tuple[Polygon, ...] = ()
-    stiffness: float = 15000.0
-    damping: float = 300.0
+    """Fixed convex polygons."""
+    stiffness: LinearStiffness = 15000.0
+    """k_contact of section B.6."""
+    damping: LinearDamping = 300.0
+    """b_contact of section B.6."""
     detection: Literal["graphics", "haptics"] = "graphics"
-    margin: float = 0.01
+    """graphics: the virtual environment finds the contact geometry, held between frames (the
+    report's local model); haptics: the mechanism does, at every evaluation."""
+    margin: Annotated[float, Quantity("m", ge=0)] = 0.01
+    """Gap up to which the virtual environment reports a contact."""
     broad_phase: bool = True
+    """Leaves out the pairs of a body and an obstacle that it can never reach."""
 
 
 @dataclass(frozen=True)

@@ -3,45 +3,52 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
-from hapticlink.components.specs.linkage import Damping, Stiffness
+from hapticlink.components.specs.quantities import Damping, Quantity, Stiffness
 
 
 @dataclass(frozen=True, kw_only=True)
 class Topology:
-    """Topology (joint-constraint) controller: k_j (N/m/kg), b_j (N/(m/s)/kg).
+    """Topology (joint-constraint) controller: it pulls along the resisted directions alone."""
 
-    form "plain" is M_d P_c (k_j e + b_j edot), for comparison only: it leaks onto free
-    motion and depends on the length scale.
-    """
-
-    stiffness: float = 200.0
-    damping: float = 50.0
+    stiffness: Annotated[float, Quantity("N/(m.kg)", ge=0)] = 200.0
+    """k_j, per kilogram of the device's inertia along the resisted directions."""
+    damping: Annotated[float, Quantity("N.s/(m.kg)", ge=0)] = 50.0
+    """b_j, per kilogram of the same."""
     form: Literal["constrained", "plain"] = "constrained"
+    """plain: M_d P_c (k_j e + b_j edot), for comparison only; it leaks onto free motion and depends
+    on the length scale."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Teleoperation:
-    """Position channels of the four-channel controller: K_pc and B_pc of section B.6."""
+    """Position channels of the four-channel controller: F_drift = K_pc (x_S - x_D) + B_pc (v_S -
+    v_D) of section B.6."""
 
     stiffness: Stiffness = (100.0, 100.0, 0.5)
+    """K_pc."""
     damping: Damping = (70.0, 70.0, 0.375)
+    """B_pc."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
-    """The controller block; a part that is False or None is left out.
-
-    bias "full" adds M_d a_bias, the mechanism's velocity, gravity and drive terms, to the
-    impedance law; "none" is the report. damping B_d and stiffness K_d (about the starting
-    pose) are the desired ones of (4.1).
-    """
+    """The controller of the device. A part that is false or left out has no term, no input and no
+    parameter."""
 
     impedance: bool = True
+    """The impedance law: the device moves as the mechanism would."""
     bias: Literal["none", "full"] = "none"
+    """full: adds M_d a_bias, what velocities, gravity, springs and drives of the mechanism make of
+    the operational acceleration; none: leaves it out (the report)."""
     damping: Damping | None = None
+    """B_d, the desired damping of (4.1)."""
     stiffness: Stiffness | None = None
+    """K_d, the desired stiffness of (4.1), about the starting pose."""
     teleoperation: Teleoperation | Literal[False] = field(default_factory=Teleoperation)
+    """Position channels between the operational point and the handle."""
     topology: Topology | bool = True
+    """Topology controller; true takes its defaults."""
     contact: bool = False
+    """Feels the contacts: F_env enters the impedance law. Needs [contacts]."""

@@ -3,50 +3,87 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
+
+from hapticlink.components.specs.quantities import (
+    Length,
+    LinearDamping,
+    LinearStiffness,
+    Mass,
+    MomentOfInertia,
+    Position,
+    Quantity,
+    Substeps,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Observer:
-    """Nicosia observer: bandwidth omega_n (rad/s), output gain k_D (1/s), and the rule of
-    section 1.3.1 that discretises it."""
+    """Nicosia observer of the handle's velocity and of the hand's wrench (section 4.2.1)."""
 
     rule: Literal["forward", "backward", "trapezoidal"] = "backward"
-    omega_n: float = 50.0
-    k_D: float = 100.0
+    """The rule of section 1.3.1 that discretises it."""
+    omega_n: Annotated[float, Quantity("rad/s", gt=0)] = 50.0
+    """Bandwidth."""
+    k_D: Annotated[float, Quantity("1/s", gt=0)] = 100.0
+    """Output gain."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Device:
-    """Twin pantograph. The report gives no dimensions: every number here is assumed.
+    """Twin pantograph. The report gives no dimensions: every number here is assumed, but for the
+    0.09 degrees of an encoder count.
 
-    Two five-bars in parallel planes, A and B, hold the ends of a crank of length `crank`
-    at p -+ (crank/2)(cos theta, sin theta). Base joints at (base_x -+ base_half_width,
-    base_y_a) and (..., base_y_b), elbows outward. Lengths m, masses kg, inertias kg.m2,
-    centres as distances (m) from the joint nearer the base; limits N.m.
+    Two five-bars in parallel planes, A and B, hold the ends of a crank at p -+ (crank/2)
+    (cos theta, sin theta), p the handle. Base joints at (base_x -+ base_half_width, base_y_a) and
+    (..., base_y_b), elbows outward: [the device](device.md).
     """
 
-    proximal_length: float = 0.16
-    distal_length: float = 0.20
-    crank: float = 0.08
-    base_x: float = -0.005
-    base_half_width: float = 0.03
-    base_y_a: float = -0.20
-    base_y_b: float = 0.20
-    rotor_inertia: float = 1.4e-5
-    proximal_mass: float = 0.05
-    proximal_center: float = 0.07
-    proximal_inertia: float = 1.07e-4
-    distal_mass: float = 0.035
-    distal_center: float = 0.10
-    distal_inertia: float = 1.17e-4
-    handle_mass: float = 0.12
-    handle_inertia: float = 8e-5
-    torque_limit: float = 0.5
-    encoder_resolution: float = 0.0015707963267948967
-    reach_limit: float = 0.95
-    stop_stiffness: float = 5000.0
-    stop_damping: float = 20.0
-    substeps: int = 1
+    proximal_length: Length = 0.16
+    """Length of the links next to the motors."""
+    distal_length: Length = 0.20
+    """Length of the links between elbow and crank."""
+    crank: Length = 0.08
+    """Length of the crank between the two planes."""
+    base_x: Position = -0.005
+    """x midway between the base joints of a plane."""
+    base_half_width: Annotated[float, Quantity("m", ge=0)] = 0.03
+    """Half the distance between the base joints of a plane."""
+    base_y_a: Position = -0.20
+    """y of the base joints of plane A, below the workspace."""
+    base_y_b: Position = 0.20
+    """y of the base joints of plane B, above the workspace."""
+    rotor_inertia: MomentOfInertia = 1.4e-5
+    """Inertia of each motor's rotor."""
+    proximal_mass: Mass = 0.05
+    """Mass of each proximal link."""
+    proximal_center: Position = 0.07
+    """Its centre of mass from the base joint, along the link."""
+    proximal_inertia: MomentOfInertia = 1.07e-4
+    """Its inertia about the centre of mass."""
+    distal_mass: Mass = 0.035
+    """Mass of each distal link."""
+    distal_center: Position = 0.10
+    """Its centre of mass from the elbow, along the link."""
+    distal_inertia: MomentOfInertia = 1.17e-4
+    """Its inertia about the centre of mass."""
+    handle_mass: Annotated[float, Quantity("kg", gt=0)] = 0.12
+    """Mass of handle and crank."""
+    handle_inertia: Annotated[float, Quantity("kg.m2", gt=0)] = 8e-5
+    """Inertia of handle and crank."""
+    torque_limit: Annotated[float, Quantity("N.m", gt=0)] = 0.5
+    """Largest torque of a motor; where one would exceed it, all four are scaled alike."""
+    encoder_resolution: Annotated[float, Quantity("rad", gt=0)] = 0.0015707963267948966
+    """Angle of one encoder count (0.09 degrees)."""
+    reach_limit: Annotated[float, Quantity("1", gt=0.5, lt=1)] = 0.95
+    """Share of an arm's full reach at which the stops begin."""
+    stop_stiffness: LinearStiffness = 5000.0
+    """Stiffness of the stops."""
+    stop_damping: LinearDamping = 20.0
+    """Damping of the stops."""
+    substeps: Substeps = 1
+    """Integration steps within a communication step."""
     sensing: Literal["ideal", "encoders"] = "ideal"
+    """Set by the scene's own `sensing`."""
     observer: Observer = field(default_factory=Observer)
+    """The observer, with sensing = "encoders"."""

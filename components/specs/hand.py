@@ -5,50 +5,77 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from hapticlink.components.specs.linkage import Damping, Inertia, Stiffness, Wrench
+from hapticlink.components.specs.quantities import (
+    Angle,
+    Damping,
+    Force,
+    Inertia,
+    Position,
+    Stiffness,
+    Time,
+    Torque,
+    Wrench,
+)
+
+Path = tuple[tuple[Time, Position, Position, Angle], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConstantHand:
-    """A constant wrench (N, N, N.m) at the handle, with an optional damping to ground."""
+    """A constant wrench on the handle, with an optional damping to ground."""
 
     type: Literal["constant"] = "constant"
+    """A constant wrench."""
     wrench: Wrench
+    """Force and moment on the handle."""
     damping: Damping | None = None
+    """Damping of the handle to ground."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProfileHand:
-    """A wrench read from a table of rows (t s, N, N, N.m), linear between rows, held after."""
+    """A wrench on the handle from a table, with an optional damping to ground."""
 
     type: Literal["profile"] = "profile"
-    table: tuple[tuple[float, float, float, float], ...]
+    """A wrench from a table."""
+    table: tuple[tuple[Time, Force, Force, Torque], ...]
+    """Rows of time, force and moment, sorted by time; linear between rows, the ends held."""
     damping: Damping | None = None
+    """Damping of the handle to ground."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArmHand:
-    """An arm behind a grip: mass M_a held to a target path by K_a, B_a, and to the handle by
-    the grip's K_gr, B_gr. target: rows (t s, x m, y m, theta rad), linear, held after."""
+    """An arm behind a grip: a mass held to a target path, and to the handle by the grip."""
 
     type: Literal["arm"] = "arm"
+    """An arm behind a grip."""
     mass: Inertia = (1.0, 1.0, 0.002)
+    """M_a, the arm's mass and moment of inertia."""
     stiffness: Stiffness = (300.0, 300.0, 1.0)
+    """K_a, arm to target."""
     damping: Damping = (10.0, 10.0, 0.02)
+    """B_a, arm to target."""
     grip_stiffness: Stiffness = (2000.0, 2000.0, 5.0)
+    """K_gr, arm to handle."""
     grip_damping: Damping = (20.0, 20.0, 0.05)
-    target: tuple[tuple[float, float, float, float], ...]
+    """B_gr, arm to handle."""
+    target: Path
+    """Rows of time and pose, sorted by time; linear between rows, the ends held."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpringHand:
-    """A massless hand: spring and damper (N/m, N/m, N.m/rad; N.s/m, ...) to a target path,
-    rows (t s, x m, y m, theta rad), linear, held after."""
+    """A massless hand: a spring and damper from the handle to a target path."""
 
     type: Literal["spring"] = "spring"
+    """A spring and damper."""
     stiffness: Stiffness
+    """Stiffness, handle to target."""
     damping: Damping | None = None
-    target: tuple[tuple[float, float, float, float], ...] = ((0.0, 0.0, 0.0, 0.0),)
+    """Damping, handle to target; none where left out."""
+    target: Path = ((0.0, 0.0, 0.0, 0.0),)
+    """Rows of time and pose, sorted by time; linear between rows, the ends held."""
 
 
 Hand = ConstantHand | ProfileHand | ArmHand | SpringHand

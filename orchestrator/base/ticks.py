@@ -7,6 +7,7 @@ that do not divide each other never meet a rounded float.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -15,8 +16,15 @@ from itertools import pairwise
 
 
 def exact(number: int | float | str) -> Fraction:
-    """The rational that a number is written as: 29.97 is 2997/100, "30000/1001" itself."""
-    return Fraction(str(number))
+    """The rational that a number is written as: 29.97 is 2997/100, "30000/1001" itself.
+
+    Raises ValueError for what is no number, or one that takes too long to be written out (of more
+    than 50 characters or with an exponent of four digits), and ZeroDivisionError.
+    """
+    text = str(number)
+    if len(text) > 50 or re.search(r"[eE][+-]?\d{4}", text):
+        raise ValueError(f"{text[:50]!r}: too long a number")
+    return Fraction(text)
 
 
 @dataclass(frozen=True)

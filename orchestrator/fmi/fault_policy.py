@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
+
+from hapticlink.components.specs.quantities import Quantity
 
 
 @dataclass(frozen=True, kw_only=True)
 class Faults:
-    """What a run does about an FMU that fails.
-
-    nan: an output that is not finite ends the run, or keeps its last finite value. discard: an
-    fmi2Discard ends the run, or the step is taken again in smaller ones where the FMU can do
-    that. timeout (s): how long an isolated FMU may take for one call.
-    """
+    """What a run does about an FMU that fails."""
 
     nan: Literal["stop", "hold"] = "stop"
+    """An output that is not finite ends the run, or keeps its last finite value."""
     discard: Literal["stop", "retry"] = "stop"
-    timeout: float = 60.0
+    """An fmi2Discard ends the run, or the step is taken again in smaller ones where the FMU can."""
+    timeout: Annotated[float, Quantity("s", gt=0, le=86400)] = 60.0
+    """How long an isolated FMU may take for one call."""

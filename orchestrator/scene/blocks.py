@@ -7,7 +7,7 @@ from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.linkage import GraphicsCopy
-from hapticlink.orchestrator.scene.records import AnyRate
+from hapticlink.orchestrator.scene.rates import AnyRate
 from hapticlink.orchestrator.scene.scene import Scene
 
 

@@ -1,4 +1,4 @@
-"""[[fmu]] and [[connection]]: anyone's FMUs in a scene, as frozen records."""
+"""A scene's own tables beside those of the components, as frozen records."""
 
 from __future__ import annotations
 
@@ -8,64 +8,56 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-Value = bool | int | float | str | tuple[bool | int | float, ...]
+from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
+from hapticlink.orchestrator.scene.rates import AnyRate, Seconds
+
+OWN = "the variable's own"
+"""The unit of what belongs to an FMU that is not the project's."""
+Value = (
+    bool
+    | Annotated[int, Quantity(OWN)]
+    | Annotated[float, Quantity(OWN)]
+    | str
+    | tuple[bool | Annotated[int | float, Quantity(OWN)], ...]
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ForeignFmu:
-    """An FMU of FMI 2.0 or 3.0 co-simulation.
-
-    path: relative to the scene file. rate: "haptics", "graphics", or one of its own,
-    as graphics.rate.
-    timing: None takes what the FMU declares, and "continuous" where it doesn't; "sampled" is a
-    block whose doStep(t, h) puts out y(t) of the inputs of t. start: values of inputs and
-    parameters by name; a list for a whole vector. isolate: in a process of its own.
-    """
+    """An FMU of FMI 2.0 or 3.0 co-simulation."""
 
     name: str
+    """By which connections and results speak of it: letters, digits and _."""
     path: str
-    rate: AnyRate = "haptics"
+    """Its file, from the folder of the scene's."""
+    rate: Literal["haptics", "graphics"] | AnyRate = "haptics"
+    """Its communication rate: that of the scene, or one of its own, as graphics.rate."""
     timing: Literal["sampled", "continuous"] | None = None
+    """sampled: doStep(t, h) puts out y(t) of the inputs of t; continuous: y(t + h). What the FMU
+    declares where left out, "continuous" where it does not."""
     start: Mapping[str, Value] = field(default_factory=dict)
+    """Values of inputs and parameters by name; a list for a whole vector."""
     isolate: bool = False
+    """Runs it in a process of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wire:
-    """`from = "a.y"` to `to = "b.u"`: a scalar or a whole vector, of any FMU of the scene.
-
-    hold: None takes the scene's. Units convert by themselves where `convert`; the target gets
-    factor y + offset of that. A wire to an input of a block takes the place of the loop's own.
-    """
+    """A connection of a scalar or a whole vector, between any FMUs of the scene. One to an input of
+    a block takes the place of the loop's own."""
 
     from_: Annotated[str, Field(alias="from")]
+    """The output, `fmu.variable`."""
     to: str
+    """The input, `fmu.variable`."""
     hold: str | None = None
-    factor: float = 1.0
-    offset: float = 0.0
+    """Its hold between rates; the scene's where left out."""
+    factor: Annotated[float, Quantity("1")] = 1.0
+    """The input gets factor y + offset, after the conversion of units; not 0."""
+    offset: Annotated[float, Quantity(OWN)] = 0.0
+    """See `factor`."""
     convert: bool = True
-
-
-Rate = int | float | str
-"""Hz; a fraction of whole numbers may be written as text ("30000/1001")."""
-
-
-Seconds = int | float | str
-"""s, written as a rate is ("1/2048")."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class VariableRate:
-    """Periods drawn uniformly between 1/max and 1/min (Hz), in whole haptic ticks."""
-
-    min: Rate
-    max: Rate
-    seed: int = 0
-
-
-AnyRate = Rate | VariableRate | tuple[float, ...]
-"""A tuple holds the times (s) at which steps end. A file may also give a recorded trace,
-`{ trace = FILE }`, which becomes such times."""
+    """Converts between the units of the two ends."""
 
 
 INTERPOLATING = ("zoh", "foh", "second-order", "hermite")
@@ -74,62 +66,63 @@ INTERPOLATING = ("zoh", "foh", "second-order", "hermite")
 
 @dataclass(frozen=True, kw_only=True)
 class Iteration:
-    """Settings of [iteration].
-
-    method: fixed point with Aitken's relaxation, or Newton. tolerance: outputs y agree where they
-    differ by at most tolerance (1 + |y|). most: steps taken again for one step (those that make
-    Newton's Jacobian not counted). interpolation: the hold on connections between plants of a
-    rate: "zoh" their value at the end, "foh" linear from the start, "second-order", or "hermite",
-    which needs derivatives ("foh" stands where there are none). unconverged: ends the run, or
-    goes on with what there is.
-    """
+    """What `coupling = "iterated"` repeats until connected plants of a rate agree."""
 
     method: Literal["aitken", "newton"] = "aitken"
-    tolerance: float = 1e-9
-    most: int = 50
+    """Fixed point with Aitken's relaxation, or Newton."""
+    tolerance: Annotated[float, Quantity("1", gt=0, lt=1)] = 1e-9
+    """Outputs y agree where they differ by at most tolerance (1 + |y|)."""
+    most: Annotated[int, Quantity("1", ge=1, le=10000)] = 50
+    """Most repetitions of a step; those that make Newton's Jacobian are not counted."""
     interpolation: Literal["zoh", "foh", "second-order", "hermite"] = "foh"
+    """Hold on connections between plants of a rate: zoh, their value at the end of the step; foh,
+    linear from its start; second-order; hermite, which needs derivatives (foh without)."""
     unconverged: Literal["stop", "accept"] = "stop"
+    """Ends the run, or goes on with what there is."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Latency:
-    """A latency drawn uniformly between min and max (s) and the probability of a loss, for each
-    sample, by numpy's PCG64 with `seed`. max None is min: a constant latency. Connections of
-    one seed lose and delay the same samples, as one packet would."""
+    """Latency and loss of each sample of a connection, drawn by numpy's PCG64. Connections of one
+    seed lose and delay the same samples, as one packet would."""
 
-    min: float = 0.0
-    max: float | None = None
-    loss: float = 0.0
-    seed: int = 0
+    min: Elapsed = 0.0
+    """Least latency."""
+    max: Elapsed | None = None
+    """Largest latency; `min` where left out, a constant latency."""
+    loss: Annotated[float, Quantity("1", ge=0, le=1)] = 0.0
+    """Probability that a sample is lost."""
+    seed: Seed = 0
+    """Seed."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StepControl:
-    """Settings of [step_control]; times in s, as numbers or "1/3000".
-
-    tolerance: doubling, error per second of an output y over its nominal (1 where it has none) +
-    |y|; ecco, residual energy of a step over `energy` (J), the energy that matters in the scene.
-    min: the shortest step, accepted whatever its error. max: None is a period of the rate.
-    """
+    """Steps chosen for accuracy."""
 
     method: Literal["doubling", "ecco"]
-    tolerance: float
+    """doubling: a step against two of half its size; ecco: the residual energy of a step."""
+    tolerance: Annotated[float, Quantity("1", gt=0)]
+    """doubling: error per second of an output y over its nominal (1 where it has none) + |y|; ecco:
+    residual energy over `energy`."""
     min: Seconds
+    """Shortest step, accepted whatever its error."""
     max: Seconds | None = None
-    energy: float | None = None
+    """Longest step; a period of the rate where left out."""
+    energy: Annotated[float, Quantity("J", gt=0)] | None = None
+    """The energy that matters in the scene, which ecco needs."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PowerPort:
-    """The power into a plant is sign * effort . d(displacement)/dt.
-
-    effort is an input (`fmu.port` or an entry of it, N and N.m), displacement an output of the same
-    FMU that its effort works on (m and rad); other units count by their factors (`bonds`).
-    """
+    """The power into a plant is sign * effort . d(displacement)/dt."""
 
     effort: str
+    """An input, `fmu.port` or an entry of it (N and N.m; other units count by their factors)."""
     displacement: str
-    sign: float = 1.0
+    """The output of the same FMU that the effort works on (m and rad)."""
+    sign: Annotated[float, Quantity("1")] = 1.0
+    """-1 where the effort counts against the displacement."""
 
     @property
     def fmu(self) -> str:
@@ -138,18 +131,19 @@ class PowerPort:
 
 @dataclass(frozen=True, kw_only=True)
 class SetSpring:
-    """F = stiffness (set_position - position) + damping (set_velocity - velocity), entry by entry.
-
-    set_position and set_velocity are inputs of one FMU (`fmu.port`), the far end; position is the
-    near end, an input of that FMU at its own rate or an output. Gains are in the inputs' units;
-    no damping is 0, and so is no set_velocity.
-    """
+    """F = stiffness (set_position - position) + damping (set_velocity - velocity), entry by entry,
+    of an FMU whose far end the scene sets."""
 
     set_position: str
+    """The input that sets the far end, `fmu.port`."""
     position: str
-    stiffness: tuple[float, ...]
-    damping: tuple[float, ...] = ()
+    """The near end: an input of that FMU at its own rate, or an output of it."""
+    stiffness: tuple[Annotated[float, Quantity(OWN, ge=0)], ...]
+    """Stiffness, entry by entry."""
+    damping: tuple[Annotated[float, Quantity(OWN, ge=0)], ...] = ()
+    """Damping, entry by entry; 0 where left out."""
     set_velocity: str = ""
+    """The input that sets the far end's velocity; 0 where left out."""
 
     @property
     def ports(self) -> tuple[str, ...]:

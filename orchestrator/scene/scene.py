@@ -23,16 +23,15 @@ from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
+from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.faults import Finding, unplaced
 from hapticlink.orchestrator.fmi.fault_policy import Faults
+from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
 from hapticlink.orchestrator.scene.records import (
-    AnyRate,
     ForeignFmu,
     Iteration,
     Latency,
     PowerPort,
-    Rate,
-    Seconds,
     SetSpring,
     StepControl,
     Wire,
@@ -41,24 +40,24 @@ from hapticlink.orchestrator.scene.records import (
 
 @dataclass(frozen=True, kw_only=True)
 class Haptics:
-    """The fast rate (Hz)."""
+    """The fast rate."""
 
     rate: Rate = 512
+    """Communication rate of the blocks of the haptic loop."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Graphics(GraphicsCopy):
-    """The slow rate, and the graphics copy that runs at it.
-
-    rate: Hz, bounds and a seed, or the times (s) at which frames end. align "exact" ends
-    frame i at i/rate, "tick" at the first haptic tick at or after it; None is "exact" for a
-    fixed rate, and rates that vary are always on ticks. phase (s) is the end of the first frame
-    of a fixed rate, None a whole period. A file may give a recorded trace: `{ trace = FILE }`.
-    """
+    """The slow rate, and the graphics copy of the mechanism that runs at it, pulled by a PD
+    controller (section B.6)."""
 
     rate: AnyRate = 30
+    """Frames: a rate, bounds and a seed, the times at which frames end, or a recorded trace."""
     phase: Seconds | None = None
+    """End of the first frame of a fixed rate, at most a period; a period where left out."""
     align: Literal["exact", "tick"] | None = None
+    """exact: frame i ends at i/rate; tick: at the first haptic tick at or after that. Exact for a
+    fixed rate where left out; rates that vary are always on ticks."""
 
 
 def _hand_type(table: Any) -> str:
@@ -80,65 +79,86 @@ Hand = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """Everything a run needs. duration in s; see the field's own records for the tables.
-
-    sensing "ideal" gives controller and mechanism the hand's wrench and the true pose, "encoders"
-    the observer's (it stands here, not in [device]). mechanism_at: the rate of the virtual
-    mechanism. directions_from: who computes Lambda_inv and P_c, the graphics copy or the mechanism
-    itself. local_model holds the mechanism's D, W, w and J_h from the graphics rate (B.15). hands
-    are those at the further points of the linkage, by name. hold is the default from a slow rate to
-    a fast one, downsampling from a fast to a slow; holds gives others by source
-    (`virtual_environment.P_c`), target or `source -> target`. delays by the same names: a latency
-    in s, or one drawn from a seed, and losses. phases: by FMU, the end of its first step (s), after
-    which come whole periods. kinds says what a signal is where its FMU does not, or "none" for
-    what it does say. power pairs efforts with displacements of FMUs that do not declare them,
-    spring says which inputs set a spring within one. substeps: steps of a plant between two reads,
-    its held inputs renewed at each. get_after_set: plants whose feed-through may be read after new
-    inputs are set, which FMI forbids between two steps.
-    stop_when, a signal against a number, ends the run in good order: None takes the device's
-    workspace where there is a device, "" is never. isolate runs every FMU in a process of its own.
-    packaging "native" compiles the scene's own blocks, which then need no Python.
-    A file may also say `extends`, a scene over which its own tables are laid.
-    """
+    """Everything a run needs. A block is simulated where its table is present."""
 
     __pydantic_config__ = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     title: str
+    """Of figures and messages."""
     description: str = ""
-    duration: float
+    """What `hapticlink info` tells."""
+    duration: Duration
+    """Simulated time."""
     hold: str = "zoh"
+    """Hold on connections from a slow rate to a fast one: [holds](holds.md)."""
     downsampling: str = "latest"
+    """From a fast rate to a slow one: the latest sample, or the mean over the slow step."""
     holds: Mapping[str, str] = field(default_factory=dict)
-    delays: Mapping[str, float | Latency] = field(default_factory=dict)
+    """Another hold for a connection, by source, target or "source -> target"."""
+    delays: Mapping[str, Elapsed | Latency] = field(default_factory=dict)
+    """Latency of a connection, or a table of latency and loss, by the same names."""
     phases: Mapping[str, Seconds] = field(default_factory=dict)
+    """End of an FMU's first step, by the FMU's name; whole periods follow."""
     kinds: Mapping[str, Kind | Literal["none"]] = field(default_factory=dict)
+    """What a signal is where its FMU does not say, by connection; or "none" for what it does say."""
     power: tuple[PowerPort, ...] = ()
+    """Efforts and displacements of FMUs other than the scene's own blocks."""
     spring: tuple[SetSpring, ...] = ()
-    substeps: Mapping[str, int] = field(default_factory=dict)
+    """Inputs of FMUs that set a spring within: [holds](holds.md), pspm."""
+    substeps: Mapping[str, Substeps] = field(default_factory=dict)
+    """Steps of a plant between two reads, its held inputs renewed at each; by the FMU's name."""
     get_after_set: tuple[str, ...] = ()
+    """Plants whose feed-through may be read after new inputs are set, which FMI forbids between two
+    steps."""
     coupling: Literal["gauss-seidel", "jacobi", "gauss-seidel-plants", "iterated"] = "gauss-seidel"
+    """Order of calls: [coupling](coupling.md)."""
     iteration: Iteration = field(default_factory=Iteration)
+    """Of coupling = "iterated"."""
     step_control: StepControl | None = None
+    """Steps chosen for accuracy."""
     sensing: Literal["ideal", "encoders"] = "ideal"
+    """ideal: controller and mechanism get the hand's wrench and the true pose; encoders: the
+    observer's."""
     mechanism_at: Literal["haptics", "graphics"] = "haptics"
+    """Rate of the virtual mechanism."""
     directions_from: Literal["graphics", "mechanism"] = "graphics"
+    """Who computes Lambda^-1 and P_c: the graphics copy, or the mechanism itself."""
     local_model: bool = False
+    """Holds the mechanism's D, W, w and J_h of (B.15) from the graphics rate:
+    [local model](local-model.md)."""
     stop_when: str | None = None
+    """A signal against a number, which ends the run in good order. Where left out,
+    "haptic_device.workspace_margin < 0" where there is a device; "" is never."""
     haptics: Haptics = field(default_factory=Haptics)
+    """The fast rate."""
     graphics: Graphics | None = None
+    """The slow rate and the graphics copy, the block `virtual_environment`."""
     linkage: Linkage | None = None
+    """The mechanism, the block `virtual_mechanism`: [mechanisms](mechanisms.md)."""
     contacts: Contacts | None = None
+    """What the links can touch."""
     mechanism: Mechanism = field(default_factory=Mechanism)
+    """Time integration of the mechanism."""
     directions: Directions = field(default_factory=Directions)
+    """The test for resisted directions."""
     device: Device | None = None
+    """The twin pantograph, the block `haptic_device`: [device](device.md)."""
     controller: Controller | None = None
+    """The block `controller`."""
     hand: Hand | None = None
+    """The user, the block `hand`."""
     hands: Mapping[str, Hand] = field(default_factory=dict)
+    """Hands at the further points of the linkage, by the point's name."""
     fmu: tuple[ForeignFmu, ...] = ()
+    """Anyone's FMUs: [foreign FMUs](foreign-fmus.md)."""
     connection: tuple[Wire, ...] = ()
+    """Connections of them."""
     faults: Faults = field(default_factory=Faults)
+    """What a run does about an FMU that fails: [faults](faults.md)."""
     isolate: bool = False
+    """Runs every FMU in a process of its own."""
     packaging: Literal["python", "native"] = "python"
+    """native: compiles the scene's own blocks, which then need no Python: [FMUs](fmus.md)."""
 
     @property
     def place(self) -> Callable[[tuple[str | int, ...], str], Finding]:

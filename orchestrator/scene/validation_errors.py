@@ -11,7 +11,7 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.faults import near, unknown
-from hapticlink.orchestrator.scene import checks, schema
+from hapticlink.orchestrator.scene import checks, key_descriptions, schema
 from hapticlink.orchestrator.scene.scene import adapter
 from hapticlink.orchestrator.scene.toml_keys import Path
 
@@ -23,15 +23,22 @@ def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
         path = _path(error, data)
         if path is not None:
             by_path.setdefault(path, []).append(error)
-    found = []
+    found: list[tuple[Path, str]] = []
     for at, group in by_path.items():
         deeper = any(len(other) > len(at) and other[: len(at)] == at for other in by_path)
         if deeper and all(e["type"].endswith(("_type", "literal_error")) for e in group):
             continue  # the other branches of a union whose right branch says more below
-        unlimited = [e for e in group if e["type"] == "finite_number"]
-        told = (_message(e, at, data) for e in unlimited or group)
-        found.append((at, " or ".join(dict.fromkeys(told))))
+        limited = [e for e in group if e["type"] in _RANGE]
+        told = {_message(e, at, data) for e in limited or group}
+        expected = f"{_shown(group[0]['input'])} should be {key_descriptions.expected(at)}"
+        found.append((at, told.pop() if len(told) == 1 else expected))
     return found
+
+
+_RANGE = {
+    *("greater_than", "greater_than_equal", "less_than", "less_than_equal"),
+    *("finite_number", "out_of_range"),
+}
 
 
 def _path(error: Any, data: Any) -> Path | None:
@@ -114,7 +121,7 @@ def _at(data: Any, path: Path) -> Any:
 
 
 def _message(error: Any, path: Path, data: Any) -> str:
-    kind, value = error["type"], error["input"]
+    kind, value = error["type"], _shown(error["input"])
     if kind == "missing":
         return "is missing"
     if kind == "unexpected_keyword_argument":
@@ -122,12 +129,20 @@ def _message(error: Any, path: Path, data: Any) -> str:
     if kind == "union_tag_invalid":
         known = [t for k in schema.at(path[:-1]) for t in schema.types(k)]
         return unknown("type", error["ctx"]["tag"], known)
-    if kind == "finite_number":
-        return f"{value!r}: give a finite number"
-    if kind in ("tuple_type", "too_long") and (wanted := schema.vector(path)):
-        return f"{value!r} should be {wanted}"
+    if kind in _RANGE:
+        finite = "" if value.lstrip("-") not in ("inf", "nan") else "finite "
+        return f"{value} is out of range: give a {finite}{key_descriptions.number(path)}"
+    if kind == "no_number":
+        return f"{value} should be {key_descriptions.expected(path)}"
+    if kind in ("tuple_type", "too_long") and (wanted := key_descriptions.vector(path)):
+        return f"{value} should be {wanted}"
     message = error["msg"].removeprefix("Input should be ").replace("an object", "a table")
-    return f"{value!r} should be {message}" if message != error["msg"] else f"{value!r}: {message}"
+    return f"{value} should be {message}" if message != error["msg"] else f"{value}: {message}"
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 100 else f"{text[:97]}..."
 
 
 def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:

@@ -21,7 +21,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import fmu_rates
-from hapticlink.orchestrator.scene.records import AnyRate
+from hapticlink.orchestrator.scene.rates import AnyRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,

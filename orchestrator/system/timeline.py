@@ -19,7 +19,7 @@ from hapticlink.orchestrator.base.ticks import (
     variable,
 )
 from hapticlink.orchestrator.scene.blocks import fmu_rates
-from hapticlink.orchestrator.scene.records import AnyRate, VariableRate
+from hapticlink.orchestrator.scene.rates import AnyRate, VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path
 

@@ -15,7 +15,8 @@ from hapticlink.orchestrator.base.ticks import (
     periodic,
     variable,
 )
-from hapticlink.orchestrator.scene.records import AnyRate, ForeignFmu, VariableRate
+from hapticlink.orchestrator.scene.rates import AnyRate, VariableRate
+from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Haptics, Scene
 
 

@@ -1,11 +1,20 @@
-"""What the shape of a scene cannot say: names that must exist, numbers that must be positive,
-tables that need each other. Each check yields (path in the file, message with remedy)."""
+"""What a scene's records cannot say of one key alone: names that must exist, numbers that limit
+each other, tables that need each other. Each check yields (path in the file, message with
+remedy)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hapticlink.orchestrator.scene.checks import blocks, contacts, coupling, fmus, linkage, rates
+from hapticlink.orchestrator.scene.checks import (
+    blocks,
+    contacts,
+    coupling,
+    device,
+    fmus,
+    linkage,
+    rates,
+)
 from hapticlink.orchestrator.scene.conditions import parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
@@ -13,25 +22,25 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 
 def check(scene: Scene) -> list[Problem]:
     """Every fault found, in the order of the file's sections."""
-    found = [*_numbers(scene), *rates.check(scene), *coupling.holds(scene), *blocks.missing(scene)]
+    found = [
+        *_condition(scene),
+        *rates.check(scene),
+        *coupling.holds(scene),
+        *blocks.missing(scene),
+    ]
     found += fmus.check(scene)
     if scene.linkage:
         found += linkage.check(scene.linkage)
     found += contacts.check(scene)
+    found += device.check(scene)
     found += coupling.check(scene)
     found += blocks.check(scene)
     return found
 
 
-def _numbers(scene: Scene) -> Iterator[Problem]:
-    if scene.duration <= 0:
-        yield ("duration",), f"{scene.duration} s: a run takes more than 0 s"
+def _condition(scene: Scene) -> Iterator[Problem]:
     if scene.stop_when:
         try:
             parse_condition(scene.stop_when)
         except ValueError as error:
             yield ("stop_when",), str(error)
-    for table in ("mechanism", "graphics", "device"):
-        record = getattr(scene, table)
-        if record and record.substeps < 1:
-            yield (table, "substeps"), f"{record.substeps}: at least 1 substep"

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from hapticlink.components.contact.broad_phase import counterclockwise, edges
 from hapticlink.components.specs.contacts import Contacts
-from hapticlink.components.specs.linkage import Linkage, Point
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import Point
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
@@ -28,18 +29,12 @@ def check(scene: Scene) -> Iterator[Problem]:
         message = "there is no graphics rate: add [graphics], or take detection = 'haptics'"
         yield (*here, "detection"), message
     yield from _obstacles(contacts)
-    for key in ("stiffness", "damping", "margin"):
-        if getattr(contacts, key) < 0:
-            yield (*here, key), f"{getattr(contacts, key)}: 0 or more"
 
 
 def _shapes(linkage: Linkage) -> Iterator[Problem]:
     for i, body in enumerate(linkage.body):
-        path: Path = ("linkage", "body", i)
-        if body.radius is not None and body.radius <= 0:
-            yield (*path, "radius"), f"{body.radius} m: a radius is more than 0"
         if len(body.capsule) not in (1, 2) or len(set(body.capsule)) != len(body.capsule):
-            yield (*path, "capsule"), "two different points, or one for a disc"
+            yield ("linkage", "body", i, "capsule"), "two different points, or one for a disc"
 
 
 def _obstacles(contacts: Contacts) -> Iterator[Problem]:
@@ -48,9 +43,6 @@ def _obstacles(contacts: Contacts) -> Iterator[Problem]:
         yield from _convex((*here, "enclosure"), contacts.enclosure)
     for i, polygon in enumerate(contacts.polygon):
         yield from _convex((*here, "polygon", i, "corners"), polygon.corners)
-    for i, disc in enumerate(contacts.disc):
-        if disc.radius <= 0:
-            yield (*here, "disc", i, "radius"), f"{disc.radius} m: a radius is more than 0"
     names: set[str] = {"enclosure"}
     for kind in ("disc", "polygon"):
         for i, obstacle in enumerate(getattr(contacts, kind)):

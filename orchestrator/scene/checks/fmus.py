@@ -37,5 +37,3 @@ def check(scene: Scene) -> Iterator[Problem]:
             yield ("connection", i, "hold"), unknown("hold", wire.hold, HOLDS)
         if wire.factor == 0:
             yield ("connection", i, "factor"), "0.0 passes nothing on: take the connection out"
-    if scene.faults.timeout <= 0:
-        yield ("faults", "timeout"), f"{scene.faults.timeout} s: a timeout is more than 0"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 from hapticlink.components.specs.linkage import Linkage
@@ -19,10 +18,6 @@ def check(linkage: Linkage) -> Iterator[Problem]:
         path: Path = (*here, "body", i)
         if body.name in frames[: i + 1]:
             yield (*path, "name"), f"{body.name!r} is taken: name each body once, none 'ground'"
-        if body.mass < 0:
-            yield (*path, "mass"), f"{body.mass} kg: a mass is 0 or more"
-        if body.inertia < 0:
-            yield (*path, "inertia"), f"{body.inertia} kg.m2: an inertia is 0 or more"
     yield from _tree(linkage, frames)
     for i, loop in enumerate(linkage.loop):
         for k, name in enumerate(loop.bodies):
@@ -41,8 +36,6 @@ def check(linkage: Linkage) -> Iterator[Problem]:
             elif isinstance(value, tuple) != (types[name] == "free"):
                 wanted = "three numbers" if types[name] == "free" else "one number"
                 yield (*here, table, name), f"{value!r}: a {types[name]} joint takes {wanted}"
-            elif isinstance(value, float) and not math.isfinite(value):
-                yield (*here, table, name), f"{value!r} is not finite"
 
 
 def _tree(linkage: Linkage, frames: list[str]) -> Iterator[Problem]:

@@ -341,7 +341,7 @@ def findings(folder: Path, text: str) -> dict[str, tuple[int | None, str]]:
         ('"takes.u"', '"takes"', "connection[0].to", 13, "write fmu.variable"),
         ("Gives.fmu", "Give.fmu", "fmu[0] (gives).path", 7, "there is no file"),
         ('"takes"', '"gives"', "fmu[1] (gives).name", 9, "is taken"),
-        ("\n[[conn", "\nrate = 0\n[[conn", "fmu[1] (takes).rate", 11, "more than 0"),
+        ("\n[[conn", "\nrate = 0\n[[conn", "fmu[1] (takes).rate", 11, "> 0"),
         ("\n[[conn", "\nrate = 'graphics'\n[[conn", "fmu[1] (takes).rate", 11, "no graphics rate"),
         ("\n[[conn", "\nstart.gan = 1\n[[conn", "fmu[1] (takes).start.gan", 11, "mean 'gain'"),
         ("\n[[conn", "\nstart.y = 1\n[[conn", "fmu[1] (takes).start.y", 11, "causality is output"),

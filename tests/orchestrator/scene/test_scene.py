@@ -5,7 +5,7 @@ import pytest
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.scene import find, load
-from hapticlink.orchestrator.scene.records import VariableRate
+from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.toml_keys import key_lines
 
 GOOD = """title = "A bar"
@@ -60,7 +60,8 @@ def test_all_faults_at_once_with_line_and_remedy() -> None:
     assert found["linkage.body[0] (bar).mass"] == (11, "is missing")
     assert found["linkage.body[0] (bar).mas"] == (13, "unknown key; did you mean 'mass'?")
     assert found["linkage.joint[0] (pivot).child"] == (18, "no body 'bra'; did you mean 'bar'?")
-    assert found["graphics.rate"] == (6, "-3 Hz: a rate is more than 0")
+    message = "-3 is out of range: give a number > 0 and <= 1000000 (Hz)"
+    assert found["graphics.rate"] == (6, message)
     assert found["holds.x"] == (29, "no hold 'zog'; did you mean 'zoh'?")
 
 
@@ -69,13 +70,13 @@ def test_all_faults_at_once_with_line_and_remedy() -> None:
     [
         ('body = "bar", at', 'body = "rod", at', "linkage.operational_point.body", "no body 'rod'"),
         ("start.pivot", "start.pvot", "linkage.start.pvot", "did you mean 'pivot'"),
-        ("mass = 1.0", "mass = -1.0", "linkage.body[0] (bar).mass", "0 or more"),
+        ("mass = 1.0", "mass = -1.0", "linkage.body[0] (bar).mass", ">= 0 (kg)"),
         ("mass = 1.0", "mass = inf", "linkage.body[0] (bar).mass", "finite"),
         ("[device]\n", "", "controller", "add [device]"),
         ("[graphics]\nrate = 30\n", "", "directions_from", "add [graphics]"),
         ("rate = 30", "rate = { min = 60, max = 10 }", "graphics.rate.min", "swap them"),
         ("rate = 30", "rate = [0.5, 0.2]", "graphics.rate", "must rise"),
-        ("[controller]", "[controller]\ntopology = 3", "controller.topology", "boolean"),
+        ("[controller]", "[controller]\ntopology = 3", "controller.topology", "true or false"),
         ("[controller]", "[controller]\ntopology.stif = 3", "controller.topology.stif", "unknown"),
         ("[hand]", "[hand]\ntype = 'arm'", "hand.wrench", "belongs to type 'constant', not 'arm'"),
         ("[haptics]", "stop_when = 'x = 3'\n[haptics]", "stop_when", "write a signal"),

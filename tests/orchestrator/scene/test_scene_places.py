@@ -83,8 +83,8 @@ def test_connections_that_are_not_there(tmp_path: Path) -> None:
         ("hand.type=spring", "hand.mass: `mass` belongs to type 'arm', not 'spring'"),
         ("hand.wrench=[1,2,3]", "hand.wrench: `wrench` belongs to type 'constant', not 'arm'"),
         ("haptic.rate=1", "haptic: unknown key; did you mean 'haptics'?"),
-        ("haptics.rate=nan", "haptics.rate: nan: give a finite number"),
-        ("duration=inf", "duration: inf: give a finite number"),
+        ("haptics.rate=nan", "haptics.rate: nan is out of range: give a finite number > 0 and"),
+        ("duration=inf", "duration: inf is out of range: give a finite number > 0 and"),
         (
             "controller.teleoperation.stiffness=100",
             "controller.teleoperation.stiffness: 100 should be three numbers (N/m, N/m, N.m/rad)",
@@ -111,7 +111,7 @@ def test_a_shape_is_told_in_words_of_the_scene(option: str, message: str) -> Non
 
 def test_nan_as_a_start_value(tmp_path: Path) -> None:
     text = '[[fmu]]\nname = "p"\npath = "p.fmu"\nstart.mass = nan\n'
-    assert "line 4: fmu[0] (p).start.mass: nan: give a finite number" in told(text)
+    assert "line 4: fmu[0] (p).start.mass: nan is out of range: give a finite number" in told(text)
 
 
 def test_shape_faults_and_others_are_told_together(tmp_path: Path) -> None:
@@ -121,7 +121,7 @@ def test_shape_faults_and_others_are_told_together(tmp_path: Path) -> None:
     for message in (
         "line 3: hold: no hold 'zog'",
         "line 4: duration: '1' should be a valid number",
-        "line 6: graphics.rate: 'fast': write a rate",
+        "line 6: graphics.rate: 'fast' should be a number (Hz) or a fraction",
         "line 7: connection[0].to: is missing",
         "line 8: connection[0].from: no FMU 'handle'; did you mean 'hand'?",
         "line 10: hand.type: no type 'sprin'",
@@ -134,7 +134,7 @@ def test_shape_faults_and_others_are_told_together(tmp_path: Path) -> None:
 def test_an_unknown_type_of_a_joint_hides_nothing() -> None:
     found = told(GOOD.replace('name = "pivot"', 'name = "pivot"\ntype = "x"'), "haptics.rate=-1")
     assert "joint[0] (pivot).type: 'x' should be 'revolute'" in found
-    assert "haptics.rate: -1 Hz" in found
+    assert "haptics.rate: -1 is out of range: give a number > 0" in found
 
 
 def test_a_missing_name_makes_no_fault_where_it_is_spoken_of() -> None:
@@ -186,8 +186,8 @@ def test_an_inherited_fault_names_the_base_and_its_line(tmp_path: Path) -> None:
     base = _file(tmp_path, text, "base.toml")
     top = _file(tmp_path, 'extends = "base.toml"\nhold = "zog"\n[graphics]\nphase = 0.01\n')
     found = told(top.read_text(), folder=tmp_path)
-    assert f"{base}, line 6: graphics.rate: -3 Hz" in found
-    assert f"{base}, line 13: linkage.body[0] (bar).mass: -1.0 kg" in found
+    assert f"{base}, line 6: graphics.rate: -3 is out of range: give a number > 0" in found
+    assert f"{base}, line 13: linkage.body[0] (bar).mass: -1.0 is out of range" in found
     assert "\n  line 2: hold: no hold 'zog'" in found
 
 

@@ -24,7 +24,7 @@ from hapticlink.orchestrator.plan.sample_ages import uses
 from hapticlink.orchestrator.plan.schemes import CAUSAL
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
-from hapticlink.orchestrator.scene.records import VariableRate
+from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks, timeline
@@ -149,7 +149,7 @@ def test_variable_rates_of_fmus_survive_an_ssp(tmp_path: Path) -> None:
         ("{ min = 60, max = 10 }", "swap them"),
         ("[0.1, 0.2]", "the times end before duration = 0.5 s"),
         ("[0.3, 0.2, 0.5]", "times must rise"),
-        ("'often'", "write 'haptics', 'graphics', or a rate as 30"),
+        ("'often'", 'should be "haptics" or "graphics" or a number .Hz. or'),
         ("'graphics'", "add .graphics."),
         ("{ trace = 'none.csv' }", "cannot be read as a trace"),
     ],

@@ -1,0 +1,88 @@
+"""What the numbers of a scene are: units and ranges, declared with the keys that hold them.
+
+A number of a record is of one of the kinds below, or has a `Quantity` of its own; the docstring
+under a field is the key's meaning. What reads scenes refuses the values out of range; the reference
+page and the JSON schema of scenes are made from the same declarations.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator
+from dataclasses import KW_ONLY, dataclass
+from fractions import Fraction
+from typing import Annotated, Any
+
+from annotated_types import Ge, GroupedMetadata, Gt, Le, Lt
+
+_BOUNDS: dict[str, tuple[str, Callable[[Any, Any], bool], Any]] = {
+    "gt": (">", operator.gt, Gt),
+    "ge": (">=", operator.ge, Ge),
+    "lt": ("<", operator.lt, Lt),
+    "le": ("<=", operator.le, Le),
+}
+
+
+@dataclass(frozen=True)
+class Quantity(GroupedMetadata):
+    """A finite number in `unit` ("1" has none), within the bounds that are given."""
+
+    unit: str
+    _: KW_ONLY
+    gt: float | None = None
+    ge: float | None = None
+    lt: float | None = None
+    le: float | None = None
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """The bounds that are given, by "gt", "ge", "lt", "le"."""
+        given = {name: getattr(self, name) for name in _BOUNDS}
+        return {name: bound for name, bound in given.items() if bound is not None}
+
+    @property
+    def range(self) -> str:
+        """`> 0 and <= 1000`; `finite` where there is no bound."""
+        said = [f"{_BOUNDS[name][0]} {bound}" for name, bound in self.bounds.items()]
+        return " and ".join(said) or "finite"
+
+    def __contains__(self, number: float | Fraction) -> bool:
+        return all(_BOUNDS[name][1](number, bound) for name, bound in self.bounds.items())
+
+    def __iter__(self) -> Iterator[Any]:
+        """The bounds as what pydantic reads."""
+        for name, bound in self.bounds.items():
+            yield _BOUNDS[name][2](bound)
+
+
+Time = Annotated[float, Quantity("s")]
+Elapsed = Annotated[float, Quantity("s", ge=0, le=100000)]
+Duration = Annotated[float, Quantity("s", gt=0, le=100000)]
+Position = Annotated[float, Quantity("m")]
+Length = Annotated[float, Quantity("m", gt=0)]
+Angle = Annotated[float, Quantity("rad")]
+Coordinate = Annotated[float, Quantity("rad or m")]
+Mass = Annotated[float, Quantity("kg", ge=0)]
+MomentOfInertia = Annotated[float, Quantity("kg.m2", ge=0)]
+Force = Annotated[float, Quantity("N")]
+Torque = Annotated[float, Quantity("N.m")]
+Effort = Annotated[float, Quantity("N.m or N")]
+LinearStiffness = Annotated[float, Quantity("N/m", ge=0)]
+LinearDamping = Annotated[float, Quantity("N.s/m", ge=0)]
+AngularStiffness = Annotated[float, Quantity("N.m/rad", ge=0)]
+AngularDamping = Annotated[float, Quantity("N.m.s/rad", ge=0)]
+JointStiffness = Annotated[float, Quantity("N.m/rad or N/m", ge=0)]
+JointDamping = Annotated[float, Quantity("N.m.s/rad or N.s/m", ge=0)]
+Substeps = Annotated[int, Quantity("1", ge=1, le=1000)]
+Seed = Annotated[int, Quantity("1", ge=0, le=2**63 - 1)]
+
+Point = tuple[Position, Position]
+Pose = tuple[Position, Position, Angle]
+Wrench = tuple[Force, Force, Torque]
+Stiffness = tuple[LinearStiffness, LinearStiffness, AngularStiffness]
+Damping = tuple[LinearDamping, LinearDamping, AngularDamping]
+Inertia = tuple[
+    Annotated[float, Quantity("kg", gt=0)],
+    Annotated[float, Quantity("kg", gt=0)],
+    Annotated[float, Quantity("kg.m2", gt=0)],
+]

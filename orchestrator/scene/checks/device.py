@@ -1,0 +1,40 @@
+"""Numbers of [device] and [directions] that limit each other; each yields (path, message)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+
+
+def check(scene: Scene) -> Iterator[Problem]:
+    factor = scene.directions.rank_tolerance * scene.directions.hysteresis
+    if not factor < 1:
+        yield (
+            ("directions", "hysteresis"),
+            f"{scene.directions.hysteresis} times rank_tolerance = "
+            f"{scene.directions.rank_tolerance} is {factor:.6g}, a share that no direction "
+            "exceeds: give less than 1 in all",
+        )
+    device, here = scene.device, ("device",)
+    if device is None:
+        return
+    if device.base_y_a >= device.base_y_b:
+        message = (
+            f"{device.base_y_a} m is not below base_y_b = {device.base_y_b} m: plane A reaches "
+            "upward, plane B downward"
+        )
+        yield (*here, "base_y_a"), message
+    if device.sensing != "ideal":
+        yield (*here, "sensing"), f"write sensing = {device.sensing!r} outside of [device]"
+    reach = device.proximal_length + device.distal_length
+    folded = abs(device.proximal_length - device.distal_length)
+    if (2 * device.reach_limit - 1) * reach <= folded:
+        path: Path = (*here, "reach_limit")
+        least = (1 + folded / reach) / 2
+        yield (
+            path,
+            f"{device.reach_limit} leaves an arm nothing between its two stops, as its links "
+            f"differ by {folded:.6g} m: give more than {least:.6g}, or links of more equal lengths",
+        )
