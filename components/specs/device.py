@@ -84,6 +84,6 @@ class Device:
     substeps: Substeps = 1
     """Integration steps within a communication step."""
     sensing: Literal["ideal", "encoders"] = "ideal"
-    """Set by the scene's own `sensing`."""
+    """Not to be written here: the scene's own `sensing` sets it."""
     observer: Observer = field(default_factory=Observer)
     """The observer, with sensing = "encoders"."""

@@ -24,6 +24,7 @@ _COMMANDS = {
     "build": "Build the FMUs of a scene.",
     "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
     "info": "Tell what a scene consists of, or which scenes there are.",
+    "schema": "Print what a scene may say, for editors or as a page.",
     "sweep": "Run many variants of a scene in parallel: one table and figure.",
     "study": "Study which hold suits which rate: tables, figures and a page.",
     "bench": "Measure run time against error, beside other codes.",

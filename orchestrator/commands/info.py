@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.orchestrator.commands.options import Scene, Set
+from hapticlink.orchestrator.commands.options import Out, Scene, Set
 from hapticlink.orchestrator.results.summary import MECHANISM
 from hapticlink.orchestrator.run.open_fmus import KINDS
 from hapticlink.orchestrator.system.system import System
@@ -16,9 +17,11 @@ if TYPE_CHECKING:
     from hapticlink.orchestrator.base.ticks import Timeline
 
 
-def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
-    """Tell what a scene consists of: rates, FMUs, connections, holds; what it needs and leaves out,
-    and what that saves. Without SCENE, list the shipped scenes."""
+def info(scene: Scene | None = None, /, *, set: Set = None, out: Out = None) -> int:
+    """Tell what a scene consists of: rates, FMUs, connections, holds; where the device's workspace
+    lies, and whether the scene starts in it; what it needs and leaves out, and what that saves.
+    Without SCENE, list the shipped scenes. With OUT, draw the workspace there, as workspace.png.
+    """
     from hapticlink.orchestrator import open_scene
     from hapticlink.orchestrator.base import temporary_folders
     from hapticlink.orchestrator.plan import sample_ages
@@ -35,11 +38,12 @@ def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
     time = timeline.timeline(read)
     with temporary_folders.room() as room:
         made = assemble.from_scene(read, time, fmu_files.fmu_files(read, time, room))
-        start = at_start(made) if read.linkage and read.linkage.loop else []
+        start = at_start(made) if read.linkage and (read.linkage.loop or read.device) else {}
     print(f"{read.title}\n{read.description.strip()}".strip())
     print(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
-    for line in summary.moved(asdict(read.linkage), start) if read.linkage and start else ():
-        print(f"  {line}")
+    if read.linkage and start:
+        for line in summary.moved(asdict(read.linkage), coordinates(start)):
+            print(f"  {line}")
     for fmu in made.fmus:
         timing = fmu.description.timing
         print(f"  {fmu.name}: {timing}, at {fmu.clock}, {len(fmu.description.outputs)} outputs")
@@ -52,8 +56,24 @@ def info(scene: Scene | None = None, /, *, set: Set = None) -> int:
             age = ages[connection.name]
             note = f"{age['least'] * 1e3:.3g} to {age['most'] * 1e3:.3g}"
         print(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
+    if read.device:
+        _workspace(read, [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)], out)
     _needs(read, time)
     return 0
+
+
+def _workspace(scene: Any, start: list[float], out: Path | None) -> None:
+    from hapticlink.orchestrator.results import folders, workspace
+
+    print("\ndevice's workspace")
+    for line in workspace.lines(scene.device, start):
+        print(f"  {line}")
+    if out:
+        path = folders.made(out) / "workspace.png"
+        title = f"Device and its workspace: {scene.title}"
+        figure = workspace.draw(scene.device, start, title)
+        figure.savefig(path, dpi=150, metadata={"Software": None})  # the same bytes every time
+        print(f"  {path}")
 
 
 def _needs(scene: Any, time: Timeline) -> None:
@@ -84,17 +104,18 @@ def _needs(scene: Any, time: Timeline) -> None:
 _PER_TICK = ("operations", "signals")
 
 
-def at_start(system: System) -> list[float]:
-    """q of the mechanism alone, as its FMU assembles it in initialisation; none without one."""
+def at_start(system: System) -> dict[str, float]:
+    """Outputs of the mechanism alone, as its FMU assembles it in initialisation; none without
+    one."""
     fmu = system.fmu.get(MECHANISM)
     if fmu is None:
-        return []
+        return {}
     outputs = np.zeros(len(fmu.description.outputs))
     made = KINDS[fmu.description.fmi](MECHANISM, fmu.description, outputs, fmu.starts)
     with made as instance:
         instance.enter_initialization(1.0)
         instance.read()
-    return coordinates(dict(zip((s.name for s in fmu.description.outputs), outputs, strict=True)))
+    return dict(zip((s.name for s in fmu.description.outputs), outputs.tolist(), strict=True))
 
 
 def coordinates(values: dict[str, float]) -> list[float]:

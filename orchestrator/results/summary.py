@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.results.tables import Results
-from hapticlink.orchestrator.results.tracking import table_of
+from hapticlink.orchestrator.results.tracking import DEVICE, table_of
 
 
 def lines(results: Results) -> Iterator[str]:
@@ -38,10 +38,22 @@ def lines(results: Results) -> Iterator[str]:
 
 
 def _start(results: Results) -> Iterator[str]:
+    device = table_of(results, MARGIN)
+    if device and len(device["time"]) and device[MARGIN][0] < 0:
+        yield outside(device[DEVICE][0], device[MARGIN][0])
     linkage = results.run["scene"]["linkage"]
     table = table_of(results, f"{MECHANISM}.q")
     if linkage and table and len(table["time"]):
         yield from moved(linkage, table[f"{MECHANISM}.q"][0])
+
+
+def outside(pose: Sequence[float], margin: float) -> str:
+    """That a pose is beyond the stops of the device, where `margin` (m) is negative."""
+    told = ", ".join(f"{value:.4g}" for value in pose)
+    return (
+        f"the start pose (x m, y m, theta rad) = ({told}) is outside the device's workspace by "
+        f"{-margin:.3g} m (move linkage.operational_point or linkage.start, or change [device])"
+    )
 
 
 def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
@@ -71,3 +83,4 @@ _UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}
 
 
 MECHANISM = "virtual_mechanism"
+MARGIN = "haptic_device.workspace_margin"

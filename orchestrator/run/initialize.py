@@ -13,6 +13,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.results.summary import outside
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.solvers import Matrix, Newton, Vector
@@ -147,13 +148,7 @@ def require_finite(instances: Mapping[str, Instance]) -> None:
         start = dict(zip(names, device.outputs.tolist(), strict=True))
         margin = start.get("workspace_margin", 0.0)
         if margin < 0:
-            pose = ", ".join(f"{start.get(f'x_true[{i}]', np.nan):.4g}" for i in (1, 2, 3))
-            raise FmuFault(
-                DEVICE,
-                f"the start pose (x m, y m, theta rad) = ({pose}) is outside the device's "
-                f"workspace by {-margin:.3g} m (move linkage.operational_point or linkage.start, "
-                "or change [device])",
-                0.0,
-            )
+            pose = [start.get(f"x_true[{i}]", np.nan) for i in (1, 2, 3)]
+            raise FmuFault(DEVICE, outside(pose, margin), 0.0)
     for instance in instances.values():
         instance.require_finite()

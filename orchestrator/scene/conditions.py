@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 from collections.abc import Callable
@@ -33,9 +34,9 @@ def parse_condition(text: str) -> Condition:
     """Raises ValueError, with an example, where `text` is no condition."""
     match = _PATTERN.fullmatch(text)
     try:
-        if match is None:
+        if match is None or not math.isfinite(value := float(match[4])):
             raise ValueError
-        return Condition(match[1], match[2], match[3], float(match[4]))
+        return Condition(match[1], match[2], match[3], value)
     except ValueError:
         example = "haptic_device.workspace_margin < 0"
         raise ValueError(f"{text!r}: write a signal against a number, {example!r}") from None

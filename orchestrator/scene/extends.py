@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.scene import families
 from hapticlink.orchestrator.scene.find import find, folder_of
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Place, flatten, key_lines, place_of, whole
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneFile(Scene):
+    """Everything a run needs. A block is simulated where its table is present; a scene with nothing
+    but a [linkage] runs the mechanism alone."""
+
+    extends: str | None = None
+    """The scene over which this one's tables are laid: a shipped one by its name, or a path from
+    the file that says it. Tables merge key by key; arrays, and tables of another `type`, replace
+    those below."""
 
 
 def document(
@@ -20,7 +33,7 @@ def document(
     stands. `above` are the scenes that extend this one, `file` is its name to them."""
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
         raise SceneFault(name, [Finding("", f"not TOML: {error}", file=file)]) from error
     flatten(data)
     places = {whole(path): (file, line) for path, line in key_lines(text).items()}

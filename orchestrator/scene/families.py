@@ -7,12 +7,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.base.faults import near
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 ARGUMENTS = ("family", "n")
+MEMBERS = Quantity("1", ge=1, le=1000)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FamilyLinkage(Linkage):
+    """Bodies, a tree of joints, and the cut joints that close loops; or a family of linkages, over
+    which the other keys are laid."""
+
+    family: str | None = None
+    """A linkage that repeats a pattern: n-four-bar."""
+    n: Annotated[int, MEMBERS] | None = None
+    """How many members the family's linkage has."""
 
 
 class FamilyError(ValueError):
@@ -74,8 +89,8 @@ def members(arguments: dict[str, Any]) -> dict[str, Any]:
     family, n = arguments.get("family"), arguments.get("n")
     if family not in FAMILIES:
         raise FamilyError("family", f"no family {family!r}; {near(str(family), FAMILIES)}")
-    if not isinstance(n, int) or isinstance(n, bool) or n < 1:
-        raise FamilyError("n", f"{n!r}: how many members? write a whole number of at least 1")
+    if not isinstance(n, int) or isinstance(n, bool) or n not in MEMBERS:
+        raise FamilyError("n", f"{n!r} is out of range: give a whole number {MEMBERS.range}")
     return FAMILIES[family](n)
 
 

@@ -7,10 +7,23 @@ becomes the list of its times in the scene, so that run.json holds the frames th
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 from hapticlink.orchestrator.base.faults import InputFault
+
+LONGEST = Decimal("1e12")
+"""s; a clock that counts from 1970 shows 2e9."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """A recorded trace of frames, instead of a rate."""
+
+    trace: str
+    """A CSV file with the times (s) at which frames ended in its first column, from the folder of
+    the scene's file."""
 
 
 def frame_times(path: Path) -> list[float]:
@@ -26,7 +39,9 @@ def frame_times(path: Path) -> list[float]:
             continue
         try:
             stamp = Decimal(field)
-        except InvalidOperation:
+            if not -LONGEST < stamp < LONGEST:
+                raise InvalidOperation
+        except InvalidOperation:  # not a number, or a comparison with "nan"
             if number == 1:
                 continue
             raise InputFault(f"{path}: line {number}: {field!r} is no time in s") from None

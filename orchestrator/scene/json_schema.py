@@ -1,7 +1,7 @@
 """A JSON schema (draft 2020-12) of scene files, made from the records, for editors.
 
-It says what each key may hold. Tables that a scene extends may say the rest, so that only entries
-of arrays, which are not laid over each other, require their keys.
+It says what each key may hold, and refuses others. What a table lacks may stand in the scene that
+this one extends; entries of arrays are not laid over each other, so these alone require their keys.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from typing import Any
 
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.scene import key_descriptions, schema
-from hapticlink.orchestrator.scene.families import Family
+from hapticlink.orchestrator.scene.records import ForeignFmu
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import NAMED
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -27,21 +28,82 @@ Json = dict[str, Any]
 
 def json_schema() -> Json:
     """The schema of a scene file."""
-    tables: dict[str, Json] = {}
-    scene = _table(schema.Scene, False, tables)
+    definitions = _Definitions()
+    scene = definitions.table(Scene, entry=False)
     return {
         "$schema": DRAFT,
         "title": "hapticlink scene",
         **scene,
         "anyOf": [{"required": ["extends"]}, {"required": ["title", "duration"]}],
-        "$defs": tables,
+        "$defs": definitions.found,
     }
 
 
-def _table(record: Any, entry: bool, tables: dict[str, Json]) -> Json:
-    """A record as a table, one of an array with its keys required."""
-    properties, required = {}, []
-    for key, hint in schema.hints(record).items():
-        found = _value(hint, entry, tables)
-        ...
-    return {}
+def _measure(kind: Any) -> str:
+    """` (N/m; >= 0)`"""
+    said = [text for text in (key_descriptions.unit(kind), key_descriptions.limits(kind)) if text]
+    return f" ({'; '.join(said)})" if said else ""
+
+
+class _Definitions:
+    """The tables that are referred to, by name."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, Json] = {}
+
+    def _reference(self, record: Any, entry: bool) -> Json:
+        name = record.__name__ + ("Entry" if entry else "")
+        if name not in self.found:
+            self.found[name] = self.table(record, entry)
+        return {"$ref": f"#/$defs/{name}"}
+
+    def table(self, record: Any, entry: bool) -> Json:
+        """A record; of an array, `entry`, with the keys that it requires."""
+        properties, required = {}, []
+        for key, hint in schema.hints(record).items():
+            default = schema.default(record, key)
+            found = self._any_of(hint, entry)
+            if isinstance(default, str | bool | int | float | tuple) and default != ():
+                found["default"] = default
+            if key in NAMED or (record, key) == (ForeignFmu, "start"):
+                # A name with dots may be written as tables in tables.
+                values = {"anyOf": [found["additionalProperties"], {"type": "object"}]}
+                found["additionalProperties"] = values
+            about = key_descriptions.meanings(record)[key]
+            properties[key] = {"description": about + _measure(hint), **found}
+            if default is MISSING:
+                required.append(key)
+        table = {
+            "type": "object",
+            "description": key_descriptions.about(record),
+            "properties": properties,
+            "additionalProperties": False,
+        }
+        return {**table, "required": required} if entry and required else table
+
+    def _any_of(self, kind: Any, entry: bool) -> Json:
+        found: list[Json] = []
+        for branch, beside in schema.measured(kind):
+            if branch is not NoneType and (one := self._one(branch, beside, entry)) not in found:
+                found.append(one)
+        return dict(found[0]) if len(found) == 1 else {"anyOf": found}
+
+    def _one(self, kind: Any, quantity: Quantity | None, entry: bool) -> Json:
+        origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+        if origin is typing.Literal:
+            return {"enum": list(arguments)}
+        if origin is tuple and Ellipsis in arguments:
+            of_tables = is_dataclass(arguments[0])
+            return {"type": "array", "items": self._any_of(arguments[0], entry or of_tables)}
+        if origin is tuple:
+            entries = [self._any_of(argument, entry) for argument in arguments]
+            count = len(entries)
+            return {"type": "array", "prefixItems": entries, "minItems": count, "maxItems": count}
+        if origin is Mapping:
+            return {"type": "object", "additionalProperties": self._any_of(arguments[1], entry)}
+        if is_dataclass(kind):
+            return self._reference(kind, entry)
+        if kind is str and quantity:
+            return {"type": "string", "pattern": _FRACTION, "maxLength": 50}
+        bounds = quantity.bounds if quantity else {}
+        return {"type": _TYPES[kind], **{_KEYWORDS[name]: b for name, b in bounds.items()}}

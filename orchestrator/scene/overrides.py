@@ -20,7 +20,7 @@ def parse(option: str) -> tuple[tuple[str, ...], Any]:
         raise InputFault(f"--set {option}: write key=value, e.g. --set graphics.rate=10")
     try:
         return names, tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except ValueError:  # TOMLDecodeError, or a whole number of thousands of digits
         return names, text.strip()
 
 

@@ -121,7 +121,7 @@ class PowerPort:
     """An input, `fmu.port` or an entry of it (N and N.m; other units count by their factors)."""
     displacement: str
     """The output of the same FMU that the effort works on (m and rad)."""
-    sign: Annotated[float, Quantity("1")] = 1.0
+    sign: Annotated[float, Quantity("1", ge=-1, le=1)] = 1.0
     """-1 where the effort counts against the displacement."""
 
     @property

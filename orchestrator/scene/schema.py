@@ -5,12 +5,21 @@ from __future__ import annotations
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
 from types import UnionType
 from typing import Any
 
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Quantity
+from hapticlink.orchestrator.scene.extends import SceneFile
+from hapticlink.orchestrator.scene.families import FamilyLinkage
+from hapticlink.orchestrator.scene.frame_trace import Trace
+from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path
+
+_WRITTEN: dict[Any, Any] = {Scene: SceneFile, Linkage: FamilyLinkage}
+"""Records that a file writes with keys that are resolved before they are read."""
 
 
 def keys(kinds: list[Any]) -> set[str]:
@@ -29,22 +38,33 @@ def chosen(kinds: list[Any], table: Any) -> list[Any]:
     return [k for k in _records(kinds) if name in types(k)] or kinds
 
 
-def at(path: Path) -> list[Any]:
+def at(path: Path, data: Any = None) -> list[Any]:
     """The types that the value at `path` may have, unions and annotations taken apart."""
-    return [branch for kind in said_of(path) for branch in branches(kind)]
+    return [branch for kind in said_of(path, data) for branch in branches(kind)]
 
 
-def said_of(path: Path) -> list[Any]:
-    """What the records say of the value at `path`."""
+def said_of(path: Path, data: Any = None) -> list[Any]:
+    """What the records say of the value at `path`; where the scene's `data` is given, those that
+    its tables name by their `type`."""
     if not path:
         return [Scene]
-    above, part = at(path[:-1]), path[-1]
+    above, part = chosen(at(path[:-1], data), value(data, path[:-1])), path[-1]
     if isinstance(part, int):
         tuples = [typing.get_args(k) for k in above if typing.get_origin(k) is tuple]
         entries = [t[0] if Ellipsis in t else t[part] for t in tuples if t[part:] or Ellipsis in t]
         return list(dict.fromkeys(entries))
     named = [typing.get_args(k)[1] for k in above if typing.get_origin(k) is Mapping]
     return named + [hint for kind in _records(above) if (hint := hints(kind).get(part))]
+
+
+def value(data: Any, path: Path) -> Any:
+    """What stands at `path`, None where nothing does."""
+    for part in path:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return data
 
 
 def branches(kind: Any) -> list[Any]:
@@ -63,6 +83,8 @@ def measured(kind: Any, quantity: Quantity | None = None) -> Iterator[tuple[Any,
             yield from measured(member, quantity)
     else:
         yield kind, quantity
+        if kind is VariableRate:
+            yield Trace, None
 
 
 def is_needed(path: Path, of: Any = None) -> bool:
@@ -75,15 +97,21 @@ def is_needed(path: Path, of: Any = None) -> bool:
 
 def default(kind: Any, key: str) -> Any:
     """The default of a record's key, MISSING where it is required."""
-    found = next(f for f in fields(kind) if f.name.rstrip("_") == key)
+    found = next(f for f in fields(as_written(kind)) if f.name.rstrip("_") == key)
     return found.default_factory() if found.default_factory is not MISSING else found.default
 
 
+@cache
 def hints(kind: Any) -> dict[str, Any]:
     """The annotations of a record's keys."""
-    found = typing.get_type_hints(kind, include_extras=True)
+    found = typing.get_type_hints(as_written(kind), include_extras=True)
     return {name.rstrip("_"): hint for name, hint in found.items() if name[0] != "_"}  # `from_`
 
 
 def _records(kinds: list[Any]) -> list[Any]:
     return [kind for kind in kinds if is_dataclass(kind)]
+
+
+def as_written(record: Any) -> Any:
+    """The record of a table as a file writes it."""
+    return _WRITTEN.get(record, record)

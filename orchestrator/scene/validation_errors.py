@@ -30,7 +30,7 @@ def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
             continue  # the other branches of a union whose right branch says more below
         limited = [e for e in group if e["type"] in _RANGE]
         told = {_message(e, at, data) for e in limited or group}
-        expected = f"{_shown(group[0]['input'])} should be {key_descriptions.expected(at)}"
+        expected = f"{_shown(group[0]['input'])} should be {key_descriptions.expected(at, data)}"
         found.append((at, told.pop() if len(told) == 1 else expected))
     return found
 
@@ -70,11 +70,11 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
     untyped = [path for path, _ in known if path[-1:] == ("type",) and _is_kind(path[:-1])]
     wrong = [path[:-1] if path in untyped else path for path, _ in known if path]
     for path in wrong:
-        node = _at(whole, path[:-1])
+        node = schema.value(whole, path[:-1])
         if isinstance(node, dict):
             node.pop(path[-1], None)
     for path in wrong:
-        node, filled = _at(whole, path[:-1]), _stand_in(path)
+        node, filled = schema.value(whole, path[:-1]), _stand_in(path)
         if isinstance(node, list):
             place = typing.cast("int", path[-1])
             node += [filled] * (place + 1 - len(node))  # too short a vector
@@ -110,16 +110,6 @@ def _stand_in(path: Path) -> Any:
     return None
 
 
-def _at(data: Any, path: Path) -> Any:
-    """What stands at `path`, None where nothing does (any more)."""
-    for part in path:
-        try:
-            data = data[part]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return data
-
-
 def _message(error: Any, path: Path, data: Any) -> str:
     kind, value = error["type"], _shown(error["input"])
     if kind == "missing":
@@ -131,10 +121,10 @@ def _message(error: Any, path: Path, data: Any) -> str:
         return unknown("type", error["ctx"]["tag"], known)
     if kind in _RANGE:
         finite = "" if value.lstrip("-") not in ("inf", "nan") else "finite "
-        return f"{value} is out of range: give a {finite}{key_descriptions.number(path)}"
+        return f"{value} is out of range: give a {finite}{key_descriptions.number(path, data)}"
     if kind == "no_number":
-        return f"{value} should be {key_descriptions.expected(path)}"
-    if kind in ("tuple_type", "too_long") and (wanted := key_descriptions.vector(path)):
+        return f"{value} should be {key_descriptions.expected(path, data)}"
+    if kind in ("tuple_type", "too_long") and (wanted := key_descriptions.vector(path, data)):
         return f"{value} should be {wanted}"
     message = error["msg"].removeprefix("Input should be ").replace("an object", "a table")
     return f"{value} should be {message}" if message != error["msg"] else f"{value}: {message}"
@@ -147,7 +137,7 @@ def _shown(value: Any) -> str:
 
 def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     """That a table has no such key, or that only one of another type has."""
-    kinds, table, key = schema.at(path[:-1]), _at(data, path[:-1]), str(path[-1])
+    kinds, table, key = schema.at(path[:-1]), schema.value(data, path[:-1]), str(path[-1])
     types = {name: k for k in kinds for name in schema.types(k)}
     branch = loc[-2] if len(loc) > 1 else None  # where the table has no type: the default's
     this = table.get("type", branch) if isinstance(table, dict) else branch

@@ -1,0 +1,29 @@
+"""`hapticlink schema`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+Markdown = Annotated[
+    bool, Parameter(negative="", help="Print the reference page, docs/scene-reference.md, instead.")
+]
+
+
+def schema(*, markdown: Markdown = False) -> int:
+    """Print what a scene may say, every key with unit, range and meaning: a JSON schema (draft
+    2020-12), by which editors complete and check scenes.
+
+    `hapticlink schema > scene.schema.json`, and `#:schema scene.schema.json` as the first line of a
+    scene.
+    """
+    import json
+
+    from hapticlink.orchestrator.scene import json_schema, reference
+
+    if markdown:
+        print(reference.page(), end="")
+    else:
+        print(json.dumps(json_schema.json_schema(), indent=2))
+    return 0

@@ -1,0 +1,78 @@
+"""The workspace of a scene's device: where it lies, in words and as a drawing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hapticlink.components.device.workspace import Range, links, margin, workspace
+from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator.results.summary import outside
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Pose = Sequence[float]
+"""x m, y m, theta rad."""
+
+
+def lines(device: Device, start: Pose) -> Iterator[str]:
+    """Where the handle can be, and whether it can be where a scene starts."""
+    space = workspace(device)
+    for which, field in (("some", space.some), ("every", space.every)):
+        extent = space.extent(field)
+        where = f"x {_range(extent[0])} m, y {_range(extent[1])} m" if extent else "nowhere"
+        yield f"at {which} theta: {where}"
+    turns = space.turns
+    yield f"theta: {'any' if turns == [_TURN] else ', '.join(map(_range, turns)) + ' rad'}"
+    found = float(margin(device, np.array([start]))[0])
+    if found < 0:
+        yield f"warning: {outside(start, found)}"
+    else:
+        pose = ", ".join(f"{value:.4g}" for value in start)
+        yield f"the handle starts at ({pose}), {found:.3g} m from the nearest stop"
+
+
+_TURN = (-math.pi, math.pi)
+
+
+def _range(of: Range) -> str:
+    return f"{of[0]:.2g} to {of[1]:.2g}"
+
+
+def draw(device: Device, start: Pose, title: str) -> Figure:
+    """The device at the pose `start`, and where its handle can be."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+    space = workspace(device)
+    figure = Figure(figsize=(6.4, 5.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    shades = (
+        (space.some, "0.92", "handle at some theta"),
+        (space.every, "0.8", "handle at every theta"),
+    )
+    for field, shade, _ in shades:
+        axes.contourf(space.x, space.y, field.T, [0, math.inf], colors=[shade])
+    for i, arm in enumerate(links(device, start)):
+        color, label = (("C0", "arms of plane A"), ("C1", "arms of plane B"))[i // 2]
+        axes.plot(*arm.T, color=color, marker="o", ms=3, label=label if i % 2 == 0 else None)
+        motor = "motors" if i == 0 else None
+        axes.plot(*arm[0], color=color, marker="s", ls="", label=motor)
+    ends = links(device, start)[[0, 2], 2]
+    axes.plot(*ends.T, "k-", lw=3, label="crank")
+    axes.plot(*start[:2], "wo", mec="k", label="handle where the scene starts")
+    handles, labels = axes.get_legend_handles_labels()
+    handles += [Patch(color=shade) for _, shade, _ in shades]
+    labels += [text for _, _, text in shades]
+    figure.legend(handles, labels, fontsize="small", ncols=3, loc="outside lower center")
+    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+    axes.set_title(fill(title, 70), fontsize="medium")
+    axes.grid(alpha=0.3)
+    return figure

@@ -1,0 +1,119 @@
+"""The JSON schema and the reference page of scenes say what the records say."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import is_dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from hapticlink.orchestrator.scene import find, key_descriptions, load, reference, schema
+from hapticlink.orchestrator.scene.json_schema import json_schema
+from hapticlink.orchestrator.scene.scene import Scene
+from tests.orchestrator.conftest import status
+from tests.orchestrator.scene.test_scene import GOOD
+
+ROOT = Path(__file__).parents[3]
+SCHEMA = jsonschema.Draft202012Validator(json_schema())
+
+
+def test_the_command_prints_a_valid_schema(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status("schema") == 0
+    printed = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator.check_schema(printed)
+    assert printed == json.loads(json.dumps(json_schema()))
+
+
+@pytest.mark.parametrize("name", find.shipped())
+def test_shipped_scenes_follow_it(name: str) -> None:
+    SCHEMA.validate(tomllib.loads(find.find(name)[1]))
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        "graphics.rate = '30000/1001'",
+        "graphics.rate = [0.5, 1.0]",
+        "graphics.rate = { min = 10, max = 60, seed = 4 }",
+        "controller.topology = false",
+        "controller.topology.stiffness = 3",
+        "controller.teleoperation = false",
+        "holds.virtual_environment.P_c = 'lead'",
+        "delays.'hand.F' = { min = 0.001, loss = 0.1 }",
+        "delays.hand.F = 0.001",
+    ],
+)
+def test_every_way_to_write_a_key_follows_it(more: str) -> None:
+    text = GOOD.replace("rate = 30\n", "" if more.startswith("graphics") else "rate = 30\n")
+    text = f"{more}\n{text.replace('[graphics]', '')}" if "graphics" in more else f"{more}\n{text}"
+    if more.startswith("controller"):
+        text = text.replace("[controller]\n", "")
+    load.read(text)
+    SCHEMA.validate(tomllib.loads(text))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("duration = 1.0\n", ""),
+        ("mass = 1.0\n", ""),
+        ("mass", "mas"),
+        ("rate = 30", "rate = 'fast'"),
+        ("rate = 30", "rate = { trace = 3 }"),
+        ("[controller]", "[controller]\nbias = 'half'"),
+        ("[hand]", "[hand]\ntype = 'arm'"),
+        ("at = [0.1, 0.0]", "at = [0.1]"),
+        ('child = "bar"', "child = 3"),
+    ],
+)
+def test_what_does_not(old: str, new: str) -> None:
+    assert SCHEMA.is_valid(tomllib.loads(GOOD))
+    assert old in GOOD
+    assert not SCHEMA.is_valid(tomllib.loads(GOOD.replace(old, new)))
+
+
+def test_the_reference_page_is_up_to_date() -> None:
+    """Made by `hapticlink schema --markdown > docs/scene-reference.md`."""
+    assert (ROOT / "docs" / "scene-reference.md").read_text(encoding="utf-8") == reference.page()
+
+
+def records(hint: Any) -> Iterator[Any]:
+    """Every record that is reached from a type."""
+    for kind in schema.branches(hint):
+        if is_dataclass(kind):
+            yield kind
+            yield from chain.from_iterable(map(records, schema.hints(kind).values()))
+        else:
+            yield from chain.from_iterable(map(records, typing.get_args(kind)))
+
+
+def bare(hint: Any) -> Iterator[Any]:
+    """The numbers within a type that say neither unit nor range."""
+    for kind, quantity in schema.measured(hint):
+        if kind in (float, int) and not quantity:
+            yield kind
+        elif typing.get_origin(kind) in (tuple, Mapping):
+            yield from chain.from_iterable(map(bare, typing.get_args(kind)))
+
+
+RECORDS = tuple(dict.fromkeys(records(Scene)))
+
+
+def test_records_of_every_table_are_found() -> None:
+    names = {record.__name__ for record in RECORDS}
+    assert {"Body", "PDDrive", "Observer", "ArmHand", "VariableRate", "Latency", "Trace"} <= names
+
+
+@pytest.mark.parametrize("record", RECORDS)
+def test_every_key_has_a_meaning_and_every_number_a_quantity(record: Any) -> None:
+    meanings = key_descriptions.meanings(record)
+    for name, hint in schema.hints(record).items():
+        assert meanings[name].endswith("."), name
+        assert not list(bare(hint)), name
