@@ -30,7 +30,7 @@ ROUNDING = 1e-16  # of S: a loop whose rows are all below it says nothing
 TINY = 1e-200
 
 # Relative to the mean of S_ii over a loop's rows.
-MU = 1e-14
+PIVOT = 1e-15
 MU_FOLLOWING = 1e-6  # of c in `follow`
 MU_MULTIPLIERS = 1e-9  # of multipliers of least norm: rounding along null(W') is divided by it
 PROXIMAL_STEPS = 2
@@ -74,13 +74,34 @@ def loop_scale(S: ca.SX) -> ca.SX:
 
 
 class Factored:
-    """L diag(d) L' of a symmetric matrix, without pivoting."""
+    """L diag(d) L' of a symmetric matrix, without pivoting; each d at least `least`, if given."""
 
-    def __init__(self, A: ca.SX) -> None:
-        self.d, self.upper, self.order = ca.ldl(ca.sparsify(A), False)
+    def __init__(self, A: ca.SX, least: ca.SX | None = None) -> None:
+        m, nonzero = A.shape[0], A.sparsity().has_nz
+        left = [{i: A[i, j] for i in range(j, m) if nonzero(i, j)} for j in range(m)]
+        self._inverse: list[ca.SX] = []
+        self._columns: list[dict[int, ca.SX]] = []
+        for j, column in enumerate(left):
+            pivot = column.pop(j, ca.SX(0))
+            self._inverse.append(1 / (pivot if least is None else ca.fmax(pivot, least[j])))
+            scaled = {i: a * self._inverse[j] for i, a in column.items()}
+            for i, a in column.items():
+                for k, l in scaled.items():
+                    if k >= i:
+                        left[i][k] = left[i].get(k, ca.SX(0)) - l * a
+            self._columns.append(scaled)
 
     def solve(self, b: ca.SX) -> ca.SX:
-        return ca.ldl_solve(b, self.d, self.upper, self.order)
+        """x of A x = b, m x r."""
+        x = [b[i, :] for i in range(b.shape[0])]
+        for j, column in enumerate(self._columns):
+            for i, l in column.items():
+                x[i] = x[i] - l * x[j]
+        for j, column in reversed(list(enumerate(self._columns))):
+            x[j] = self._inverse[j] * x[j]
+            for i, l in column.items():
+                x[j] = x[j] - l * x[i]
+        return ca.vertcat(*x)
 
 
 class Regularised(Factored):
@@ -102,7 +123,7 @@ class Regularised(Factored):
 class ClosedLoopSolver:
     """Factors of D and W (m x n); m = 0 leaves D^-1 alone."""
 
-    def __init__(self, inertia: Inertia, W: ca.SX, mu: float = MU) -> None:
+    def __init__(self, inertia: Inertia, W: ca.SX, mu: float | None = None) -> None:
         self.inertia, self.W, self.m = inertia, W, W.shape[0]
         self._d_inv = ca.diag(1 / (inertia.d + inertia.k))
         self._light = inertia.k.sparsity().row()
@@ -110,7 +131,10 @@ class ClosedLoopSolver:
             self._Z = inertia.inward(W.T)
             self._Y = self._d_inv @ self._Z
             self.S = symmetric(self._Z.T @ self._Y)
-            self._sharp = Regularised(self.S, mu * loop_scale(self.S))
+            scale = loop_scale(self.S)
+            self._sharp = (
+                Factored(self.S, PIVOT * scale) if mu is None else Regularised(self.S, mu * scale)
+            )
 
     @cached_property
     def _following(self) -> Regularised:
