@@ -207,7 +207,8 @@ def _step(
             model, block.p, independent_coordinates.start_pose(model, block.p), given
         )
         return independent_coordinates.step(mechanism.integrator, embedded, x, u, p, t, block.h)
-    qdd = space.solver.follow(efforts, closing)
+    extrapolates = integrators.METHODS[mechanism.integrator].extrapolates
+    qdd = space.solver.follow(efforts, closing, refined=extrapolates)
     ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
     if model.linkage.loop and mechanism.formulation == "partitioning":
         parted = Partitioning(

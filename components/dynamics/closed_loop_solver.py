@@ -11,8 +11,8 @@ mu is relative to the mean of S_ii over the two rows of each loop, so that a loo
 beside light ones counts as much as they do, in whatever frame. Where an eigenvalue sigma^2 of S, so
 scaled, is below mu its direction is cut: the closure does not act along it. Which mu is right near
 a singular pose depends on the right-hand side. W D^-1 b lies in the range of W by construction, and
-cutting it lets the linkage go with the acceleration that b alone would give: mu is as small as the
-rounding of S allows (its pivots are then mu within 2e-15). c = -Wdot qd does so only for rates on
+cutting it lets the linkage go with the acceleration that b alone would give: there mu is zero, and
+pivots of S have a floor at its rounding instead, which redundant closures rest on. c = -Wdot qd does so only for rates on
 the branch; what the rates are off is divided by sigma. `follow` therefore cuts c early, and is for
 accelerations that are integrated.
 """
@@ -86,21 +86,21 @@ class Factored:
             self._inverse.append(1 / (pivot if least is None else ca.fmax(pivot, least[j])))
             scaled = {i: a * self._inverse[j] for i, a in column.items()}
             for i, a in column.items():
-                for k, l in scaled.items():
+                for k, entry in scaled.items():
                     if k >= i:
-                        left[i][k] = left[i].get(k, ca.SX(0)) - l * a
+                        left[i][k] = left[i].get(k, ca.SX(0)) - entry * a
             self._columns.append(scaled)
 
     def solve(self, b: ca.SX) -> ca.SX:
         """x of A x = b, m x r."""
         x = [b[i, :] for i in range(b.shape[0])]
         for j, column in enumerate(self._columns):
-            for i, l in column.items():
-                x[i] = x[i] - l * x[j]
+            for i, entry in column.items():
+                x[i] = x[i] - entry * x[j]
         for j, column in reversed(list(enumerate(self._columns))):
             x[j] = self._inverse[j] * x[j]
-            for i, l in column.items():
-                x[j] = x[j] - l * x[i]
+            for i, entry in column.items():
+                x[j] = x[j] - entry * x[i]
         return ca.vertcat(*x)
 
 
@@ -186,14 +186,16 @@ class ClosedLoopSolver:
             more, y = more + v + self._Y @ also, y + also
         return a + inertia.outward(more), self._shortest(y)
 
-    def follow(self, b: ca.SX, c: ca.SX) -> ca.SX:
-        """a as in `solve`, unrefined, for rates that are near the branch: n x r."""
+    def follow(self, b: ca.SX, c: ca.SX, *, refined: bool = False) -> ca.SX:
+        """a as in `solve`, for rates that are near the branch: n x r; refined once if asked."""
         inertia, beta = self.inertia, self.inertia.inward(b)
         if not self.m:
             return inertia.outward(self._d_inv @ beta)
         particular = self._following.proximal(c)
         taken_back = ca.diag(inertia.k) @ (self._Y @ particular)
         v, y = self._closed(beta + taken_back, ca.SX(*c.shape))
+        if refined:
+            y += self._sharp.solve(-self._Z.T @ (v + self._Y @ y))
         return inertia.outward(v + self._Y @ (y + particular))
 
     def constrain(self, c: ca.SX) -> ca.SX:

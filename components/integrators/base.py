@@ -18,10 +18,13 @@ class Baumgarte:
 
 
 class Integrator(ABC):
-    """One method. `order` is the global one; a step is a pure expression in x, u, p, t, h."""
+    """One method. `order` is the global one; a step is a pure expression in x, u, p, t, h.
+
+    extrapolates: stages weigh earlier ones by far more than 1, and their rounding with them."""
 
     name: str
     order: int
+    extrapolates: bool = False
     baumgarte: Baumgarte
 
     @abstractmethod

@@ -29,6 +29,7 @@ class RungeKutta(Integrator):
         self.baumgarte = baumgarte
         self.tableau = tableau
         self.order = tableau.order
+        self.extrapolates = any(abs(a) > 10 for row in tableau.a for a in row)
 
     def step(
         self,

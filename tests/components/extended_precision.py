@@ -8,7 +8,12 @@ mp.mp.dps = 60
 
 def numbers(linkage, q, qd, F):
     """All that the equations take, flat: (masses and points, q, qd, F), and how to name them."""
-    given = {"q": list(q), "qd": list(qd), "F": list(F), "op": linkage.operational_point.at or (0, 0)}
+    given = {
+        "q": list(q),
+        "qd": list(qd),
+        "F": list(F),
+        "op": linkage.operational_point.at or (0, 0),
+    }
     for b in linkage.body:
         given[b.name, "mass"] = [b.mass, b.inertia]
         given[b.name, "center"] = b.center or (0.0, 0.0)
@@ -106,15 +111,17 @@ def solution(linkage, given):
             K[i, j] = D[i, j]
     for r, loop in enumerate(linkage.loop):
         at = given["loop", r]
-        one, other = (found[name].at(at[2 * k : 2 * k + 2], qd) for k, name in enumerate(loop.bodies))
+        one, other = (
+            found[name].at(at[2 * k : 2 * k + 2], qd) for k, name in enumerate(loop.bodies)
+        )
         for k in range(2):
             right[n + 2 * r + k, 0] = other.bias[k] - one.bias[k]
             for i in range(n):
                 K[n + 2 * r + k, i] = one.J[i][k] - other.J[i][k]
                 K[i, n + 2 * r + k] = other.J[i][k] - one.J[i][k]
-    solved = mp.lu_solve_mat(K, right) if hasattr(mp, "lu_solve_mat") else K**-1 * right
+    solved = K**-1 * right
     mobility = [
-        [sum(hand.J[i][k] * solved[i, 1 + l] for i in range(n)) for l in range(3)] for k in range(3)
+        [sum(hand.J[i][k] * solved[i, 1 + j] for i in range(n)) for j in range(3)] for k in range(3)
     ]
     numbers = [[solved[i, 0] for i in range(n)], [solved[n + i, 0] for i in range(m)], mobility]
     return [np.array(v, dtype=object) for v in numbers]

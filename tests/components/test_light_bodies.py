@@ -1,0 +1,213 @@
+"""Light and massless bodies in loops, against one equation in SciPy and 60 digits in mpmath."""
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+import extended_precision as exact
+import numpy as np
+import pytest
+from blocks import Running
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mechanisms import five_bar, linkages
+from scipy.integrate import solve_ivp
+
+from hapticlink.components.blocks.virtual_environment import virtual_environment
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.component import Signals
+from hapticlink.components.dynamics.massless_bodies import MasslessError
+from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.variables import parameters
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs import (
+    Body,
+    Directions,
+    GraphicsCopy,
+    Joint,
+    Linkage,
+    Loop,
+    Mechanism,
+    OperationalPoint,
+)
+
+G, RATE = 9.81, 1000
+
+
+def trammel(sliders, turn=0.0, start=math.pi / 3):
+    """A rod of 1 m and 1 kg between two sliders (kg) on lines at right angles, turned as a whole;
+    `start` is the angle of the rod's middle about the crossing."""
+    c, s = math.cos(turn), math.sin(turn)
+    slider = {"mass": sliders, "inertia": 0.0}
+    return Linkage(
+        body=(
+            Body(name="slider_x", **slider),
+            Body(name="rod", mass=1.0, inertia=1 / 12, center=(0.5, 0.0)),
+            Body(name="slider_y", **slider),
+        ),
+        joint=(
+            Joint(name="x", type="prismatic", child="slider_x", axis=turn),
+            Joint(name="pin", parent="slider_x", child="rod"),
+            Joint(name="y", type="prismatic", child="slider_y", axis=turn + math.pi / 2),
+        ),
+        loop=(Loop(bodies=("rod", "slider_y"), at=((1.0, 0.0), (0.0, 0.0))),),
+        gravity=(G * s, -G * c),
+        operational_point=OperationalPoint(body="rod", at=(0.5, 0.0)),
+        start={"x": math.cos(start), "pin": turn + math.pi - start, "y": math.sin(start)},
+    )
+
+
+def pendulum(sliders, t_end, start=math.pi / 3):
+    """(angle, rate) of the rod's middle: (m/4 + I + m_s) angle'' = -(m/2 + m_s) g cos angle."""
+    pull, inertia = 0.5 + sliders, 1 / 4 + 1 / 12 + sliders
+
+    def f(_, y):
+        return y[1], -pull * G * math.cos(y[0]) / inertia
+
+    return solve_ivp(f, (0, t_end), (start, 0), "DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+
+
+@pytest.mark.parametrize(
+    ("sliders", "turn"),
+    [(1.0, 0.5), (1e-2, 0.5), (1e-4, 0.5), (1e-7, 0.5), (1e-12, 0.5), (0.0, 0.5), (0.0, 0.0)],
+)
+def test_trammel_with_sliders_of_any_mass(sliders, turn):
+    block = Running(virtual_mechanism(trammel(sliders, turn), Mechanism(), step_s=1 / RATE))
+    begin, change = block.y["energy"], 0.0
+    for k in range(3 * RATE):
+        block.step(1 / RATE)
+        if k % 50 == 0:
+            change = max(change, abs(block.y["energy"] - begin))
+    angle, rate = pendulum(sliders, 3.0)
+    middle = 0.5 * np.array([math.cos(angle + turn), math.sin(angle + turn)])
+    np.testing.assert_allclose(block.y["x"][:2], middle, rtol=0, atol=1e-11)
+    assert change < 1e-9
+    # Gravity, the centripetal force and the tangential one are all that the guides and the rod's
+    # inertia leave: the force of the cut pin along its guide moves the slider alone.
+    along = np.array([-math.sin(turn), math.cos(turn)])
+    pull, inertia = 0.5 + sliders, 1 / 4 + 1 / 12 + sliders
+    turned = -pull * G * math.cos(angle) / inertia
+    lift = math.cos(angle) * turned - math.sin(angle) * rate**2
+    force = sliders * (lift + G)
+    assert abs(along @ block.y["lambda"]) == pytest.approx(abs(force), rel=1e-7, abs=1e-9)
+
+
+def test_massless_sliders_leave_the_mobility_of_a_rod_on_its_circle():
+    """Lambda^-1 = J J'/(m/4 + I) with the one column of motion of the rod's middle."""
+    block = Running(virtual_mechanism(trammel(0.0), Mechanism(), Directions(), step_s=1 / RATE))
+    motion = np.array([-0.5 * math.sin(math.pi / 3), 0.5 * math.cos(math.pi / 3), -1.0])
+    mobility = np.outer(motion, motion) / (1 / 4 + 1 / 12)
+    np.testing.assert_allclose(block.y["Lambda_inv"], mobility, atol=1e-13)
+    assert block.y["n_constraints"] == 2
+
+
+def test_the_graphics_copy_has_massless_bodies_too():
+    copy = virtual_environment(trammel(0.0), GraphicsCopy(), Directions(), local_model=True)
+    block = Running(copy)
+    held = Running(virtual_mechanism(trammel(0.0), Mechanism(), step_s=1 / RATE, frame_s=1 / 30))
+    own = Running(virtual_mechanism(trammel(0.0), Mechanism(), step_s=1 / RATE))
+    held.set(**{name: block.y[name] for name in ("D", "W", "w", "J_h")})
+    for name in ("qdd", "lambda", "a_bias"):
+        np.testing.assert_allclose(held.y[name], own.y[name], rtol=1e-10, atol=1e-10)
+
+
+@st.composite
+def spread(draw):
+    """A random linkage, its masses and inertias each times 1e-12 to 1."""
+    linkage, q, qd = draw(linkages(max_bodies=6, max_loops=2))
+    rng = np.random.default_rng(draw(st.integers(0, 2**31)))
+    body = tuple(
+        replace(b, mass=b.mass * 10 ** rng.uniform(-12, 0), inertia=b.inertia * 10**i)
+        for b, i in zip(linkage.body, rng.uniform(-12, 0, len(linkage.body)), strict=True)
+    )
+    return replace(linkage, body=body), q, qd, rng
+
+
+@settings(max_examples=20, deadline=None)
+@given(spread())
+def test_random_linkages_are_as_exact_as_their_last_digits(drawn):
+    """The error is within 1000 times of what a change of every length, angle, rate, mass and
+    force in its last place makes of the exact solution; each in the largest entry."""
+    linkage, q, qd, rng = drawn
+    F = rng.normal(size=3)
+    given_numbers = exact.numbers(linkage, q, qd, F)
+    solution = exact.solution(linkage, given_numbers)
+    near = [exact.solution(linkage, exact.disturbed(given_numbers, rng)) for _ in range(3)]
+    for k, mine in enumerate(ours(linkage, q, qd, F)):
+        right = solution[k]
+        error = np.abs(mine.reshape(right.shape) - right).max(initial=0)
+        inherent = max(np.abs(other[k] - right).max(initial=0) for other in near)
+        assert error <= 1000 * inherent + 1e-15 * np.abs(right).max(initial=0)
+
+
+def ours(linkage, q, qd, F):
+    variables = parameters(linkage)
+    p, n = Signals("p", variables), len(q)
+    symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
+    model = LinkageModel(linkage, p, *symbols)
+    space = OperationalSpace(model)
+    found = [*space.motion(model.J_h.T @ ca.DM(F)), space.Lambda_inv]
+    f = ca.Function("f", [*symbols, p.vector], found)
+    return [np.array(v) for v in f(q, qd, [s for v in variables for s in v.starts])]
+
+
+def four_bar(*masses):
+    """Crank .2, coupler .5, rocker .4, ground .5 m, uniform rods under gravity."""
+    lengths = {"crank": 0.2, "coupler": 0.5, "rocker": 0.4}
+    return Linkage(
+        body=tuple(
+            Body(name=name, mass=m, inertia=m * x**2 / 12, center=(x / 2, 0.0))
+            for m, (name, x) in zip(masses, lengths.items(), strict=True)
+        ),
+        joint=(
+            Joint(name="crank", child="crank"),
+            Joint(name="elbow", parent="crank", child="coupler", at_parent=(0.2, 0.0)),
+            Joint(name="rocker", child="rocker", at_parent=(0.5, 0.0)),
+        ),
+        loop=(Loop(bodies=("coupler", "rocker"), at=((0.5, 0.0), (0.4, 0.0))),),
+        gravity=(0.0, -G),
+        operational_point=OperationalPoint(body="coupler", at=(0.25, 0.0)),
+        start={"crank": 1.0, "elbow": -0.6, "rocker": 1.5},
+        start_velocity={"crank": 3.0},
+    )
+
+
+@pytest.mark.parametrize("formulation", ["multipliers", "partitioning", "embedding"])
+def test_massless_coupler_is_the_limit_of_light_ones(formulation):
+    """Also that of embedding, whose inertia G' D G never sees the coupler by itself."""
+    ends = []
+    for coupler in (0.0, 1e-13):
+        mechanism = Mechanism(formulation=formulation, integrator="dormand-prince-8")
+        block = Running(virtual_mechanism(four_bar(1.0, coupler, 1.0), mechanism, step_s=1 / RATE))
+        for _ in range(RATE // 2):
+            block.step(1 / RATE)
+        ends.append(block.x)
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
+    assert block.y["closure_error"] < 1e-14
+
+
+@pytest.mark.parametrize("loops", [True, False])
+def test_a_massless_body_that_is_free_is_refused_by_name(loops):
+    """At the end of an open chain, and two links of a five-bar, which has two freedoms."""
+    linkage = (
+        replace(five_bar(m=(0, 0, 0, 1), I=(0, 0, 0, 1e-4)))
+        if loops
+        else replace(four_bar(1.0, 0.0, 1.0), loop=())
+    )
+    name = "link[123]" if loops else "coupler"
+    with pytest.raises(MasslessError, match=f"body `{name}` has mass and inertia 0"):
+        virtual_mechanism(linkage, Mechanism(), step_s=1 / RATE)
+
+
+def test_a_dead_centre_that_nothing_with_mass_carries_ends_the_run_by_name():
+    """The rocker comes to its end with speed, the massless crank would have to turn infinitely
+    fast: energy is kept until then, and a state of the crank or coupler is no number after."""
+    component = virtual_mechanism(four_bar(0.0, 0.0, 1.0), Mechanism(), step_s=1 / RATE)
+    assert "massless body `crank`" in component.state_texts[0]
+    block = Running(component)
+    begin = block.y["energy"]
+    while np.isfinite(block.x).all():
+        assert block.y["energy"] == pytest.approx(begin, abs=0.1)
+        block.step(1 / RATE)
+        assert block.t < 0.4
+    assert not np.isfinite(block.state["q"][:2]).all()
