@@ -12,9 +12,9 @@ beside light ones counts as much as they do, in whatever frame. Where an eigenva
 scaled, is below mu its direction is cut: the closure does not act along it. Which mu is right near
 a singular pose depends on the right-hand side. W D^-1 b lies in the range of W by construction, and
 cutting it lets the linkage go with the acceleration that b alone would give: there mu is zero, and
-pivots of S have a floor at its rounding instead, which redundant closures rest on. c = -Wdot qd does so only for rates on
-the branch; what the rates are off is divided by sigma. `follow` therefore cuts c early, and is for
-accelerations that are integrated.
+pivots of S have a floor at its rounding instead, which redundant closures rest on. c = -Wdot qd
+does so only for rates on the branch; what the rates are off is divided by sigma. `follow` therefore
+cuts c early, and is for accelerations that are integrated.
 """
 
 from __future__ import annotations
