@@ -73,6 +73,15 @@ def test_slider_crank_places_its_piston():
     assert crank > 4 * math.pi
 
 
+def test_trammel_draws_an_ellipse_with_massless_blocks():
+    """A quarter of the rod from the block on x: (x/.75)^2 + (y/.25)^2 = 1, without loss."""
+    block = running("trammel")
+    begin = block.y["energy"]
+    for y in motion(block, 3.0):
+        assert math.hypot(y["x"][0] / 0.75, y["x"][1] / 0.25) == pytest.approx(1, abs=1e-12)
+    assert y["energy"] == pytest.approx(begin, abs=1e-8)
+
+
 def test_six_bar_draws_the_output_of_its_coupler_point():
     block = running("six-bar")
     for y in motion(block, 1.0):

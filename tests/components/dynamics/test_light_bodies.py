@@ -4,15 +4,13 @@ import math
 from dataclasses import replace
 
 import casadi as ca
-import extended_precision as exact
 import numpy as np
 import pytest
-from blocks import Running
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mechanisms import five_bar, linkages
 from scipy.integrate import solve_ivp
 
+import tests.components.dynamics.extended_precision as exact
 from hapticlink.components.blocks.virtual_environment import virtual_environment
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Signals
@@ -30,6 +28,8 @@ from hapticlink.components.specs import (
     Mechanism,
     OperationalPoint,
 )
+from tests.blocks import Running
+from tests.mechanisms import five_bar, linkages
 
 G, RATE = 9.81, 1000
 
