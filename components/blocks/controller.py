@@ -70,7 +70,7 @@ def _gains(
     if spec.stiffness is not None:
         gains += [
             Variable("K_d", (3,), STIFFNESS, spec.stiffness, "desired stiffness"),
-            Variable("x_ref", (3,), POSE, 0.0, "pose about which K_d acts"),
+            Variable("x_ref", (3,), POSE, 0.0, "pose about which K_d acts", "fixed"),
         ]
     if spec.teleoperation:
         K_pc, B_pc = spec.teleoperation.stiffness, spec.teleoperation.damping

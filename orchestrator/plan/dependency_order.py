@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.system.ports import derivative
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
@@ -24,18 +27,27 @@ def groups(system: System, units: Iterable[Fmu]) -> list[list[Fmu]]:
 
 
 def direct(system: System, units: Iterable[Fmu]) -> dict[str, set[str]]:
-    """By unit: those of `units` that one of its outputs depends on directly (ModelStructure, FMI
-    2.0.5 section 2.2.8)."""
+    """By unit: those of `units` that an output of it which is read depends on directly
+    (ModelStructure, FMI 2.0.5 section 2.2.8)."""
     names = {u.name for u in units}
     return {
         u.name: {
             c.source
             for c in system.into(u.name)
             if c.source in names
-            and any(u.description.follows(y, c.inputs) for y in u.description.outputs)
+            and any(u.description.follows(y, c.inputs) for y in _read(system, u))
         }
         for u in units
     }
+
+
+def _read(system: System, unit: Fmu) -> Iterator[Scalar]:
+    """The outputs that a connection carries, or whose samples its hold takes as derivatives."""
+    for c in system.out_of(unit.name):
+        yield from c.outputs
+        slope = derivative(c, system.fmu)
+        if slope and c.hold and HOLDS[c.hold].needs == "derivative":
+            yield from unit.description.port(slope, "output")
 
 
 def plants(system: System, units: Iterable[Fmu]) -> Iterator[list[Fmu]]:

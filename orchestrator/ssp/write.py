@@ -22,6 +22,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import fmu_rates
 from hapticlink.orchestrator.scene.rates import AnyRate
+from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,
@@ -65,7 +66,7 @@ def structure(scene: Scene, system: System) -> bytes:
     for unit in system.fmus:
         _component(elements, unit)
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
-    lines = [c for c in system.connections if not c.initial]
+    lines = [c for c in system.connections if not c.to_parameter]
     if lines:
         connections = SubElement(top, f"{{{SSD}}}Connections")
     for c in lines:
@@ -155,9 +156,14 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
         | ({"isolate": True} if u.isolate else {})
         for u in system.fmus
     }
-    found["connection"] = [_row(c) for c in system.connections if c.initial]
+    wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
+    found["connection"] = [_row(c, wires.get(c.name)) for c in system.connections if c.to_parameter]
     return found
 
 
-def _row(c: Connection) -> dict[str, str]:
-    return {"from": f"{c.source}.{c.source_port}", "to": f"{c.target}.{c.target_port}"}
+def _row(c: Connection, wire: Wire | None) -> dict[str, Any]:
+    """As a [[connection]]; its own hold is among [holds]."""
+    row = {"from": f"{c.source}.{c.source_port}", "to": f"{c.target}.{c.target_port}"}
+    if not wire:
+        return row
+    return row | {"factor": wire.factor, "offset": wire.offset, "convert": wire.convert}

@@ -46,8 +46,12 @@ def assign(
     assigned = tuple(_assign(connections, by_name, timeline, rules, refused))
     assigned = tuple(_with_springs(assigned, by_name, rules, refused))
     if rules.hold not in {c.hold for c in assigned}:
-        # A default that fits nowhere is a mistake where it needs something that is nowhere.
-        refused = [replace(r, key=r.key or "hold") for r in refused]
+        # A default that fits nowhere is a mistake where it needs something that is nowhere. Between
+        # iterated plants it was the interpolation that did not fit, and that gives way.
+        refused = [
+            r if r.key or _between_plants(r.connection, by_name) else replace(r, key="hold")
+            for r in refused
+        ]
     return assigned, tuple(refused)
 
 

@@ -40,7 +40,8 @@ class Fmu:
 class Connection:
     """A vector from one FMU's outputs to another's inputs; hold is None within one rate.
 
-    A connection to parameters (`initial`) is made once, in initialisation.
+    A connection to parameters acts at each communication point where they are tunable, else once,
+    in initialisation (`initial`; FMI 2.0.5 section 2.2.7).
     """
 
     source: str
@@ -58,8 +59,12 @@ class Connection:
         return f"{self.source}.{self.source_port} -> {self.target}.{self.target_port}"
 
     @property
-    def initial(self) -> bool:
+    def to_parameter(self) -> bool:
         return self.inputs[0].causality == "parameter"
+
+    @property
+    def initial(self) -> bool:
+        return self.to_parameter and self.inputs[0].variability != "tunable"
 
 
 @dataclass(frozen=True)

@@ -141,3 +141,14 @@ def test_limit_of_stability_to_one_percent(
         for part in (Fraction(99, 100), Fraction(101, 100))
     )
     assert below < 1 < above
+
+
+def test_an_output_that_nobody_reads_makes_no_order(fmus: Fmus, tmp_path: Path) -> None:
+    """`one.a` follows the force and is not connected: whatever the order of the file, `one` steps
+    first, with the limit of that order (.0569 the other way round)."""
+    turned = dict(reversed(fmus.items()))
+    below, above = (
+        growth(turned, tmp_path, Fraction(step), "foh", 8, 500, coupling="gauss-seidel-plants")
+        for step in (".0755", ".0771")
+    )
+    assert below < 1 < above

@@ -258,6 +258,21 @@ def test_a_ring_of_direct_dependencies_is_named(tmp_path: Path) -> None:
         list(delays(Plan(made)))
 
 
+def test_a_ring_opens_where_only_unread_outputs_are_direct(tmp_path: Path) -> None:
+    """b.y follows b.u at once, but only b.z is read: z_{k+1} = y_{k-1}, y_k = 2 z_k + 1."""
+    parts = described([gain("a", 2.0, 1.0, "sampled"), gain("b", 3.0, 0.0, "sampled")], tmp_path)
+    rows = [("a.y", "b.u"), ("a.y", "b.w"), ("b.z", "a.u")]
+    outcome, table = simulate(
+        system(parts, rows, "gauss-seidel", Fraction(1), Fraction(8)), tmp_path
+    )
+    assert outcome.fault is None
+    z = [0.0, 1.0]
+    for k in range(2, 9):
+        z.append(2 * z[k - 2] + 1)
+    assert table["b.z"].tolist() == z
+    assert table["a.y"].tolist() == [2 * value + 1 for value in z]
+
+
 # --- as a scene ---------------------------------------------------------------------------
 
 SCENE = """
@@ -291,6 +306,23 @@ def test_a_scene_is_iterated_as_it_says(fmus: Fmus, tmp_path: Path) -> None:
     assert found["iterations"]["steps"] == 50
     assert found["iterations"]["rollbacks"] > 0
     assert found["iterations"]["jacobians"] >= 1
+
+
+def test_hermite_gives_way_where_a_source_has_no_derivative(tmp_path: Path) -> None:
+    """No connection of this scene takes `hold`, so it is not `hold` that does not fit."""
+    bare = described((oscillator.one(), oscillator.two()), tmp_path)
+    settings = (
+        'iteration = { method = "newton", interpolation = "hermite", tolerance = 1e-10 }\n'
+        "substeps = { one = 4, two = 4 }"
+    )
+    results = experiment.simulate(scene(bare, "iterated", settings), tmp_path / "out").results
+    assert results.run["fault"] is None
+    assert results.run["holds"] == {
+        "two.F -> one.F": "foh",
+        "one.x -> two.x1": "hermite",
+        "one.v -> two.v1": "hermite",
+    }
+    assert error(results.haptics) < 2e-3
 
 
 @pytest.mark.parametrize(("method", "tolerance"), [("doubling", 0.3), ("ecco", 1e-3)])
