@@ -1,34 +1,61 @@
-"""A scene by its name or path: a shipped one, a TOML file, an SSP."""
+"""A scene by its name or path: a shipped one, a TOML file, an SSP; or with further options."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 from hapticlink.orchestrator.base.faults import Finding, SceneFault
 from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find import find, folder_of
-from hapticlink.orchestrator.scene.load import from_tables, read
-from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.load import from_source
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene, adapter
+from hapticlink.orchestrator.scene.source import Source
 
 
-def load(scene: str, options: Sequence[str] = ()) -> Scene:
-    """Find, change by `options` (`key=value`) and check a scene: a file, a shipped one, an SSP."""
+def load(scene: str | FilePath | Scene, options: Options = ()) -> Scene:
+    """Find, change by `options` and check a scene: a file, a shipped one, an SSP. A Scene that was
+    read from one is read again with its own options and those given; one that was made or changed
+    in Python is checked. Raises SceneFault with every finding, InputFault for an option that cannot
+    be applied."""
+    further = overrides.written(options)
+    if isinstance(scene, Scene) and scene.source and not further:
+        return scene
+    source = _of(scene) if isinstance(scene, Scene) else _find(str(scene))
+    source = replace(source, options=(*source.options, *further))
+    if source.name.endswith(".ssp"):
+        _check_ssp(source)
+    return from_source(source)
+
+
+def _find(scene: str) -> Source:
     if scene.endswith(".ssp"):
         # Its XML parsers take a while to load.
-        from hapticlink.orchestrator.ssp import names
         from hapticlink.orchestrator.ssp import read as ssp
 
-        data = ssp.tables(FilePath(scene))
-        keys = {overrides.parse(o)[0] for o in options}
-        needed = [("duration", "3")] * ("duration" not in data)
-        needed += [("haptics.rate", "100")] * ("haptics" not in data)
-        if fixed := sorted(k for k in keys if names.is_fixed(k)):
-            say = "the FMUs of an SSP are made: change its scene and export that again"
-            raise SceneFault(scene, [Finding(".".join(k), say) for k in fixed])
-        if missing := [n for n in needed if tuple(n[0].split(".")) not in keys]:
-            say = "neither it nor its FMUs' DefaultExperiment say: give e.g. --set {}={}"
-            raise SceneFault(scene, [Finding(key, say.format(key, v)) for key, v in missing])
-        return from_tables(data, options, scene, {})
+        return Source(scene, ssp.tables(FilePath(scene)), {})
     name, text = find(scene)
-    return read(text, options, name, folder_of(scene))
+    return Source(name, *document(text, name, folder_of(scene)))
+
+
+def _of(scene: Scene) -> Source:
+    if scene.source:
+        return scene.source
+    tables = adapter().dump_python(scene, mode="json", by_alias=True, exclude_none=True)
+    return Source(scene.title, tables, {})
+
+
+def _check_ssp(source: Source) -> None:
+    from hapticlink.orchestrator.ssp import names
+
+    keys = {overrides.parse(o)[0] for o in source.options}
+    needed = [("duration", "3")] * ("duration" not in source.tables)
+    needed += [("haptics.rate", "100")] * ("haptics" not in source.tables)
+    if fixed := sorted(k for k in keys if names.is_fixed(k)):
+        say = "the FMUs of an SSP are made: change its scene and export that again"
+        raise SceneFault(source.name, [Finding(".".join(k), say) for k in fixed])
+    if missing := [n for n in needed if tuple(n[0].split(".")) not in keys]:
+        say = "neither it nor its FMUs' DefaultExperiment say: give e.g. --set {}={}"
+        raise SceneFault(source.name, [Finding(key, say.format(key, v)) for key, v in missing])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
@@ -90,17 +90,18 @@ def energies(system: System, booked: Mapping[str, Energy]) -> dict[str, Any]:
     }
 
 
-def _story(scene: Scene, system: System, options: Sequence[str]) -> dict[str, Any]:
+def _story(scene: Scene, system: System) -> dict[str, Any]:
     base = system.timeline.base
     return {
         "scene": asdict(scene),
-        "options": list(options),
+        "options": list(scene.source.options) if scene.source else [],
         "versions": {name: version(name) for name in (*PACKAGES, *_compilers(scene))}
         | {"python": platform.python_version()},
         "seeds": _seeds(scene, system),
         "files": ["run.json", *(f"{c.name}.csv" for c in system.timeline.clocks)],
         "rates": [c.name for c in system.timeline.clocks],
         "clocks": clocks(system.timeline),
+        "stop_when": str(system.ends_when or ""),
         "base": f"{base.numerator}/{base.denominator} s",
         "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.fmus},
         "coupling": system.coupling,

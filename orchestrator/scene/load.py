@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -15,7 +16,8 @@ from hapticlink.orchestrator.scene import checks, families, overrides
 from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
 from hapticlink.orchestrator.scene.frame_trace import frame_times
 from hapticlink.orchestrator.scene.scene import Scene, adapter
-from hapticlink.orchestrator.scene.toml_keys import Path, Place, flat, flatten, place_of
+from hapticlink.orchestrator.scene.source import Source
+from hapticlink.orchestrator.scene.toml_keys import Path, flat, flatten, place_of
 from hapticlink.orchestrator.scene.validation_errors import beyond, problems
 
 
@@ -24,14 +26,13 @@ def read(
 ) -> Scene:
     """The scene that `text` writes, its relative paths from `folder`. Raises SceneFault with every
     finding, InputFault for an option that cannot be applied."""
-    data, places = document(text, name, folder)
-    return from_tables(data, options, name, places)
+    return from_source(Source(name, *document(text, name, folder), tuple(options)))
 
 
-def from_tables(
-    data: dict[str, Any], options: Sequence[str], name: str, places: Mapping[Path, Place]
-) -> Scene:
-    """The scene of the tables `data`, whose keys stand at `places`; faults as of `read`."""
+def from_source(source: Source) -> Scene:
+    """The scene of the tables of `source` with its options; faults as of `read`."""
+    data, options = deepcopy(dict(source.tables)), source.options
+    name, places = source.name, source.places
     which = [o for o in options if families.is_argument(overrides.parse(o)[0])]
     set_by = {overrides.apply(data, option): option for option in which}
     data = with_family(data, name, places, set_by)
@@ -69,6 +70,7 @@ def from_tables(
     if found.device and found.device.sensing != found.sensing:
         found = replace(found, device=replace(found.device, sensing=found.sensing))
     object.__setattr__(found, "_place", place)
+    object.__setattr__(found, "_source", source)
     return found
 
 

@@ -2,11 +2,54 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
 from typing import Any
 
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.scene.toml_keys import ASSIGNMENT, Path, parts, whole
+
+Options = Mapping[str, Any] | Sequence[str]
+"""Dotted keys with their Python values, or `key=value` as on the command line."""
+
+
+def written(options: Options) -> tuple[str, ...]:
+    """The options as `key=value`. Raises InputFault for a value that TOML cannot write."""
+    if isinstance(options, str):
+        raise InputFault(f"options {options!r}: give a mapping, or a list of key=value")
+    if not isinstance(options, Mapping):
+        return tuple(options)
+    return tuple(f"{key}={text(value, key)}" for key, value in options.items())
+
+
+def text(value: Any, key: str) -> str:
+    """A Python value of `key` as `parse` reads it back; words go without quotes."""
+    if isinstance(value, str):
+        try:
+            tomllib.loads(f"value = {value}")
+        except tomllib.TOMLDecodeError:
+            if value == value.strip():
+                return value
+    return _toml(value, key)
+
+
+def _toml(value: Any, key: str) -> str:
+    if hasattr(value, "tolist"):  # of NumPy
+        value = value.tolist()
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, str | PurePath):
+        return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Mapping):
+        entries = (f"{_toml(str(k), key)} = {_toml(v, key)}" for k, v in value.items())
+        return f"{{ {', '.join(entries)} }}"
+    if isinstance(value, list | tuple | range):
+        return f"[{', '.join(_toml(v, key) for v in value)}]"
+    raise InputFault(f"{key}: {value!r} is no value of a scene; give a number, text, list or table")
 
 
 def parse(option: str) -> tuple[tuple[str, ...], Any]:

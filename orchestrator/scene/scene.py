@@ -36,6 +36,7 @@ from hapticlink.orchestrator.scene.records import (
     StepControl,
     Wire,
 )
+from hapticlink.orchestrator.scene.source import Source
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,6 +165,15 @@ class Scene:
     def place(self) -> Callable[[tuple[str | int, ...], str], Finding]:
         """Makes a finding at a path of the scene; where it was read from a file, with its line."""
         return self.__dict__.get("_place", unplaced)
+
+    @property
+    def source(self) -> Source | None:
+        """What it was read from; None where it was made or changed in Python."""
+        return self.__dict__.get("_source")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the way back to the file's lines, which no other process takes."""
+        return {key: value for key, value in self.__dict__.items() if key != "_place"}
 
     @property
     def ends_when(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
@@ -21,7 +21,7 @@ from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.run_json import PACKAGES
 from hapticlink.orchestrator.scene.scene import Scene
 
-APART = frozenset({"commands", "report", "study"})
+APART = frozenset({"api", "commands", "report", "study"})
 """Folders of the orchestrator that no run depends on."""
 
 
@@ -35,7 +35,9 @@ class Job:
     refusal: str = ""
 
 
-def jobs(scene: str, options: Sequence[str], points: Iterable[Mapping[str, str]]) -> list[Job]:
+def jobs(
+    scene: str | Path | Scene, options: Sequence[str], points: Iterable[Mapping[str, str]]
+) -> list[Job]:
     """The jobs of `points`, each over `scene` with the common `options`.
 
     A point that gives no scene is a job that is refused; where every one does, InputFault.
@@ -46,11 +48,10 @@ def jobs(scene: str, options: Sequence[str], points: Iterable[Mapping[str, str]]
     return made
 
 
-def job(scene: str, options: Sequence[str], point: Mapping[str, str]) -> Job:
+def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, str]) -> Job:
     """The job of `scene` with `options`, told in the table as `point`."""
     try:
-        # A copy leaves behind the way back to the file's lines, which no other process takes.
-        found = replace(open_scene.load(scene, options))
+        found = open_scene.load(scene, options)
         return Job(point, found, key(found))
     except Fault as fault:
         return Job(point, None, refusal=str(fault))

@@ -1,0 +1,96 @@
+"""Options as Python values, of scenes by name and of Scene objects alike."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.find import shipped
+from tests.orchestrator.conftest import BAR
+
+SCALARS = (
+    st.booleans()
+    | st.integers()
+    | st.floats(allow_nan=False)
+    | st.text(st.characters(exclude_categories=("Cs",)))
+)
+VALUES = st.recursive(
+    SCALARS, lambda v: st.lists(v) | st.dictionaries(st.text("abc. \"'=", min_size=1), v)
+)
+
+
+@given(VALUES)
+def test_a_value_comes_back_from_its_text(value: Any) -> None:
+    (option,) = overrides.written({"a.b": value})
+    assert overrides.parse(option) == (("a", "b"), value)
+
+
+def test_words_numbers_and_arrays_are_written_as_on_the_command_line() -> None:
+    given = {
+        "hold": "foh", "graphics.rate": 10, "controller.topology": False, "title": "1",
+        "hand.wrench": np.array([0.1, 0, 2]), "controller.damping": (1, np.float64(2), 3.5),
+        "phases": {"hand": Path("a")},
+    }  # fmt: skip
+    assert overrides.written(given) == (
+        "hold=foh", "graphics.rate=10", "controller.topology=false", 'title="1"',
+        "hand.wrench=[0.1, 0.0, 2.0]", "controller.damping=[1, 2.0, 3.5]",
+        'phases={ "hand" = "a" }',
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("value", [None, object(), b"10", {1, 2}, [None]])
+def test_what_no_scene_can_hold_is_refused(value: object) -> None:
+    with pytest.raises(InputFault, match=r"graphics\.rate: .* is no value of a scene"):
+        overrides.written({"graphics.rate": value})
+
+
+def test_one_text_is_no_list_of_options() -> None:
+    with pytest.raises(InputFault, match="give a mapping, or a list"):
+        overrides.written("graphics.rate=10")
+
+
+def test_a_scene_object_takes_options_as_its_name_does(tmp_path: Path) -> None:
+    (tmp_path / "bar.toml").write_text(BAR)
+    more = {"haptics.rate": 100, "linkage.body.bar.mass": 2.0}
+    wanted = open_scene.load(tmp_path / "bar.toml", {"duration": 0.1, **more})
+    read = open_scene.load(tmp_path / "bar.toml", {"duration": 0.1})
+    found = open_scene.load(read, more)
+    assert found == wanted
+    assert found.source == wanted.source
+    assert read.haptics.rate == 512
+    assert open_scene.load(read) is read
+    # A family is written out again, which the records alone could not do.
+    chain = open_scene.load(open_scene.load("n-four-bar"), {"linkage.n": 2})
+    assert chain.linkage == open_scene.load("n-four-bar", ["linkage.n=2"]).linkage
+
+
+def test_faults_of_a_scene_object_name_option_and_line(tmp_path: Path) -> None:
+    (tmp_path / "bar.toml").write_text(BAR.replace("0.25", "0.25\nhold = 'foh'"))
+    read = open_scene.load(tmp_path / "bar.toml")
+    with pytest.raises(SceneFault) as refused:
+        open_scene.load(read, {"linkage.body.bar.mass": "heavy"})
+    assert "--set linkage.body.bar.mass=heavy: linkage.body[0] (bar).mass" in str(refused.value)
+    found = open_scene.load(read, {"duration": 1.0}).place(("hold",), "wrong")
+    assert (found.line, found.key) == (3, "hold")
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_a_scene_is_read_again_from_its_records(name: str) -> None:
+    read = open_scene.load(name)
+    made = replace(read, title="made in Python")
+    assert made.source is None
+    again = open_scene.load(made, {"title": read.title})
+    assert again == read
+
+
+def test_a_scene_made_in_python_is_checked() -> None:
+    made = replace(open_scene.load("five-bar"), hold="zho")
+    with pytest.raises(SceneFault, match="no hold 'zho'; did you mean 'zoh'"):
+        open_scene.load(made)
