@@ -21,6 +21,7 @@ from typing import Literal
 import casadi as ca
 
 from hapticlink.components.ports import Kind, Power, Spring
+from hapticlink.components.time_tables import TimeTable
 
 Timing = Literal["continuous", "sampled"]
 Variability = Literal["fixed", "tunable"]
@@ -155,6 +156,7 @@ class Component:
     substeps: int = 1
     documentation: str = ""
     springs: tuple[Spring, ...] = ()
+    tables: tuple[TimeTable, ...] = ()
     state_notes: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
@@ -191,10 +193,11 @@ class Block:
         self.t = ca.SX.sym("t")
         self.h = ca.SX.sym("h")
 
-    def ode(self, derivative: Mapping[str, ca.SX]) -> ca.Function:
-        """(x, u, p, t) -> dx/dt, for an integrator."""
+    def ode(self, derivative: Mapping[str, ca.SX], further: ca.SX | None = None) -> ca.Function:
+        """(x, (u, further), p, t) -> dx/dt, for an integrator."""
         xdot = pack(self.x.variables, derivative)
-        arguments = [self.x.vector, self.u.vector, self.p.vector, self.t]
+        u = self.u.vector if further is None else ca.vertcat(self.u.vector, further)
+        arguments = [self.x.vector, u, self.p.vector, self.t]
         return ca.Function("ode", arguments, [xdot], ["x", "u", "p", "t"], ["xdot"])
 
     def component(
@@ -211,8 +214,10 @@ class Block:
         state_notes: Mapping[str, str] | None = None,
         springs: Iterable[Spring] = (),
         shared: bool = False,
+        tables: Iterable[TimeTable] = (),
     ) -> Component:
-        """step and output are expressions in this block's symbols; initial in u and p only.
+        """step and output are expressions in this block's symbols; initial in u and p only. tables
+        are those that they look up.
 
         shared: step and initial are built of functions whose common terms are shared already;
         looking again costs most of the build of a large graph.
@@ -246,4 +251,5 @@ class Block:
             documentation=documentation,
             state_notes=state_notes or {},
             springs=tuple(springs),
+            tables=tuple(tables),
         )

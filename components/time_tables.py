@@ -1,35 +1,98 @@
-"""Signals of time from a table."""
+"""Signals of time from rows (time, values...), linear between rows, the ends held.
+
+The rows are data, not terms of a graph: a graph calls a look-up, which takes log2 of their number
+of comparisons. At an instant it gives y(t) and the rate of the segment that begins there. A method
+that steps over [t, t + h] takes the quadratic through y(t), y(t + h/2) and y(t + h) instead, with
+s = (time - t)/h:
+
+    y = y_0 + s (3 d_1 - d_2) + 2 s^2 (d_2 - d_1),   d_1 = y_{1/2} - y_0,  d_2 = y_1 - y_{1/2}
+
+It is the table itself where its rows meet the ends of steps, so that a method keeps its order. A
+row within a step leaves order 2: the rate's integral over the step is right, not its jump.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
+import hashlib
+from collections.abc import Iterable, Sequence
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+Rows = Sequence[tuple[float, ...]]
 
 
-def interpolate(table: Sequence[tuple[float, ...]], t: ca.SX, name: str) -> ca.SX:
-    """Value at t of rows (time, values...): linear between rows, the ends held.
+class TimeTable:
+    """Raises ValueError, with `name`, for an empty table, for numbers that are not finite and for
+    times that do not increase."""
 
-    y_0 + sum over i of (y_i+1 - y_i) clip((t - t_i)/(t_i+1 - t_i), 0, 1).
-    Raises ValueError, with `name`, for an empty table and for times that do not increase.
-    """
-    if not table:
+    def __init__(self, rows: Rows, name: str) -> None:
+        data = _checked(rows, name)
+        self.rows, self.size = rows, data.shape[1] - 1
+        self.called = f"table_{hashlib.sha256(data.tobytes()).hexdigest()[:16]}"
+        if len(rows) > 1:
+            times, values = data[:, 0].tolist(), data[:, 1:].ravel().tolist()
+            how = {"lookup_mode": ["binary"]}
+            self._value = ca.interpolant(self.called, "linear", [times], values, how)
+            self._rate = self._value.jacobian()
+
+    def value(self, t: ca.SX) -> ca.SX:
+        """y at t, k x 1."""
+        if len(self.rows) == 1:
+            return ca.SX(ca.DM(self.rows[0][1:]))
+        return self._value(ca.fmin(ca.fmax(t, self.rows[0][0]), self.rows[-1][0]))
+
+    def at(self, t: ca.SX) -> ca.SX:
+        """(y, y') at t, 2k x 1; at a row's time y' is that of the segment which begins there."""
+        rate = ca.SX(self.size, 1)
+        if len(self.rows) > 1:
+            inside = ca.logic_and(t >= self.rows[0][0], t < self.rows[-1][0])
+            rate = ca.if_else(inside, self._rate(t, ca.SX(self.size, 1)), 0)
+        return ca.vertcat(self.value(t), rate)
+
+    def over(self, t: ca.SX, h: ca.SX) -> ca.SX:
+        """Coefficients of the quadratic in (time - t) over [t, t + h], 3k x 1."""
+        start, middle, end = (self.value(t + c * h) for c in (0, 0.5, 1))
+        first, second = middle - start, end - middle
+        return ca.vertcat(start, (3 * first - second) / h, 2 * (second - first) / h**2)
+
+
+def _checked(rows: Rows, name: str) -> NDArray[np.float64]:
+    if not rows:
         raise ValueError(f"`{name}`: the table has no rows; give at least one")
-    value = ca.SX(ca.DM(table[0][1:]))
-    for i, ((t0, *y0), (t1, *y1)) in enumerate(pairwise(table), start=2):
-        if not t1 > t0:
-            raise ValueError(
-                f"`{name}`: row {i} at t = {t1} s does not come after {t0} s; sort the rows by time"
-            )
-        value += (ca.DM(y1) - ca.DM(y0)) * ca.fmin(1, ca.fmax(0, (t - t0) / (t1 - t0)))
-    return value
+    data = np.array(rows, dtype="<f8")
+    for i in np.flatnonzero(~np.isfinite(data).all(axis=1)).tolist():
+        raise ValueError(f"`{name}`: row {i + 1} is {rows[i]}; give finite numbers")
+    for i in np.flatnonzero(np.diff(data[:, 0]) <= 0).tolist():
+        raise ValueError(
+            f"`{name}`: row {i + 2} at t = {rows[i + 1][0]} s does not come after {rows[i][0]} s; "
+            "sort the rows by time"
+        )
+    return data
 
 
-def slope(table: Sequence[tuple[float, ...]], t: ca.SX) -> ca.SX:
-    """Rate of `interpolate` at t; at a row's time that of the segment which begins there."""
-    rate = ca.SX(len(table[0]) - 1, 1)
-    for (t0, *y0), (t1, *y1) in pairwise(table):
-        inside = ca.logic_and(t >= t0, t < t1)
-        rate += ca.if_else(inside, (ca.DM(y1) - ca.DM(y0)) / (t1 - t0), 0)
-    return rate
+def at(tables: Iterable[TimeTable], t: ca.SX) -> ca.SX:
+    """(y, y') of each table at t, stacked."""
+    return ca.vertcat(*(table.at(t) for table in tables))
+
+
+def over(tables: Iterable[TimeTable], t: ca.SX, h: ca.SX) -> ca.SX:
+    """t and the quadratics of each table over [t, t + h], stacked: what `within` takes."""
+    return ca.vertcat(t, *(table.over(t, h) for table in tables))
+
+
+def within(tables: Iterable[TimeTable], over: ca.SX, t: ca.SX) -> ca.SX:
+    """As `at`, from the quadratics of the step that t is in."""
+    s, found, place = t - over[0], [], 1
+    for table in tables:
+        k = table.size
+        start, first, second = (over[place + i * k : place + (i + 1) * k] for i in range(3))
+        found += [start + s * (first + s * second), first + 2 * s * second]
+        place += 3 * k
+    return ca.vertcat(*found)
+
+
+def size_over(tables: Iterable[TimeTable]) -> int:
+    """Entries of `over`."""
+    return 1 + sum(3 * table.size for table in tables)

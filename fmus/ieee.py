@@ -1,16 +1,18 @@
 """Scalar functions with the IEEE 754 results of C, where Python's `math` raises.
 
 1/0 is inf, log(-1) is nan, exp(1000) is inf. This file's text is put before generated
-straight-line code, which must run without this package: it needs only `math`.
+straight-line code, which must run without this package: it needs only the standard library.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
 from math import asinh, atan, atan2, copysign, erf, fabs, inf, isnan, nan, tanh  # noqa: F401
 
 Function = Callable[..., float]
+LookUp = Callable[[float], list[float]]
 
 
 def div(a: float, b: float) -> float:
@@ -126,3 +128,24 @@ def erfinv(a: float) -> float:
     for _ in range(2):
         y = y - (erf(y) - a) / (2.0 / math.sqrt(math.pi) * math.exp(-y * y))
     return y
+
+
+def look_up(times: Sequence[float], rows: Sequence[Sequence[float]]) -> tuple[LookUp, LookUp]:
+    """CasADi's linear interpolant on `rows` and its slope, in its order of operations
+    (casadi_interpn.hpp): t -> one value a column."""
+
+    def left(t: float) -> int:
+        return min(max(bisect_right(times, t) - 1, 0), len(times) - 2)
+
+    def value(t: float) -> list[float]:
+        k = left(t)
+        share = (t - times[k]) / (times[k + 1] - times[k])
+        pairs = zip(rows[k], rows[k + 1], strict=True)
+        return [0.0 + (1.0 - share) * a + share * b for a, b in pairs]
+
+    def slope(t: float) -> list[float]:
+        k = left(t)
+        width = times[k + 1] - times[k]
+        return [(0.0 - a + b) / width for a, b in zip(rows[k], rows[k + 1], strict=True)]
+
+    return value, slope

@@ -5,6 +5,8 @@ ways of evaluating do the same operations on the same numbers. A generated funct
 its arguments and writes its results in place:
 
     def step(a0, a1, r0):        # r0[i] = ...
+
+A time table is looked up by a function of its own, on rows that stand once in the text.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from pathlib import Path
 
 import casadi as ca
 
+from hapticlink.components.time_tables import TimeTable
 from hapticlink.fmus import ieee
 from hapticlink.fmus.errors import UnknownOperation
 
@@ -55,8 +58,8 @@ _NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
 def straight_line(function: ca.Function) -> str:
     """The text of a Python function of the same name.
 
-    Raises UnknownOperation for an instruction that is not scalar arithmetic (an external
-    call, a solver) and for a free variable.
+    Raises UnknownOperation for an instruction that is neither scalar arithmetic nor the look-up of
+    a table (an external call, a solver) and for a free variable.
     """
     if not function.is_a("SXFunction"):
         function = function.expand()
@@ -78,6 +81,8 @@ def _instruction(function: ca.Function, k: int) -> str:
         return f"w{into[0]} = a{of[0]}[{of[1]}]"
     if operation == ca.OP_OUTPUT:
         return f"r{into[0]}[{into[1]}] = w{of[0]}"
+    if operation == ca.OP_CALL:
+        return f"{', '.join(f'w{i}' for i in into)}, = {_called(function, k)}(w{of[0]})"
     template = TEMPLATES.get(operation)
     if template is None:
         name = _NAMES.get(operation, str(operation))
@@ -88,12 +93,29 @@ def _instruction(function: ca.Function, k: int) -> str:
     return f"w{into[0]} = " + template.format(*(f"w{i}" for i in of))
 
 
+def _called(function: ca.Function, k: int) -> str:
+    """The name of the look-up that instruction k is."""
+    called = function.instructions_sx()[k].which_function()
+    if called.class_name() not in ("LinearInterpolant", "LinearInterpolantJac"):
+        raise UnknownOperation(
+            f"`{function.name()}`, instruction {k}: {called.name()} is no time table, and nothing "
+            "else can be called in straight-line Python"
+        )
+    return str(called.name())
+
+
 def _literal(value: float) -> str:
     """repr gives the same double back; inf and nan have no literal."""
     return repr(float(value)) if math.isfinite(value) else f"float({str(value)!r})"
 
 
-def program(functions: Iterable[ca.Function]) -> str:
-    """One text, to be executed in an empty namespace, that defines all `functions`."""
+def program(functions: Iterable[ca.Function], tables: Iterable[TimeTable] = ()) -> str:
+    """One text, to be executed in an empty namespace, that defines all `functions` and the `tables`
+    that they look up."""
     helpers = Path(ieee.__file__).read_text(encoding="utf-8")
-    return "\n\n".join([helpers, *(straight_line(f) for f in functions)])
+    data = (
+        f"{t.called}, jac_{t.called} = look_up({[r[0] for r in t.rows]}, "
+        f"{[list(r[1:]) for r in t.rows]})\n"
+        for t in tables
+    )
+    return "\n\n".join([helpers, *data, *(straight_line(f) for f in functions)])

@@ -5,7 +5,9 @@ Sampled: F of t_k from the handle's x and v of t_k, with + on the handle.
 
 from __future__ import annotations
 
-from hapticlink.components import integrators, specs
+import casadi as ca
+
+from hapticlink.components import integrators, specs, time_tables
 from hapticlink.components.component import (
     DAMPING,
     POSE,
@@ -16,7 +18,7 @@ from hapticlink.components.component import (
     Component,
     Variable,
 )
-from hapticlink.components.time_tables import interpolate, slope
+from hapticlink.components.time_tables import TimeTable
 
 _F = Variable("F", (3,), WRENCH, description="wrench of the hand on the handle")
 _X = Variable("x", (3,), POSE, description="pose of the handle")
@@ -31,11 +33,12 @@ def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
     if spec.damping is not None:
         inputs += [_V]
         parameters += [Variable("damping", (3,), DAMPING, spec.damping, "damping to ground")]
-    block = Block(inputs=inputs, parameters=parameters, outputs=[_F])
+    block, tables = Block(inputs=inputs, parameters=parameters, outputs=[_F]), []
     if isinstance(spec, specs.ConstantHand):
         F, kind = block.p["wrench"], "a constant wrench"
     else:
-        F, kind = interpolate(spec.table, block.t, "hand.table"), "a wrench from a table"
+        tables = [TimeTable(spec.table, "hand.table")]
+        F, kind = tables[0].value(block.t), "a wrench from a table"
     if spec.damping is not None:
         F = F - block.p["damping"] * block.u["v"]
     return block.component(
@@ -46,6 +49,7 @@ def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
         step={},
         output={"F": F},
         documentation=hand.__doc__ or "",
+        tables=tables,
     )
 
 
@@ -68,19 +72,22 @@ def _arm(spec: specs.ArmHand) -> Component:
         outputs=[_F],
     )
     x, u, p, t = block.x, block.u, block.p, block.t
-    target = interpolate(spec.target, t, "hand.target")
-    target_rate = slope(spec.target, t)
+    tables = [TimeTable(spec.target, "hand.target")]
+    over = ca.SX.sym("over", time_tables.size_over(tables))
+    target, target_rate = ca.vertsplit(time_tables.within(tables, over, t), 3)
     F = p["grip_stiffness"] * (x["x_arm"] - u["x"]) + p["grip_damping"] * (x["v_arm"] - u["v"])
     pull = p["stiffness"] * (target - x["x_arm"]) + p["damping"] * (target_rate - x["v_arm"])
-    ode = block.ode({"x_arm": x["v_arm"], "v_arm": (pull - F) / p["mass"]})
+    ode = block.ode({"x_arm": x["v_arm"], "v_arm": (pull - F) / p["mass"]}, over)
+    given = ca.vertcat(u.vector, time_tables.over(tables, t, block.h))
     return block.component(
         "hand",
         "Hand: an arm behind a grip",
         "sampled",
         initial={"x_arm": u["x"], "v_arm": u["v"]},
-        step=integrators.step("rk4", ode, x.vector, u.vector, p.vector, t, block.h, [0, 1, 2]),
+        step=integrators.step("rk4", ode, x.vector, given, p.vector, t, block.h, [0, 1, 2]),
         output={"F": F},
         documentation=hand.__doc__ or "",
+        tables=tables,
     )
 
 
@@ -91,9 +98,11 @@ def _spring(spec: specs.SpringHand) -> Component:
     if spec.damping is not None:
         parameters.append(Variable("damping", (3,), DAMPING, spec.damping, "to target path"))
     block = Block(inputs=[_X, _V] if damped else [_X], parameters=parameters, outputs=[_F])
-    F = block.p["stiffness"] * (interpolate(spec.target, block.t, "hand.target") - block.u["x"])
+    table = TimeTable(spec.target, "hand.target")
+    target, rate = ca.vertsplit(table.at(block.t), 3)
+    F = block.p["stiffness"] * (target - block.u["x"])
     if damped:
-        F += block.p["damping"] * (slope(spec.target, block.t) - block.u["v"])
+        F += block.p["damping"] * (rate - block.u["v"])
     return block.component(
         "hand",
         "Hand: a spring to a target path",
@@ -102,6 +111,7 @@ def _spring(spec: specs.SpringHand) -> Component:
         step={},
         output={"F": F},
         documentation=hand.__doc__ or "",
+        tables=[table],
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from hapticlink.components import forces, integrators
+from hapticlink.components import forces, integrators, time_tables
 from hapticlink.components.component import WRENCH, Block, Component, Variable
 from hapticlink.components.contact import contact_forces
 from hapticlink.components.contact.detection import touches
@@ -34,6 +34,7 @@ from hapticlink.components.dynamics.variables import (
     motion_outputs,
     states,
 )
+from hapticlink.components.forces import drives
 from hapticlink.components.formulations import independent_coordinates
 from hapticlink.components.formulations.embedding import Embedding
 from hapticlink.components.formulations.partitioning import Partitioning
@@ -41,6 +42,7 @@ from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
+from hapticlink.components.time_tables import TimeTable
 
 
 def virtual_mechanism(
@@ -70,7 +72,9 @@ def virtual_mechanism(
         contacts = None
     parts = _Parts(linkage, mechanism, directions, contacts, frame_s)
     block = _block(parts, method, step_s / mechanism.substeps, length_scale)
-    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"], block.t)
+    tables = drives.tables(linkage)
+    tabled = ca.SX.sym("tabled", 2 * len(tables))
+    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"], tabled)
     space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
     applied = space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
     applied += further_points.efforts(model, block.u)
@@ -108,13 +112,16 @@ def virtual_mechanism(
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
-    q1, qd1 = ca.vertsplit(_step(block, model, mechanism, applied, space), model.q.numel())
+    q1, qd1 = ca.vertsplit(_step(block, model, mechanism, applied, space, tables), model.q.numel())
     stepped = ca.vertcat(carried(model, q1, qd1, block.h), qd1)
     if directions:
         resisted = resisted_directions(block, space, q0, q1)
         initial["n_resisted"] = resisted.first
         stepped = ca.vertcat(stepped, resisted.after)
         output |= {"Lambda_inv": space.Lambda_inv, **resisted.output}
+    if tables:
+        now = time_tables.at(tables, block.t)
+        output = {name: ca.substitute(value, tabled, now) for name, value in output.items()}
     component = block.component(
         "virtual_mechanism",
         "The linkage's own dynamics under the hand's and the drift wrench",
@@ -126,6 +133,7 @@ def virtual_mechanism(
         state_notes=notes(model),
         documentation=__doc__ or "",
         shared=not frame_s,
+        tables=tables,
     )
     require_closed(component, model)
     require_inertia(component, model)
@@ -191,22 +199,28 @@ def _step(
     mechanism: Mechanism,
     applied: ca.SX,
     space: OperationalSpace,
+    tables: list[TimeTable],
 ) -> ca.SX:
     """(q, qd) after h: the method on the stabilised equations, then projection if chosen; or the
     method in independent coordinates."""
     n = model.q.numel()
     efforts = space.terms.efforts + applied
     x, u, p, t = ca.vertcat(model.q, model.qd), block.u.vector, block.p.vector, block.t
+    given = u
+    if tables:
+        over = ca.SX.sym("over", time_tables.size_over(tables))
+        efforts = ca.substitute(efforts, model.tabled, time_tables.within(tables, over, t))
+        u, given = ca.vertcat(u, over), ca.vertcat(u, time_tables.over(tables, t, block.h))
     closing = -space.terms.w
     if model.linkage.loop and mechanism.stabilization == "baumgarte":
         alpha, beta = block.p["alpha"], block.p["beta"]
         closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
     if model.linkage.loop and mechanism.formulation == "embedding":
-        given = ca.Function("efforts", [x, u, p, t], [efforts], {"cse": True})
+        pushing = ca.Function("efforts", [x, u, p, t], [efforts], {"cse": True})
         embedded = Embedding(
-            model, block.p, independent_coordinates.start_pose(model, block.p), given
+            model, block.p, independent_coordinates.start_pose(model, block.p), pushing
         )
-        return independent_coordinates.step(mechanism.integrator, embedded, x, u, p, t, block.h)
+        return independent_coordinates.step(mechanism.integrator, embedded, x, given, p, t, block.h)
     extrapolates = integrators.METHODS[mechanism.integrator].extrapolates
     qdd = space.solver.follow(efforts, closing, refined=extrapolates)
     ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
@@ -214,8 +228,8 @@ def _step(
         parted = Partitioning(
             model, block.p, independent_coordinates.start_pose(model, block.p), ode
         )
-        return independent_coordinates.step(mechanism.integrator, parted, x, u, p, t, block.h)
-    after = integrators.step(mechanism.integrator, ode, x, u, p, t, block.h, range(n))
+        return independent_coordinates.step(mechanism.integrator, parted, x, given, p, t, block.h)
+    after = integrators.step(mechanism.integrator, ode, x, given, p, t, block.h, range(n))
     if mechanism.stabilization == "projection":
         own = space.terms.inertia
         project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))

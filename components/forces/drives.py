@@ -1,19 +1,27 @@
 """Joint drives: the active linkages of the report's future work (chapter 7).
 
 constant  Q = effort
-profile   Q = effort(t), from a table
+profile   Q = effort(t), from a table (time_tables.py)
 pd        Q = k (target(t) - q) + b (target'(t) - qd)
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs.linkage import ConstantDrive, Joint, Linkage, PDDrive
-from hapticlink.components.time_tables import interpolate, slope
+from hapticlink.components.specs.linkage import (
+    ConstantDrive,
+    Joint,
+    Linkage,
+    PDDrive,
+    ProfileDrive,
+)
+from hapticlink.components.time_tables import TimeTable
 
 if TYPE_CHECKING:
     from hapticlink.components.linkage.model import LinkageModel
@@ -48,22 +56,30 @@ def efforts(model: LinkageModel) -> ca.SX | None:
     driven = [j for j in model.linkage.joint if j.drive is not None]
     if not driven:
         return None
-    Q = ca.SX(model.q.numel(), 1)
+    Q, tabled = ca.SX(model.q.numel(), 1), iter(ca.vertsplit(model.tabled, 2))
     for j in driven:
-        Q[model.coordinate(j.name)] = _effort(model, j)
+        Q[model.coordinate(j.name)] = _effort(model, j, tabled)
     return Q
 
 
-def _effort(model: LinkageModel, joint: Joint) -> ca.SX:
+def tables(linkage: Linkage) -> list[TimeTable]:
+    """Those of the drives, in the order of the joints."""
+    return [
+        TimeTable(j.drive.table, f"{j.name}.drive.table")
+        for j in linkage.joint
+        if isinstance(j.drive, ProfileDrive | PDDrive)
+    ]
+
+
+def _effort(model: LinkageModel, joint: Joint, tabled: Iterator[ca.SX]) -> ca.SX:
+    """`tabled` gives (y, y') of each table in its turn; a model that is at no instant has NaN."""
     drive, p = joint.drive, model.p
     if isinstance(drive, ConstantDrive):
         return p[f"{joint.name}.effort"]
-    assert drive is not None
-    value = interpolate(drive.table, model.t, f"{joint.name}.drive.table")
+    value, rate = ca.vertsplit(next(tabled, ca.SX([math.nan, math.nan])))
     if not isinstance(drive, PDDrive):
         return value
     k = model.coordinate(joint.name)
-    rate = slope(drive.table, model.t)
     return p[f"{joint.name}.drive_K"] * (value - model.q[k]) + p[f"{joint.name}.drive_B"] * (
         rate - model.qd[k]
     )

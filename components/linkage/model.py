@@ -47,14 +47,15 @@ class LinkageModel:
     """The terms of (2.3) at q, qd, each built when it is first asked for.
 
     q, qd: n x 1; p: the parameters by name. D n x n, W m x n (m two for each loop),
-    J_h 3 x n. Raises ValueError for bodies that no joint connects to the ground.
+    J_h 3 x n. tabled: (y, y') of the drives' tables at the instant. Raises ValueError for bodies
+    that no joint connects to the ground.
     """
 
     def __init__(
-        self, linkage: Linkage, p: Signals, q: ca.SX, qd: ca.SX, t: ca.SX | None = None
+        self, linkage: Linkage, p: Signals, q: ca.SX, qd: ca.SX, tabled: ca.SX | None = None
     ) -> None:
         self.linkage, self.p, self.q, self.qd = linkage, p, q, qd
-        self.t = ca.SX(0) if t is None else t
+        self.tabled = ca.SX(0, 1) if tabled is None else tabled
 
     @cached_property
     def _offsets(self) -> dict[str, int]:

@@ -90,18 +90,25 @@ static fmi2Status not_finite(const Model *m, fmi2Status status, const double *x,
 
 /* --- the component's functions -------------------------------------------------------------- */
 
+typedef struct { /* room in which a function calls the look-ups of tables */
+    casadi_int iw[N_IW + 1];
+    double w[N_W + 1];
+} Room;
+
 static void evaluate_output(Model *m, double time) {
-    const double *arguments[] = {m->now.x, m->now.reals, m->now.reals + N_U, &time};
-    double *results[] = {m->now.reals + SETTABLE};
-    output(arguments, results, NULL, NULL, 0);
+    const double *arguments[N_ARG] = {m->now.x, m->now.reals, m->now.reals + N_U, &time};
+    double *results[N_RES] = {m->now.reals + SETTABLE};
+    Room room;
+    output(arguments, results, room.iw, room.w, 0);
 }
 
 /* Bring x0 and y up to date with what was set. */
 static void refresh(Model *m) {
     if (m->now.start_due) {
-        const double *arguments[] = {m->now.reals, m->now.reals + N_U};
-        double *results[] = {m->now.x};
-        initialize(arguments, results, NULL, NULL, 0);
+        const double *arguments[N_ARG] = {m->now.reals, m->now.reals + N_U};
+        double *results[N_RES] = {m->now.x};
+        Room room;
+        initialize(arguments, results, room.iw, room.w, 0);
         m->now.start_due = 0;
     }
     if (m->now.output_due) {
@@ -215,13 +222,14 @@ HAS_NO(Set, String, const fmi2String)
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolean no_way_back) {
     Model *m = c;
     double time, h = size / SUBSTEPS;
-    const double *arguments[] = {m->trial, m->now.reals, m->now.reals + N_U, &time, &h};
-    double *results[] = {m->after};
+    const double *arguments[N_ARG] = {m->trial, m->now.reals, m->now.reals + N_U, &time, &h};
+    double *results[N_RES] = {m->after};
+    Room room;
     if (m->now.start_due) refresh(m);
     memcpy(m->trial, m->now.x, sizeof m->trial);
     for (int k = 0; k < SUBSTEPS; k++) {
         time = start + k * size / SUBSTEPS;
-        step(arguments, results, NULL, NULL, 0);
+        step(arguments, results, room.iw, room.w, 0);
         memcpy(m->trial, m->after, sizeof m->trial);
     }
     if (first_not_finite(m->trial, N_X) >= 0) {

@@ -17,6 +17,7 @@ def component_header(component: Component) -> str:
 
     The functions are `static`, so their names (initialize, step, output) meet no one else's.
     """
+    text = functions((component.initialize, component.step, component.output))
     settable = (*component.inputs, *component.parameters)
     fixed = [False] * len(component.start_inputs)
     fixed += [v.variability == "fixed" for v in component.parameters for _ in v.names]
@@ -29,6 +30,8 @@ def component_header(component: Component) -> str:
         "N_X": sum(v.size for v in component.states),
         "SUBSTEPS": component.substeps,
         "SAMPLED": int(component.timing == "sampled"),
+        # Room that the functions need to call the look-ups of tables.
+        **{f"N_{of.upper()}": _room(text, of) for of in ("arg", "res", "iw", "w")},
     }
     return "\n".join(
         [
@@ -40,7 +43,7 @@ def component_header(component: Component) -> str:
             _table("char *const state_names", _texts(component.state_texts)),
             _table("double starts", map(_number, starts)),
             _table("char is_fixed", (str(int(flag)) for flag in fixed)),
-            functions((component.initialize, component.step, component.output)),
+            text,
         ]
     )
 
@@ -59,6 +62,11 @@ def _number(value: float) -> str:
     if math.isfinite(value):
         return repr(float(value))
     return "NAN" if math.isnan(value) else "INFINITY" if value > 0 else "-INFINITY"
+
+
+def _room(text: str, of: str) -> int:
+    """The most that a function of `text` asks for in its `_work`."""
+    return max(int(n) for n in re.findall(rf"\*sz_{of} = (\d+);", text))
 
 
 def functions(made: Iterable[ca.Function]) -> str:

@@ -20,6 +20,18 @@ from fmpy.fmi2 import FMU2Slave
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hapticlink.components import specs
+from hapticlink.components.blocks.hand import hand
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.component import Component
+from hapticlink.components.specs.linkage import (
+    Body,
+    Joint,
+    Linkage,
+    Mechanism,
+    OperationalPoint,
+    PDDrive,
+)
 from hapticlink.fmus import FmuError, build_native, check_fmu
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.build import build
@@ -48,7 +60,32 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
         for b in blocks.blocks(scene)
     }
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"}, H)
+    made |= {"arm": arm(300), "driven": driven_slider()}
     return {n: (build(c, folder / "p"), build_native(c, folder / "n")) for n, c in made.items()}
+
+
+def arm(rows: int) -> Component:
+    """An arm on a path of so many rows, 300 of them within the run of `driven`."""
+    draw = np.random.default_rng(2)
+    path = np.column_stack([np.cumsum(draw.uniform(1e-5, 2e-4, rows)), draw.normal(size=(rows, 3))])
+    return hand(specs.ArmHand(target=tuple(map(tuple, path.tolist()))))
+
+
+def driven_slider() -> Component:
+    """A joint on a path whose rows stand within steps, at their ends and at the end of the run."""
+    table = ((0.005, 0.1), (8 * H, 0.3), (0.03, 0.2), (40 * H, 0.1))
+    joint = Joint(
+        name="rail",
+        type="prismatic",
+        child="block",
+        drive=PDDrive(table=table, stiffness=400.0, damping=8.0),
+    )
+    linkage = Linkage(
+        body=(Body(name="block", mass=2.0, inertia=1.0),),
+        joint=(joint,),
+        operational_point=OperationalPoint(body="block"),
+    )
+    return virtual_mechanism(linkage, Mechanism(integrator="linearly-implicit"), step_s=H)
 
 
 def driven(path: Path) -> np.ndarray:
@@ -81,11 +118,25 @@ def driven(path: Path) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("name", [*NAMES, "discrete_equivalent"])
+@pytest.mark.parametrize("name", [*NAMES, "discrete_equivalent", "arm", "driven"])
 def test_every_block_gives_the_bits_of_its_python_fmu(both, name):
     by_python, by_c = map(driven, both[name])
     assert np.isfinite(by_c).all()
     np.testing.assert_array_equal(by_c, by_python)
+
+
+@pytest.mark.parametrize("name", ["arm", "driven"])
+def test_plain_python_looks_tables_up_to_the_same_bits(both, name, monkeypatch):
+    by_c = driven(both[name][1])
+    monkeypatch.setenv("HAPTICLINK_PURE_PYTHON", "1")
+    np.testing.assert_array_equal(by_c, driven(both[name][0]))
+
+
+def test_rows_of_a_table_are_data(both):
+    """The C text has as many statements for a path of 3000 rows as for one of 300."""
+    short, long = (component_header(arm(rows)) for rows in (300, 3000))
+    assert len(long) > 5 * len(short)
+    assert long.count(";") == short.count(";")
 
 
 @pytest.mark.parametrize("name", NAMES)
