@@ -119,9 +119,9 @@ def test_an_event_of_one_kind_shares_its_block(stamped: Make) -> None:
 
 def test_a_ring_of_sampled_blocks_is_named(stamped: Make) -> None:
     units = stamped(fixed(Fraction(512), Fraction(30), 4), "gauss-seidel").fmus[:3]
-    rows = [("controller.stamp", "hand.d"), ("hand.stamp", "controller.d")]
+    rows = [("controller.seen_d", "hand.d"), ("hand.seen_d", "controller.d")]
     ring = System(units, connected(units, rows, single(512, 4))[0], single(512, 4), "gauss-seidel")
     with pytest.raises(InputFault, match="ring: controller -> hand -> controller"):
         list(delays(Plan(ring)))
     as_jacobi = System(units, ring.connections, ring.timeline, "jacobi")
-    assert delays(Plan(as_jacobi))["hand.stamp -> controller.d"].most == 1 / 512
+    assert delays(Plan(as_jacobi))["hand.seen_d -> controller.d"].most == 1 / 512

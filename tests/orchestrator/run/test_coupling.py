@@ -201,7 +201,7 @@ def test_fmus_in_processes_of_their_own_roll_back_too(fmus: Fmus, tmp_path: Path
     )  # fmt: skip
     _, here = simulate(made, tmp_path)
     units = tuple(replace(u, isolate=True) for u in made.fmus)
-    outcome, apart = simulate(replace(made, units=units), tmp_path)
+    outcome, apart = simulate(replace(made, fmus=units), tmp_path)
     assert outcome.fault is None
     np.testing.assert_array_equal(apart.rows, here.rows)
 
