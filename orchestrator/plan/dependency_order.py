@@ -47,7 +47,7 @@ def _read(system: System, unit: Fmu) -> Iterator[Scalar]:
         yield from c.outputs
         slope = derivative(c, system.fmu)
         if slope and c.hold and HOLDS[c.hold].needs == "derivative":
-            yield from unit.description.port(slope, "output")
+            yield from slope
 
 
 def plants(system: System, units: Iterable[Fmu]) -> Iterator[list[Fmu]]:
