@@ -1,6 +1,7 @@
-"""Build hook: links `.editable/hapticlink/<folder>` to the top-level folders.
+"""Build hook: links what `.editable/hapticlink/` holds to the top-level folders.
 
-Only editable installs need it: wheels map the folders through `sources` in pyproject.toml.
+Only editable installs need it: wheels map the folders through `sources` in pyproject.toml. What is
+in `api/` are the package's own files.
 """
 
 import os
@@ -21,12 +22,17 @@ class EditableLinks(BuildHookInterface):
         root = Path(self.root)
         package = root / ".editable" / "hapticlink"
         package.mkdir(parents=True, exist_ok=True)
-        for name in FOLDERS:
-            link = package / name
-            if link.exists() or link.is_symlink():
+        targets = [root / name for name in FOLDERS]
+        targets += [path for path in (root / "api").iterdir() if path.is_file()]
+        for target in targets:
+            link = package / target.name
+            if sys.platform == "win32" and target.is_file():
+                link.unlink(missing_ok=True)  # git may have written a new file since
+                os.link(target, link)  # a symlink needs a privilege
+            elif link.exists() or link.is_symlink():
                 continue
-            if sys.platform == "win32":  # a junction needs no privilege, a symlink does
-                command = ["cmd", "/c", "mklink", "/J", str(link), str(root / name)]
+            elif sys.platform == "win32":
+                command = ["cmd", "/c", "mklink", "/J", str(link), str(target)]
                 subprocess.run(command, check=True)
             else:
-                link.symlink_to(os.path.relpath(root / name, package))
+                link.symlink_to(os.path.relpath(target, package))

@@ -43,6 +43,7 @@ ROOMS = {
         "sweep",
         "report",
         "study",
+        "api",
         "commands",
     ),
 }

@@ -22,22 +22,19 @@ def info(scene: Scene | None = None, /, *, set: Set = None, out: Out = None) -> 
     lies, and whether the scene starts in it; what it needs and leaves out, and what that saves.
     Without SCENE, list the shipped scenes. With OUT, draw the workspace there, as workspace.png.
     """
-    from hapticlink.orchestrator import open_scene
-    from hapticlink.orchestrator.base import temporary_folders
+    from hapticlink.orchestrator import api
     from hapticlink.orchestrator.plan import sample_ages
     from hapticlink.orchestrator.plan.plan import Plan
     from hapticlink.orchestrator.results import summary
-    from hapticlink.orchestrator.scene import find
-    from hapticlink.orchestrator.system import assemble, fmu_files, timeline
+    from hapticlink.orchestrator.system.built import built
 
     if scene is None:
-        for name in find.shipped():
-            print(f"{name}: {open_scene.load(name).title}")
+        for name, title in api.shipped().items():
+            print(f"{name}: {title}")
         return 0
-    read = open_scene.load(scene, set or ())
-    time = timeline.timeline(read)
-    with temporary_folders.room() as room:
-        made = assemble.from_scene(read, time, fmu_files.fmu_files(read, time, room))
+    read = api.scene(scene, set or ())
+    with built(read) as made:
+        time = made.timeline
         start = at_start(made) if read.linkage and (read.linkage.loop or read.device) else {}
     print(f"{read.title}\n{read.description.strip()}".strip())
     print(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")

@@ -8,21 +8,23 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def counted(title: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Gives a function that is told how many runs are done."""
-    with _bar(title, total) as show:
-        yield lambda done: show(done, f"{done} of {total} runs") if show else None
+def counted(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Gives a function that is told how many runs of how many are done."""
+    with _bar(title) as show:
+        yield lambda done, of: show(done, of, f"{done} of {of} runs") if show else None
 
 
 @contextmanager
 def progress(title: str, duration: float) -> Iterator[Callable[[float], None] | None]:
     """Gives a function that is told the simulated time (s), None where stderr is no terminal."""
-    with _bar(title, duration) as show:
-        yield (lambda time: show(time, f"{time:.2f} of {duration:g} s")) if show else None
+    with _bar(title) as show:
+        yield (
+            (lambda time: show(time, duration, f"{time:.2f} of {duration:g} s")) if show else None
+        )
 
 
 @contextmanager
-def _bar(title: str, total: float) -> Iterator[Callable[[float, str], None] | None]:
+def _bar(title: str) -> Iterator[Callable[[float, float, str], None] | None]:
     if not sys.stderr.isatty():
         yield None
         return
@@ -31,9 +33,9 @@ def _bar(title: str, total: float) -> Iterator[Callable[[float, str], None] | No
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[at]}"))
     with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        task = bar.add_task(title, total=total, at="building")
+        task = bar.add_task(title, total=None, at="building")
 
-        def show(completed: float, at: str) -> None:
-            bar.update(task, completed=completed, at=at)
+        def show(completed: float, total: float, at: str) -> None:
+            bar.update(task, completed=completed, total=total, at=at)
 
         yield show

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.orchestrator.base.faults import Interrupted
+from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
-
-if TYPE_CHECKING:
-    from hapticlink.orchestrator.experiment import Experiment
+from hapticlink.orchestrator.commands.progress import progress
 
 Explain = Annotated[
     bool, Parameter(negative="", help="Print what runs when, from which samples; run nothing.")
@@ -22,64 +18,30 @@ Explain = Annotated[
 
 def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain = False) -> int:
     """Run a scene: results as CSV, run.json, plan.txt and figures in OUT (default runs/<scene>)."""
+    from hapticlink.orchestrator import api
+    from hapticlink.orchestrator.results import summary
+
     if explain:
-        return _explain(scene, set or ())
+        print(*api.explain(scene, set or ()), sep="\n")
+        return 0
     folder = out or default_folder("runs", scene)
     try:
-        experiment = _simulate(scene, folder, set or ())
+        read = api.scene(scene, set or ())
+        with progress(read.title, read.duration) as told:
+            made = api.run(read, out=folder, progress=told)
+    except api.RunInterrupted as ended:
+        made = ended.run
     except KeyboardInterrupt:  # a run takes those that come while it goes on
         raise Interrupted from None
-    from hapticlink.orchestrator.plan import explain as explained
-    from hapticlink.orchestrator.plan.plan import Plan
-    from hapticlink.orchestrator.results import folders, summary
-
-    outcome = experiment.outcome
-    if outcome.fault:
-        print(f"hapticlink: {outcome.fault}", file=sys.stderr)
-    others = []
-    if outcome.end_time > 0:
-        from hapticlink.orchestrator.results.figures import draw
-
-        with (experiment.folder / "plan.txt").open("w", encoding="utf-8") as file:
-            file.writelines(f"{line}\n" for line in explained.explain(Plan(experiment.system)))
-        others = ["plan.txt", *draw(experiment.results)]
-        folders.add(experiment.folder, others)
-    speed = outcome.end_time / outcome.wall_time
-    ends = {"stop_when": f"ended by {experiment.system.ends_when}", "duration": "done"}
-    how = ends.get(outcome.reason, outcome.reason)
-    print(f"{default_folder('runs', scene).name}: {how} at {outcome.end_time:.6g} s")
-    for line in summary.lines(experiment.results):
+    if made.fault:
+        print(f"hapticlink: {made.fault}", file=sys.stderr)
+    print(f"{default_folder('runs', scene).name}: {summary.ending(made)}")
+    for line in summary.lines(made):
         print(f"  {line}")
-    print(f"  {outcome.wall_time:.2f} s of run time, {speed:.1f} times real time")
-    tables = (f"{clock.name}.csv" for clock in experiment.system.timeline.clocks)
-    print(f"  {folder}/: {', '.join([*tables, 'run.json', *others])}")
-    return outcome.fault.exit_status if outcome.fault else 0
-
-
-def _simulate(scene: str, folder: Path, options: Sequence[str]) -> Experiment:
-    from hapticlink.orchestrator import open_scene
-    from hapticlink.orchestrator.commands.progress import progress
-    from hapticlink.orchestrator.experiment import simulate
-
-    read = open_scene.load(scene, options)
-    with progress(read.title, read.duration) as told:
-        return simulate(read, folder, options, told)
-
-
-def _explain(scene: str, options: Sequence[str]) -> int:
-    """Print the plan of a run, and run nothing."""
-    from hapticlink.orchestrator import open_scene
-    from hapticlink.orchestrator.base import temporary_folders
-    from hapticlink.orchestrator.plan import explain
-    from hapticlink.orchestrator.plan.plan import Plan
-    from hapticlink.orchestrator.system.assemble import from_scene
-    from hapticlink.orchestrator.system.fmu_files import fmu_files
-    from hapticlink.orchestrator.system.timeline import timeline
-
-    read = open_scene.load(scene, options)
-    with temporary_folders.room() as room:
-        time = timeline(read)
-        system = from_scene(read, time, fmu_files(read, time, room))
-        for line in explain.explain(Plan(system), explain.PRINTED):
-            print(line)
-    return 0
+    wall_time = made.run["timings"]["run"]
+    speed = made.run["end"]["time"] / wall_time
+    print(f"  {wall_time:.2f} s of run time, {speed:.1f} times real time")
+    tables = (f"{rate}.csv" for rate in made.tables)
+    others = (name for name in made.run["files"] if not name.endswith(".csv"))
+    print(f"  {folder}/: {', '.join([*tables, *others])}")
+    return Fault.exit_status if made.fault else 0

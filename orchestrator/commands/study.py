@@ -18,10 +18,10 @@ def study(*, out: Out = None, jobs: Jobs = None) -> int:
     from hapticlink.orchestrator.study import study as make
 
     made = cases.jobs()
-    with counted("study", len(made)) as tell:
+    with counted("study") as tell:
         page = make(
             made, out or Path("results/mismatch"), Path("sweeps/mismatch"),
-            jobs or os.cpu_count() or 1, tell,
+            jobs or os.cpu_count() or 1, lambda done: tell(done, len(made)),
         )  # fmt: skip
     print(page)
     return 0

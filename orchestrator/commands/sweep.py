@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
+from hapticlink.orchestrator.commands.progress import counted
 
 Vary = Annotated[
     list[str] | None,
@@ -54,31 +54,22 @@ def sweep(
     every run fails 1. A sweep that is interrupted goes on where it was when
     it is called again; runs made before are not made twice.
     """
+    from hapticlink.orchestrator import api
     from hapticlink.orchestrator.base.faults import InputFault
-    from hapticlink.orchestrator.commands.progress import counted
-    from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.sweep import figure, grid, job, row
-    from hapticlink.orchestrator.sweep import sweep as make
+    from hapticlink.orchestrator.sweep.row import REFUSED
 
-    if bool(vary) == bool(runs):
-        raise InputFault("sweep: give --vary key=values (repeatable) or --runs FILE")
-    if jobs is not None and jobs < 1:
-        raise InputFault(f"--jobs {jobs}: give 1 or more")
-    points = grid.listed(runs) if runs else grid.grid([grid.parse(text) for text in vary or ()])
-    made = job.jobs(scene, set or (), points)
-    if metric:
-        figure.check(metric, [j.scene for j in made if j.scene])
-    folder = folders.made(out or default_folder("sweeps", scene))
-    with counted(scene, len(made)) as tell:
-        rows = make(made, folder, jobs or os.cpu_count() or 1, scheduler, tell)
-    keys = list(dict.fromkeys(k for p in points for k in p))
-    failed = [r for r in rows if r["end"] in row.FAILED]
-    for each in failed[:10]:
-        what = ", ".join(f"{k}={v}" for k, v in each.items() if k in keys)
+    folder = out or default_folder("sweeps", scene)
+    with counted(scene) as tell:
+        made = api.sweep(
+            scene, vary or (), set or (), runs=runs or (), out=folder, jobs=jobs,
+            scheduler=scheduler, metric=metric, progress=tell,
+        )  # fmt: skip
+    for each in made.failed[:10]:
+        what = ", ".join(f"{k}={v}" for k, v in each.items() if k in made.keys)
         print(f"hapticlink: {what}: {each['end']}: {each['message']}", file=sys.stderr)
-    print(f"{default_folder('sweeps', scene).name}: {len(rows)} runs, {len(failed)} of them failed")
-    drawn = figure.draw(rows, keys, folder, metric)
-    print(f"  {folder}/: table.csv{', ' if drawn else ''}{drawn or ''}")
-    if len(failed) < len(rows):
+    runs_made, failed = len(made.rows), len(made.failed)
+    print(f"{default_folder('sweeps', scene).name}: {runs_made} runs, {failed} of them failed")
+    print(f"  {folder}/: {', '.join(made.files)}")
+    if failed < runs_made:
         return 0
-    return InputFault.exit_status if all(r["end"] == row.REFUSED for r in rows) else 1
+    return InputFault.exit_status if all(r["end"] == REFUSED for r in made.rows) else 1

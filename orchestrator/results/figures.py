@@ -1,37 +1,61 @@
-"""Quick figures of a haptic run, made by `run` beside its tables.
+"""Figures of a haptic run, which `run` saves beside its tables.
 
 Names: operational point x_S (of the mechanism), handle x_D (of the device).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import DEVICE, MECHANISM, table_of, tracking
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 CONTACT = "virtual_mechanism.F_env"
-_ENDS = {"stop_when": "stop_when ended the run", "interrupted": "the run was interrupted"}
+_ENDS = {
+    "stop_when": "stop_when ended the run",
+    "interrupted": "the run was interrupted",
+    "running": "the last row so far",
+}
 
 
-def draw(results: Results) -> list[str]:
-    """Write what the run has signals for, and give the file names."""
-    drawn = []
+def figures(results: Results) -> dict[str, Figure]:
+    """By name, a figure of each thing that the run has signals for; none before its first step."""
+    drawn: dict[str, Figure] = {}
+    if not _last(results):
+        return drawn
     if table_of(results, MECHANISM):
-        drawn.append(_trajectories(results))
+        drawn["trajectories"] = _trajectories(results)
         if table_of(results, DEVICE):
-            drawn.append(_distance(results))
+            drawn["distance"] = _distance(results)
     if contact := table_of(results, CONTACT):
-        drawn.append(_contact(results, contact))
+        drawn["contact"] = _contact(results, contact)
     counting = next((t for t in results.tables.values() if _count(t)), None)
     if counting:
-        drawn.append(_constraints(results, counting))
+        drawn["constraints"] = _constraints(results, counting)
     if made := _made(results):
-        drawn.append(_energies(results, made))
+        drawn["energies"] = _energies(results, made)
     return drawn
+
+
+def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
+    """Write each as a PNG, and give the file names."""
+    for name, figure in figures.items():
+        figure.savefig(folder / f"{name}.png", dpi=150)
+    return [f"{name}.png" for name in figures]
+
+
+def _last(results: Results) -> float:
+    """The time (s) of the last row, which is the run's end."""
+    rows = next(iter(results.tables.values()))["time"]
+    return float(rows[-1]) if len(rows) else 0.0
 
 
 def short(value: float) -> str:
@@ -41,14 +65,14 @@ def short(value: float) -> str:
     return np.format_float_positional(value, precision=3, fractional=False, trim="-")
 
 
-def _axes(results: Results, title: str, x: str, y: str) -> tuple[Any, Any]:
+def _axes(results: Results, title: str, x: str, y: str) -> tuple[Figure, Any]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     end = results.run["end"]
     if end["reason"] != "duration":
         why = _ENDS.get(end["reason"], "the run was lost")
-        title += f", until {why} at {short(end['time'])} s"
+        title += f", until {why} at {short(_last(results))} s"
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -56,11 +80,6 @@ def _axes(results: Results, title: str, x: str, y: str) -> tuple[Any, Any]:
     axes.set_title(fill(title, 70), fontsize="medium")
     axes.grid(alpha=0.3)
     return figure, axes
-
-
-def _save(figure: Any, results: Results, name: str) -> str:
-    figure.savefig(results.folder / name, dpi=150)
-    return name
 
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
@@ -81,7 +100,7 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
     ]
 
 
-def _trajectories(results: Results) -> str:
+def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
     if table_of(results, DEVICE):
         apart = short(tracking(results)[1].max())
@@ -96,7 +115,7 @@ def _trajectories(results: Results) -> str:
     _obstacles(axes, results.run["scene"]["contacts"])
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(fontsize="small")
-    return _save(figure, results, "trajectories.png")
+    return figure
 
 
 def _obstacles(axes: Any, contacts: dict[str, Any] | None) -> None:
@@ -119,7 +138,7 @@ def _obstacles(axes: Any, contacts: dict[str, Any] | None) -> None:
         axes.add_patch(patch)
 
 
-def _distance(results: Results) -> str:
+def _distance(results: Results) -> Figure:
     time, gap = tracking(results)
     at = int(gap.argmax())
     title = (
@@ -128,16 +147,16 @@ def _distance(results: Results) -> str:
     )
     figure, axes = _axes(results, title, "time (s)", "distance |x_S - x_D| (mm)")
     axes.plot(time, gap)
-    return _save(figure, results, "distance.png")
+    return figure
 
 
-def _contact(results: Results, table: Table) -> str:
+def _contact(results: Results, table: Table) -> Figure:
     force = np.linalg.norm(table[CONTACT][:, :2], axis=1)
     share = 100 * float((force > 0).mean())
     title = f"Contacts push with at most {short(force.max())} N, in {short(share)} % of the samples"
     figure, axes = _axes(results, title, "time (s)", "|F_env| of the contacts (N)")
     axes.plot(table["time"], force)
-    return _save(figure, results, "contact.png")
+    return figure
 
 
 def _count(table: Table) -> str | None:
@@ -145,7 +164,7 @@ def _count(table: Table) -> str | None:
     return next(names, None)
 
 
-def _constraints(results: Results, table: Table) -> str:
+def _constraints(results: Results, table: Table) -> Figure:
     name = _count(table)
     assert name is not None
     count, time = table[name], table["time"]
@@ -155,17 +174,18 @@ def _constraints(results: Results, table: Table) -> str:
     figure, axes = _axes(results, title, "time (s)", "resisted directions")
     axes.step(time, count, where="post")
     axes.set_yticks(range(most + 2))
-    return _save(figure, results, "constraints.png")
+    return figure
 
 
 def _made(results: Results) -> dict[str, float]:
     """Energy (J) that the hold of each connection made, those across rates first."""
-    across = results.run["energies"]
-    booked = ({} if across == "none" else across) | results.run["energies_within_a_rate"]
+    across = results.run.get("energies", "none")  # a crash leaves none
+    within = results.run.get("energies_within_a_rate", {})
+    booked = ({} if across == "none" else across) | within
     return {name: energy["made"] for name, energy in booked.items()}
 
 
-def _energies(results: Results, made: dict[str, float]) -> str:
+def _energies(results: Results, made: dict[str, float]) -> Figure:
     total = sum(made.values())
     unit, per = ("mJ", 1e3) if max(map(abs, made.values())) < 0.1 else ("J", 1.0)
     did = "make" if total >= 0 else "lose"
@@ -177,4 +197,4 @@ def _energies(results: Results, made: dict[str, float]) -> str:
     axes.margins(x=0.35, y=0.2)
     axes.axvline(0, color="0.4", lw=0.8)
     axes.invert_yaxis()
-    return _save(figure, results, "energies.png")
+    return figure

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.files import write_json
@@ -36,8 +37,9 @@ def clear(folder: Path) -> None:
                 (folder / name).unlink(missing_ok=True)
 
 
-def add(folder: Path, names: Iterable[str]) -> None:
-    """List more files of a run in its run.json."""
-    run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+def add(folder: Path, names: Iterable[str]) -> dict[str, Any]:
+    """List more files of a run in its run.json, and give that."""
+    run: dict[str, Any] = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     run["files"] = list(dict.fromkeys([*run["files"], *names]))
     write_json(folder / "run.json", run)
+    return run

@@ -1,4 +1,4 @@
-"""What a run tells in the terminal beside how it ended: where it is not what was asked for."""
+"""What a run tells in the terminal: how it ended, and where it is not what was asked for."""
 
 from __future__ import annotations
 
@@ -10,6 +10,15 @@ import numpy as np
 
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import DEVICE, table_of
+
+
+def ending(results: Results) -> str:
+    """How a run ended, and when: `done at 3 s`."""
+    run, end = results.run, results.run["end"]
+    if "time" not in end:
+        return "it has not ended: it still runs, or its process was killed"
+    how = {"stop_when": f"ended by {run['stop_when']}", "duration": "done"}
+    return f"{how.get(end['reason'], end['reason'])} at {end['time']:.6g} s"
 
 
 def lines(results: Results) -> Iterator[str]:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -16,17 +17,16 @@ from hapticlink.orchestrator.base.faults import InputFault
 Vector = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class Table(Mapping[str, Vector]):
-    """The columns of one rate. `table["device.x"]` stacks `device.x[1]`, `device.x[2]`, ...
-
-    into (rows, n), a matrix into (rows, n, m); a full name gives its column, (rows,). `others` are
-    the tables of the same run.
+    """The samples of one rate by name: `table["device.x"]` stacks the columns `device.x[1]`,
+    `device.x[2]`, ... into (rows, n), those of a matrix into (rows, n, m); the whole name of a
+    column gives it alone, (rows,). `others` are the tables of the same run.
     """
 
     columns: tuple[str, ...]
     rows: Vector
-    others: Mapping[str, Table] = field(default_factory=dict, repr=False, compare=False)
+    others: Mapping[str, Table] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Vector:
         if name in self.columns:
@@ -49,34 +49,46 @@ class Table(Mapping[str, Vector]):
     def __len__(self) -> int:
         return len(self.columns)
 
+    def __repr__(self) -> str:
+        return fill(f"{len(self.rows)} rows of {', '.join(self.signals)}", 100)
 
-@dataclass(frozen=True)
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The names of scalars, vectors and matrices, `time` the first."""
+        return tuple(dict.fromkeys(column.partition("[")[0] for column in self.columns))
+
+
+@dataclass(frozen=True, eq=False)
 class Results:
-    """A run read back: `run` is run.json, `tables` the CSVs by rate."""
+    """A run read back: `run` is run.json, `tables` the CSVs by rate. Without a folder where it was
+    run in memory."""
 
-    folder: Path
+    folder: Path | None
     run: dict[str, Any]
     tables: dict[str, Table]
 
     @property
     def haptics(self) -> Table:
+        """The Table of the haptic rate."""
         return self.tables["haptics"]
 
     @property
     def graphics(self) -> Table:
+        """The Table of the graphics rate; KeyError where no FMU runs at it."""
         return self.tables["graphics"]
 
 
 def load(folder: Path | str) -> Results:
     """Read a run's folder. Raises InputFault where it holds no run."""
     folder = Path(folder)
+    tables: dict[str, Table] = {}
     try:
         run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError) as error:
-        raise InputFault(f"{folder}: not the folder of a run: {error}") from error
-    tables: dict[str, Table] = {}
-    for name in run["rates"]:
-        tables[name] = read_table(folder / f"{name}.csv", tables)
+        for name in run["rates"]:
+            tables[name] = read_table(folder / f"{name}.csv", tables)
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        why = f"{type(error).__name__}: {error}"
+        raise InputFault(f"{folder}: not the folder of a run: {why}") from error
     return Results(folder, run, tables)
 
 

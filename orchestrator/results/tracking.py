@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 MECHANISM, DEVICE = "virtual_mechanism.x", "haptic_device.x_true"
+
+
+class Tracking(NamedTuple):
+    """Distance |x_S - x_D| (mm) and angle |theta_S - theta_D| (rad) at times (s)."""
+
+    time: Vector
+    distance: Vector
+    angle: Vector
 
 
 def table_of(results: Results, signal: str) -> Table | None:
@@ -18,20 +28,19 @@ def has_tracking(results: Results) -> bool:
     return all(table_of(results, signal) for signal in (MECHANISM, DEVICE))
 
 
-def pose_error(results: Results) -> tuple[Vector, Vector, Vector]:
-    """(time s, |x_S - x_D| mm, |theta_S - theta_D| rad) at the mechanism's samples up to the
-    device's last; the device, which has a clock of its own in some scenes, linear between its own.
-    Raises KeyError."""
+def pose_error(results: Results) -> Tracking:
+    """At the mechanism's samples up to the device's last; the device, which has a clock of its own
+    in some scenes, linear between its own. Raises KeyError where there is no such signal."""
     mechanism, device = table_of(results, MECHANISM), table_of(results, DEVICE)
     if mechanism is None or device is None:
-        raise KeyError(f"{results.folder}: tracking needs {MECHANISM} and {DEVICE}")
+        raise KeyError(f"tracking needs the signals {MECHANISM} and {DEVICE}")
     time = mechanism["time"]
     time = time[time <= device["time"][-1]]
     x, y, theta = (
         mechanism[MECHANISM][: len(time), i] - np.interp(time, device["time"], device[DEVICE][:, i])
         for i in range(3)
     )
-    return time, np.hypot(x, y) * 1e3, np.abs(theta)
+    return Tracking(time, np.hypot(x, y) * 1e3, np.abs(theta))
 
 
 def tracking(results: Results) -> tuple[Vector, Vector]:

@@ -18,6 +18,17 @@ Measure = Callable[[Experiment], Row]
 Tell = Callable[[int], None]
 
 
+class Unfinished(Fault):
+    """Ctrl-C ended a sweep of `of` runs when it had `done` of them."""
+
+    def __init__(self, done: int, of: int, folder: Path) -> None:
+        self.done, self.of = done, of
+        super().__init__(
+            f"interrupted: {done} of {of} runs are in {folder}/table.csv; "
+            "the same command does the rest"
+        )
+
+
 def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row:
     """The row of one job; its results live in `room` (None: the machine's own) until measured."""
     assert each.scene is not None
@@ -76,10 +87,7 @@ def sweep(
     except OSError as error:
         raise Fault(f"{folder}: {error}") from error
     if interrupted or len(told) < len(jobs):
-        raise Fault(
-            f"interrupted: {len(told)} of {len(jobs)} runs are in {folder}/table.csv; "
-            "the same command does the rest"
-        )
+        raise Unfinished(len(told), len(jobs), folder)
     return told
 
 

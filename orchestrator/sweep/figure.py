@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from hapticlink.orchestrator.sweep.grid import number
 from hapticlink.orchestrator.sweep.row import METRIC, Row
 from hapticlink.orchestrator.sweep.table import columns
 from hapticlink.orchestrator.sweep.title import axis, title
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 NAMES = {
     METRIC: "largest tracking error (mm)",
@@ -42,9 +45,9 @@ def check(metric: str, scenes: Sequence[Scene]) -> None:
         raise InputFault(f"--metric {unknown('column of numbers', metric, known)}")
 
 
-def draw(rows: Sequence[Row], keys: Sequence[str], folder: Path, metric: str | None) -> str | None:
-    """Write sweep.png and give its name; None where no row has a number to draw. Raises
-    InputFault for a metric that is no column."""
+def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) -> Figure | None:
+    """The figure; None where no row has a number to draw. Raises InputFault for a metric that is no
+    column."""
     known = [c for c in columns(rows) if any(isinstance(r.get(c), int | float) for r in rows)]
     if known and metric and metric not in known:
         raise InputFault(f"--metric {metric}: no column of numbers; there are {', '.join(known)}")
@@ -66,11 +69,15 @@ def draw(rows: Sequence[Row], keys: Sequence[str], folder: Path, metric: str | N
         lost = sum(not _shown(r, metric) for r in rows)
         found = title(best, best[metric], NAMES.get(metric, metric), keys, lost, len(rows))
         axes.set_title(fill(found, 80), fontsize="medium")
-    figure.savefig(folder / "sweep.png", dpi=130, metadata={"Software": None})
-    return "sweep.png"
+    return figure
 
 
-def _axes(wide: bool) -> tuple[Any, Any]:
+def save(figure: Figure, path: Path) -> None:
+    """The same rows give the same bytes: without the software's version."""
+    figure.savefig(path, dpi=130, metadata={"Software": None})
+
+
+def _axes(wide: bool) -> tuple[Figure, Any]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -17,6 +17,10 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.process import BaseProcess
+from types import ModuleType
+from typing import Any
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.sweep.job import Job
@@ -62,10 +66,25 @@ def _spread(
     return []
 
 
+class _Worker(SpawnProcess):
+    """A spawned process that does not run the caller's script once more, as they do by default:
+    a sweep in it needs no `if __name__ == "__main__"`, and its file need not be there."""
+
+    @staticmethod
+    def _Popen(process: BaseProcess) -> Any:
+        main = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            return SpawnProcess._Popen(process)
+        finally:
+            sys.modules["__main__"] = main
+
+
 @contextmanager
 def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
     before = set(multiprocessing.active_children())
-    context = multiprocessing.get_context("spawn")  # FMUs hold threads and libraries: no fork
+    context = SpawnContext()  # FMUs hold threads and libraries: no fork
+    context.Process = _Worker  # type: ignore[misc]
     pool = ProcessPoolExecutor(
         count, mp_context=context, initializer=_follow, max_tasks_per_child=RUNS
     )

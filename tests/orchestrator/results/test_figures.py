@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
+from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import figures, tables
 from hapticlink.orchestrator.sweep import title
-from tests.orchestrator.conftest import status
 
 
 @pytest.mark.parametrize(
@@ -19,69 +19,58 @@ def test_numbers_are_three_digits_without_powers_of_ten(value: float, text: str)
     assert figures.short(value) == text
 
 
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """The axes of each figure, by file name."""
-    found: dict[str, Any] = {}
-    save = figures._save
-
-    def keep(figure: Any, of: tables.Results, name: str) -> str:
-        found[name] = figure.axes[0]
-        return save(figure, of, name)
-
-    monkeypatch.setattr(figures, "_save", keep)
-    return found
+def drawn(results: tables.Results) -> dict[str, Any]:
+    """The axes of each figure, by its name."""
+    return {name: figure.axes[0] for name, figure in figures.figures(results).items()}
 
 
 def run(scene: str, out: Path, *options: str) -> tables.Results:
-    settings = [part for option in options for part in ("--set", option)]
-    assert status("run", scene, "--out", out, *settings) == 0
-    return tables.load(out)
+    return simulate(scene, out, options).results
 
 
-def test_an_early_end_stands_in_every_title(tmp_path: Path, drawn: dict[str, Any]) -> None:
-    run("closed-loop", tmp_path, "stop_when='virtual_mechanism.x[1]<0.044'")
-    assert {"trajectories.png", "distance.png", "constraints.png", "energies.png"} == set(drawn)
-    for axes in drawn.values():
+def test_an_early_end_stands_in_every_title(tmp_path: Path) -> None:
+    found = drawn(run("closed-loop", tmp_path, "stop_when='virtual_mechanism.x[1]<0.044'"))
+    assert {"trajectories", "distance", "constraints", "energies"} == set(found)
+    for axes in found.values():
         assert "until stop_when ended the run at 0." in axes.get_title().replace("\n", " ")
-    names = [text.get_text() for text in drawn["trajectories.png"].get_legend().get_texts()]
+    names = [text.get_text() for text in found["trajectories"].get_legend().get_texts()]
     assert names == ["operational point x_S", "handle x_D", "start"]
 
 
-def test_obstacles_and_the_force_of_contacts_are_drawn(
-    tmp_path: Path, drawn: dict[str, Any]
-) -> None:
+def test_obstacles_and_the_force_of_contacts_are_drawn(tmp_path: Path) -> None:
     found = run("obstacles", tmp_path, "duration=0.7")
-    patches = drawn["trajectories.png"].patches
+    axes = drawn(found)
+    patches = axes["trajectories"].patches
     assert [type(p).__name__ for p in patches] == ["Circle", "Circle", "Polygon"]
     assert patches[0].center == pytest.approx((72, 12))  # mm, of the disc `pin`
     assert patches[0].radius == pytest.approx(8)
-    force = drawn["contact.png"].lines[0].get_ydata()
+    force = axes["contact"].lines[0].get_ydata()
     F = found.haptics["virtual_mechanism.F_env"]
     assert force == pytest.approx((F[:, 0] ** 2 + F[:, 1] ** 2) ** 0.5)
     assert force.max() > 0
-    run("enclosure", tmp_path, "duration=0.05")
-    (walls,) = drawn["trajectories.png"].patches
+    enclosed = drawn(run("enclosure", tmp_path, "duration=0.05"))
+    (walls,) = enclosed["trajectories"].patches
     assert walls.get_xy()[:4].min(axis=0) == pytest.approx((-30, -45))
 
 
-def test_every_hand_s_point_is_drawn(tmp_path: Path, drawn: dict[str, Any]) -> None:
+def test_every_hand_s_point_is_drawn(tmp_path: Path) -> None:
     found = run("two-hands", tmp_path, "duration=0.1")
-    left = drawn["trajectories.png"].lines[1]
+    left = drawn(found)["trajectories"].lines[1]
     assert left.get_label() == "point left"
     expected = found.haptics["virtual_mechanism.left.x"][:, 0] * 1e3
     assert left.get_xdata() == pytest.approx(expected)
 
 
-def test_a_sampled_spring_shows_its_energy(tmp_path: Path, drawn: dict[str, Any]) -> None:
+def test_a_sampled_spring_shows_its_energy(tmp_path: Path) -> None:
     """All that the mass has gained, its spring's energy counted, is what the hold made."""
     found = run("sampled-spring", tmp_path)
-    (bar,) = drawn["energies.png"].patches
+    axes = drawn(found)["energies"]
+    (bar,) = axes.patches
     x = found.haptics["virtual_mechanism.x"][:, 0]
     v = found.haptics["virtual_mechanism.v"][:, 0]
     energy = 0.5 * v**2 + 50 * x**2  # 1 kg on 100 N/m
     assert bar.get_width() == pytest.approx(energy[-1] - energy[0], rel=1e-6)
-    assert "(J;" in drawn["energies.png"].get_xlabel()
+    assert "(J;" in axes.get_xlabel()
 
 
 def test_the_title_of_a_sweep_has_quantity_unit_and_what_was_lost() -> None:

@@ -359,25 +359,18 @@ def test_rows_that_are_broken_are_made_again(tmp_path: Path) -> None:
     ],
 )
 def test_every_shape_of_a_sweep_has_a_figure(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    keys: tuple[str, ...],
-    lines: int,
-    bars: int,
-    maps: int,
+    keys: tuple[str, ...], lines: int, bars: int, maps: int
 ) -> None:
     """It shows the numbers of all runs that have one and lasted."""
-    drawn, axes_of = [], figure._axes
-    monkeypatch.setattr(figure, "_axes", lambda wide: drawn.append(axes_of(wide)) or drawn[-1])
     values = {"a": [str(i) for i in range(12)], "b": ["1", "2.5", "4"], "h": ["zoh", "foh"]}
     rows: list[row.Row] = [
         {**p, "end": "stop_when" if i == 1 else "duration", "tracking_max_mm": 10.0**i}
         for i, p in enumerate(grid.grid([Axis(k, tuple(values[k])) for k in keys]))
     ]
     del rows[0]["tracking_max_mm"]
-    assert figure.draw(rows, keys, tmp_path, None) == "sweep.png"
-    assert (tmp_path / "sweep.png").is_file()
-    axes = drawn[0][1]
+    found = figure.draw(rows, keys)
+    assert found is not None
+    axes = found.axes[0]
     curves = [line.get_ydata() for line in axes.lines if line.get_marker() == "."]
     widths, cells = [bar.get_width() for bar in axes.patches], axes.collections
     assert (len(curves), len(widths), len(cells)) == (lines, bars, maps)
@@ -386,8 +379,8 @@ def test_every_shape_of_a_sweep_has_a_figure(
     expected = [r["tracking_max_mm"] for r in rows[1:] if r["end"] == "duration"]
     assert sorted(shown[np.isfinite(shown)]) == sorted(expected)
     with pytest.raises(InputFault, match="there are tracking_max_mm"):
-        figure.draw(rows, keys, tmp_path, "tracking")
-    assert figure.draw([row.failed("died", "")], (), tmp_path, None) is None
+        figure.draw(rows, keys, "tracking")
+    assert figure.draw([row.failed("died", "")], ()) is None
 
 
 # --- a cluster --------------------------------------------------------------------------------

@@ -1,0 +1,76 @@
+"""Haptic rendering of linkages: FMUs, co-simulated at separate rates.
+
+    import hapticlink as hl
+
+    r = hl.run("closed-loop", {"graphics.rate": 10})
+    r["virtual_mechanism.x"], r.time("virtual_mechanism.x")
+
+Scenes: `shipped`, `scene`, `explain`. Runs: `run`, `sweep`, `load`. Files: `build`, `export`.
+Raised: `InputFault` for bad input, with all findings of a scene `SceneFault`; each is a `Fault`.
+"""
+
+# In a checkout this file is `api/__init__.py`; installed, it is the package's own.
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hapticlink.orchestrator.api import (
+        Fault,
+        InputFault,
+        Run,
+        RunInterrupted,
+        Scene,
+        SceneFault,
+        Sweep,
+        Table,
+        build,
+        explain,
+        export,
+        load,
+        run,
+        scene,
+        shipped,
+        sweep,
+    )
+
+    __version__: str
+else:
+
+    def __getattr__(name: str) -> Any:
+        """Loads what is behind a name when it is first used: `hapticlink --help` needs none."""
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("hapticlink")
+        if name not in __all__:
+            raise AttributeError(f"module 'hapticlink' has no attribute {name!r}")
+        from hapticlink.orchestrator import api
+
+        return getattr(api, name)
+
+
+__all__ = [
+    "Fault",
+    "InputFault",
+    "Run",
+    "RunInterrupted",
+    "Scene",
+    "SceneFault",
+    "Sweep",
+    "Table",
+    "__version__",
+    "build",
+    "explain",
+    "export",
+    "load",
+    "run",
+    "scene",
+    "shipped",
+    "sweep",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__

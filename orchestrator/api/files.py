@@ -1,0 +1,56 @@
+"""Files made from a scene: its FMUs, and its SSP."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from hapticlink.fmus.native import PLATFORMS
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.fmu_files import fmu_files
+from hapticlink.orchestrator.system.timeline import timeline
+
+
+def build(
+    scene: str | Path | Scene,
+    options: Options = (),
+    *,
+    out: str | Path,
+    all_platforms: bool = False,
+) -> dict[str, Path]:
+    """Build the FMUs of a scene into the folder `out`: the file `<block>.fmu` of each block.
+
+    `all_platforms` compiles native FMUs for Linux, Windows and macOS, not for this machine alone.
+    Raises InputFault where there is nothing to build, or `out` cannot be written to.
+    """
+    read = open_scene.load(scene, options)
+    if all_platforms and read.packaging != "native":
+        raise InputFault("--all-platforms compiles: add --set packaging=native")
+    if not blocks(read):
+        raise InputFault(f"{read.title}: nothing to build: its FMUs are given as files")
+    folder = folders.made(out)
+    with temporary_folders.room() as room:
+        files = fmu_files(read, timeline(read), room, PLATFORMS if all_platforms else ())
+        return {
+            name: Path(shutil.copy(path, folder / f"{name}.fmu")) for name, path in files.items()
+        }
+
+
+def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path) -> Path:
+    """Write a scene as the SSP `out`: FMUs and connections for other tools; rates and holds, which
+    the standard does not know, in an annotation. `run` reads it back.
+
+    Raises InputFault for a scene that cannot be run, or where `out` cannot be written.
+    """
+    from hapticlink.orchestrator.ssp import write  # its XML parsers take a while to load
+
+    read = open_scene.load(scene, options)
+    with built(read) as system:
+        return write.write(read, system, Path(out))

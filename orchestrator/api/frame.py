@@ -1,0 +1,23 @@
+"""Tables as pandas frames, where pandas is installed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from hapticlink.orchestrator.base.faults import InputFault
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def frame(columns: Mapping[str, Any], index: str | None = None) -> pd.DataFrame:
+    """A frame of `columns`, the one of the name `index` as its index. Raises InputFault without
+    pandas."""
+    try:
+        import pandas as pd
+    except ImportError:
+        message = "frame() needs pandas: pip install pandas, or hapticlink with the extra `pandas`"
+        raise InputFault(message) from None
+    made = pd.DataFrame(dict(columns))
+    return made.set_index(index) if index else made

@@ -1,0 +1,83 @@
+"""A run's results as Python sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
+
+from hapticlink.orchestrator.api.frame import frame
+from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.results import figures, summary
+from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.tracking import Tracking, pose_error, table_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Run(Results):
+    """The results of a run, good or not.
+
+    `r["haptics"]` is the Table of a rate, `r["virtual_mechanism.x"]` a signal as a NumPy array:
+    (k,) of a scalar, (k, n) of a vector, (k, n, m) of a matrix, in the units of its FMU. Rates
+    differ, so that each signal has its own k times: `r.time("virtual_mechanism.x")`, in s.
+
+    `tables` are the Tables by rate, `run` is run.json (the scene, versions, holds, energies, ages
+    of samples, timings), `folder` where they stand, None for a run in memory.
+    """
+
+    def __getitem__(self, name: str) -> Any:
+        """The Table of a rate, or a signal of any. Raises KeyError with the names there are."""
+        return self.tables[name] if name in self.tables else self._table(name)[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.tables or any(name in table for table in self.tables.values())
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def time(self, name: str) -> Vector:
+        """The times (s) of a signal, or of a rate's rows. Raises KeyError."""
+        table: Table = self.tables[name] if name in self.tables else self._table(name)
+        return table["time"]
+
+    def frame(self, rate: str) -> pd.DataFrame:
+        """The Table of a rate as a pandas frame over `time` (s), a column an entry of a vector.
+        Raises InputFault without pandas, KeyError."""
+        if rate not in self.tables:
+            raise KeyError(unknown("rate", rate, self.tables))
+        return frame(self.tables[rate], "time")
+
+    @property
+    def fault(self) -> str | None:
+        """What ended the run in bad order, an FMU's fault or a crash; None where it ended in good
+        order, by `stop_when` or the edge of the device's workspace too."""
+        found = self.run.get("fault")
+        return found["message"] if found else None
+
+    def tracking(self) -> Tracking:
+        """Tracking error, `(time, distance, angle)`: |x_S - x_D| (mm) and |theta_S - theta_D| (rad)
+        between operational point and handle, at times (s). Raises KeyError without either."""
+        return pose_error(self)
+
+    def figures(self) -> dict[str, Figure]:
+        """Matplotlib figures by name, of what the scene has: `trajectories`, `distance`, `contact`,
+        `constraints`, `energies`."""
+        return figures.figures(self)
+
+    def _table(self, name: str) -> Table:
+        found = table_of(self, name)
+        if found is None or name == "time":
+            signals = [s for table in self.tables.values() for s in table.signals if s != "time"]
+            raise KeyError(unknown("rate or signal", name, [*self.tables, *signals]))
+        return found
+
+    def __repr__(self) -> str:
+        lines = [f"{self.run['scene']['title']}: {summary.ending(self)}"]
+        lines += [self.fault] if self.fault else []
+        lines += [f"{rate}: {shorten(repr(t), 88)}" for rate, t in self.tables.items()]
+        return "\n  ".join([*lines, f"folder: {self.folder or 'none, in memory'}"])

@@ -1,0 +1,78 @@
+"""Running a scene, and reading a run back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from hapticlink.orchestrator.api.result import Run
+from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.plan import explain
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results import figures, folders, tables
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
+
+
+class RunInterrupted(Interrupted):
+    """Ctrl-C ended a run; `run` holds its results up to then."""
+
+    def __init__(self, run: Run) -> None:
+        super().__init__(run.run["end"]["time"])
+        self.run = run
+
+
+def run(
+    scene: str | Path | Scene,
+    options: Options = (),
+    *,
+    out: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Run a scene, changed by `options` (see `scene`).
+
+    The results are in memory, or in the folder `out` too: a CSV a rate, run.json, plan.txt and
+    figures, in place of those of an earlier run there. `progress` is told the simulated time (s)
+    now and then.
+
+    Raises InputFault before anything runs. A fault of the run itself is no exception: look at
+    `fault` of what is returned, whose results go as far as the run did. Ctrl-C raises
+    RunInterrupted, with the results so far as its `run`.
+    """
+    if out is None:
+        with temporary_folders.room() as room:
+            found = simulate(scene, room, options, progress).results
+        made = Run(None, found.run, found.tables)
+    else:
+        made = _in_folder(scene, Path(out), options, progress)
+    if made.run["end"]["reason"] == "interrupted":
+        raise RunInterrupted(made)
+    return made
+
+
+def _in_folder(
+    scene: str | Path | Scene,
+    folder: Path,
+    options: Options,
+    progress: Callable[[float], None] | None,
+) -> Run:
+    ended = simulate(scene, folder, options, progress)
+    found = ended.results
+    run = found.run
+    if ended.outcome.end_time > 0:
+        try:
+            with (folder / "plan.txt").open("w", encoding="utf-8") as file:
+                file.writelines(f"{line}\n" for line in explain.explain(Plan(ended.system)))
+            run = folders.add(folder, ["plan.txt", *figures.save(figures.figures(found), folder)])
+        except KeyboardInterrupt:
+            message = f"interrupted: {folder} has the results of the run, not all of its figures"
+            raise Fault(message) from None
+    return Run(folder, run, found.tables)
+
+
+def load(folder: str | Path) -> Run:
+    """Read the folder of a run. Raises InputFault where it holds none."""
+    found = tables.load(folder)
+    return Run(found.folder, found.run, found.tables)
