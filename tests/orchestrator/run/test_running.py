@@ -167,7 +167,7 @@ def test_ctrl_c_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path: Path) -
 )
 def test_ctrl_c_before_the_run_says_so(bar: Path, tmp_path: Path, body: str, when: str) -> None:
     code = (
-        "import hapticlink.orchestrator.scene_file as s, os, signal\n"
+        "import hapticlink.orchestrator.open_scene as s, os, signal\n"
         "from contextlib import suppress\n"
         "interrupt, load = lambda: os.kill(os.getpid(), signal.SIGINT), s.load\n"
         "def interrupted(*a):\n"
