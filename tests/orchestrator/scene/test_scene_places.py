@@ -121,7 +121,7 @@ def test_shape_faults_and_others_are_told_together(tmp_path: Path) -> None:
     for message in (
         "line 3: hold: no hold 'zog'",
         "line 4: duration: '1' should be a valid number",
-        "line 6: graphics.rate: 'fast' should be a number (Hz) or a fraction",
+        "line 6: graphics.rate: 'fast' should be a number (Hz), a fraction",
         "line 7: connection[0].to: is missing",
         "line 8: connection[0].from: no FMU 'handle'; did you mean 'hand'?",
         "line 10: hand.type: no type 'sprin'",

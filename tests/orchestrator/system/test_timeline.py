@@ -149,7 +149,7 @@ def test_variable_rates_of_fmus_survive_an_ssp(tmp_path: Path) -> None:
         ("{ min = 60, max = 10 }", "swap them"),
         ("[0.1, 0.2]", "the times end before duration = 0.5 s"),
         ("[0.3, 0.2, 0.5]", "times must rise"),
-        ("'often'", 'should be "haptics" or "graphics" or a number .Hz. or'),
+        ("'often'", 'should be "haptics" or "graphics", a number .Hz., a fraction'),
         ("'graphics'", "add .graphics."),
         ("{ trace = 'none.csv' }", "cannot be read as a trace"),
     ],
