@@ -20,7 +20,7 @@ TYPES = (
 """The FMI types that are numbers, by the name in their get and set functions: FMI 2.0's two,
 FMI 3.0's ten, and Boolean of both."""
 _CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
-_DERIVATIVE = re.compile(r"der\((.+)\)((?:\[[\d, ]+\])?)")
+_DERIVATIVE = re.compile(r"der\((.+)\)")
 _ENTRY = re.compile(r"\[[\d, ]+\]$")
 
 
@@ -116,8 +116,8 @@ def derivatives(model: Any) -> dict[str, str]:
         names = _names(variable)
         if variable.derivative is not None:
             found |= dict(zip(_names(variable.derivative), names, strict=False))
-        elif structured:
-            found |= {y[1] + y[2]: name for name in names if (y := _DERIVATIVE.fullmatch(name))}
+        elif structured and (y := _DERIVATIVE.fullmatch(variable.name)):
+            found |= {y[1] + name.removeprefix(variable.name): name for name in names}
     return found
 
 

@@ -46,8 +46,9 @@ def from_source(source: Source) -> Scene:
             wrong.append(((*path, "rate"), str(fault)))
             del recorded["rate"]
     for fmu in tables_of(data, "fmu"):
-        if isinstance(fmu.get("start"), dict):
-            fmu["start"] = dict(flat(fmu["start"]))
+        for key in ("start", "derivatives"):
+            if isinstance(fmu.get(key), dict):
+                fmu[key] = dict(flat(fmu[key]))
 
     def place(path: Path, message: str) -> Finding:
         key = _dotted(path, data)

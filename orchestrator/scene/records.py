@@ -37,6 +37,8 @@ class ForeignFmu:
     declares where left out, "continuous" where it does not."""
     start: Mapping[str, Value] = field(default_factory=dict)
     """Values of inputs and parameters by name; a list for a whole vector."""
+    derivatives: Mapping[str, str] = field(default_factory=dict)
+    """By an output, the output that is its derivative, where the FMU does not declare it."""
     isolate: bool = False
     """Runs it in a process of its own."""
 

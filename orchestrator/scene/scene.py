@@ -100,7 +100,7 @@ class Scene:
     """Latency of a connection, or a table of latency and loss, by the same names."""
     phases: Mapping[str, Seconds] = field(default_factory=dict)
     """End of an FMU's first step, by the FMU's name; whole periods follow."""
-    kinds: Mapping[str, Kind | Literal["none"]] = field(default_factory=dict)
+    kinds: Mapping[str, Literal[Kind, "none"]] = field(default_factory=dict)
     """What a signal is where its FMU does not say, by connection; "none" overrides its FMU."""
     power: tuple[PowerPort, ...] = ()
     """Efforts and displacements of FMUs other than the scene's own blocks."""

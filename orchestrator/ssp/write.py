@@ -151,9 +151,11 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
             scene.graphics, mode="json", exclude_none=True, include={"rate", "align", "phase"}
         )
     as_json = partial(pydantic.TypeAdapter(AnyRate).dump_python, mode="json")
+    derivatives = {f.name: dict(f.derivatives) for f in scene.fmu if f.derivatives}
     found["fmu"] = {
         u.name: {"rate": as_json(rates[u.name]), "timing": u.description.timing}
         | ({"isolate": True} if u.isolate else {})
+        | ({"derivatives": derivatives[u.name]} if u.name in derivatives else {})
         for u in system.fmus
     }
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}

@@ -127,9 +127,8 @@ def _misfit(
         return f"rows of {c.source_port} name things: between two samples there is none"
     if needs == "derivative" and derivative(c, fmus) is None:
         return (
-            f"{c.source} does not put out the derivative of {c.source_port} (an output whose "
-            f"`derivative` it is, or der({c.source_port})); take 'foh', which makes it from two "
-            "samples"
+            f"{c.source} does not put out the derivative of {c.source_port}, or does not say so "
+            "(docs/holds.md, Derivatives); take 'foh', which makes it from two samples"
         )
     if needs == "power" and not carries_power(c, power):
         return (

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from hapticlink.orchestrator.base.faults import unknown
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, conversion
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
-from hapticlink.orchestrator.system.fmu_tables import settable
+from hapticlink.orchestrator.system.fmu_tables import outputs, settable
 from hapticlink.orchestrator.system.system import Connection
 
 
@@ -25,24 +24,24 @@ def connect(
     fed: dict[tuple[str, str], str] = {}
     for path, wire in wires:
         (giver, output), (taker, entry) = (e.split(".", 1) for e in (wire.from_, wire.to))
-        outputs: tuple[Scalar, ...] = ()
+        given: tuple[Scalar, ...] = ()
         inputs: tuple[Scalar, ...] = ()
         try:
-            outputs = _outputs(described[giver], output)
+            given = outputs(described[giver], output)
         except ValueError as error:
             problems.append(((*path, "from"), str(error)))
         try:
             inputs = settable(described[taker], entry)
         except ValueError as error:
             problems.append(((*path, "to"), str(error)))
-        if not outputs or not inputs:
+        if not given or not inputs:
             continue
         try:
-            inputs = _converted(wire, described[giver], outputs, described[taker], inputs)
+            inputs = _converted(wire, described[giver], given, described[taker], inputs)
         except ValueError as error:
             problems.append((path, str(error)))
             continue
-        made = Connection(giver, output, taker, entry, outputs, inputs)
+        made = Connection(giver, output, taker, entry, given, inputs)
         twice = [s.name for s in inputs if (taker, s.name) in fed]
         if twice:
             message = f"{taker}.{twice[0]} is fed by {fed[taker, twice[0]]} already; keep one"
@@ -70,29 +69,19 @@ def whole(
             yield (*path, "to"), message
 
 
-def _outputs(found: Description, name: str) -> tuple[Scalar, ...]:
-    outputs = found.port(name, "output")
-    if not outputs:
-        others = [s for s in found.scalars if name in (s.name, s.port)]
-        if others:
-            raise ValueError(f"{name} is no output, its causality is {others[0].causality}")
-        raise ValueError(unknown("output", name, dict.fromkeys(s.port for s in found.outputs)))
-    return outputs
-
-
 def _converted(
     wire: Wire,
     giver: Description,
-    outputs: tuple[Scalar, ...],
+    given: tuple[Scalar, ...],
     taker: Description,
     inputs: tuple[Scalar, ...],
 ) -> tuple[Scalar, ...]:
     """The inputs with what the connection does to their values. Raises ValueError."""
-    if len(outputs) != len(inputs) or inputs[0].type == "String":
-        sizes = f"{wire.from_} has {len(outputs)} numbers, {wire.to} takes {len(inputs)}"
+    if len(given) != len(inputs) or inputs[0].type == "String":
+        sizes = f"{wire.from_} has {len(given)} numbers, {wire.to} takes {len(inputs)}"
         raise ValueError(f"{sizes}; connect their entries one by one")
     found = []
-    for a, b in zip(outputs, inputs, strict=True):
+    for a, b in zip(given, inputs, strict=True):
         units = SAME
         if wire.convert:
             try:

@@ -1,4 +1,5 @@
-"""[[fmu]] tables against the FMUs that they name: descriptions and start values."""
+"""[[fmu]] tables against the FMUs that they name: descriptions, start values, and the entries of
+a name."""
 
 from __future__ import annotations
 
@@ -26,6 +27,11 @@ def fmus(scene: Scene, problems: list[Problem]) -> Iterator[tuple[ForeignFmu, De
             continue
         if fmu.timing:
             found = replace(found, timing=fmu.timing)
+        for name, derivative in fmu.derivatives.items():
+            try:
+                found = _with_derivative(found, name, derivative)
+            except ValueError as error:
+                problems.append((("fmu", i, "derivatives", name), str(error)))
         starts: list[Starts] = []
         for name, value in fmu.start.items():
             try:
@@ -35,6 +41,15 @@ def fmus(scene: Scene, problems: list[Problem]) -> Iterator[tuple[ForeignFmu, De
         yield fmu, found, sum(starts, ())
 
 
+def _with_derivative(found: Description, name: str, derivative: str) -> Description:
+    """Raises ValueError where the two are no outputs of one size."""
+    entries, slopes = outputs(found, name), outputs(found, derivative)
+    if len(entries) != len(slopes):
+        raise ValueError(f"{derivative} has {len(slopes)} entries for the {len(entries)} of {name}")
+    declared = {a.name: b.name for a, b in zip(entries, slopes, strict=True)}
+    return replace(found, derivatives={**found.derivatives, **declared})
+
+
 def _start(found: Description, name: str, value: Value) -> Starts:
     """Raises ValueError for a name that takes no start, and values that do not fit it."""
     scalars = settable(found, name, start=True)
@@ -42,6 +57,17 @@ def _start(found: Description, name: str, value: Value) -> Starts:
     if len(values) != len(scalars):
         raise ValueError(f"{len(values)} values for the {len(scalars)} of {name}")
     return tuple((s, fitting(s, given)) for s, given in zip(scalars, values, strict=True))
+
+
+def outputs(found: Description, name: str) -> tuple[Scalar, ...]:
+    """The entries of an output. Raises ValueError where there is none."""
+    entries = found.port(name, "output")
+    if not entries:
+        others = [s for s in found.scalars if name in (s.name, s.port)]
+        if others:
+            raise ValueError(f"{name} is no output, its causality is {others[0].causality}")
+        raise ValueError(unknown("output", name, dict.fromkeys(s.port for s in found.outputs)))
+    return entries
 
 
 def settable(found: Description, name: str, start: bool = False) -> tuple[Scalar, ...]:

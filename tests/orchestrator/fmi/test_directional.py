@@ -112,7 +112,7 @@ def test_start_values_by_directional_derivatives(
     tmp_path: Path, offered: float, flags: tuple[str, ...], used: bool, isolate: bool
 ) -> None:
     made = looped(tmp_path, offered, flags)
-    made = replace(made, units=tuple(replace(u, isolate=isolate) for u in made.units))
+    made = replace(made, fmus=tuple(replace(u, isolate=isolate) for u in made.fmus))
     _, table = solved(made, tmp_path)
     p, q, k, c = 100.0, 1.0, 100.0, 1.0
     force = (p * (0.5 + k * 0.3 + c * 0.2) - q * 0.1) / (1 + p)

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.orchestrator.foreign_fmus import NUMBERS, c_fmu3, python_fmu, run
+from hapticlink.orchestrator.fmi.description import describe
+from tests.orchestrator.foreign_fmus import NUMBERS, c_fmu3, edited, python_fmu, run
 
 ONE = '[[fmu]]\nname = "one"\npath = "types.fmu"\n'
 ISOLATED = "isolate = true\n"
@@ -32,6 +33,24 @@ def test_start_values_of_every_type(
         np.testing.assert_array_equal(column[0], 0.0)
         np.testing.assert_array_equal(column[1:], np.float32(0.1) if kind == "Float32" else value)
     assert log.read_text(encoding="utf-8").splitlines() == ["Grüße", "terminate", "free"]
+
+
+def test_which_output_is_the_derivative_of_which(tmp_path: Path) -> None:
+    """By value reference (FMI 3.0 section 2.4.7.4), entry by entry of an array."""
+
+    def change(text: str) -> str:
+        size = '<Dimension start="2"/>'
+        text = text.replace('"out_Float32" valueReference="3" ', '"slope" valueReference="3" ')
+        for name, more in (("out_Float64", ""), ("slope", 'derivative="1" ')):
+            head, tail = text.split(f'name="{name}" ')
+            text = f'{head}{more}name="{name}" ' + tail.replace("/>", f">{size}</{kind(name)}>", 1)
+        return text
+
+    def kind(name: str) -> str:
+        return "Float32" if name == "slope" else "Float64"
+
+    found = describe(edited(c_fmu3(tmp_path), change))
+    assert found.derivatives == {"out_Float64[1]": "slope[1]", "out_Float64[2]": "slope[2]"}
 
 
 def test_connections_to_every_type_round_to_whole_numbers(tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def test_a_step_that_fails_is_taken_back_and_shortened(
     tmp_path: Path, failure: int, isolate: bool
 ) -> None:
     made = controlled(tmp_path, brittle(tmp_path, failure))
-    made = replace(made, units=tuple(replace(u, isolate=isolate) for u in made.units))
+    made = replace(made, fmus=tuple(replace(u, isolate=isolate) for u in made.fmus))
     outcome, table = simulate(made, tmp_path)
     assert outcome.fault is None
     steps = outcome.steps["haptics"]
@@ -98,8 +98,8 @@ def test_errors_are_measured_against_nominal_values(tmp_path: Path) -> None:
         one = native(tmp_path, "one", nominal=nominal)
         made = controlled(tmp_path, one, tolerance=tolerance)
         two = native(tmp_path, "two", nominal=nominal)
-        units = (made.units[0], replace(made.units[1], description=two))
-        return simulate(replace(made, units=units), tmp_path)[0]
+        units = (made.fmus[0], replace(made.fmus[1], description=two))
+        return simulate(replace(made, fmus=units), tmp_path)[0]
 
     large, larger = solved(1e6, 2e-7), solved(2e6, 1e-7)
     coarse, usual = solved(100.0, 0.02), solved(1.0, 0.02)

@@ -1,0 +1,273 @@
+"""What ports mean comes from the FMU: under any name, twice, in an SSP, and never from a name."""
+
+from __future__ import annotations
+
+import re
+import uuid
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.system.assemble import from_scene
+from hapticlink.orchestrator.system.fmu_files import fmu_files
+from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import timeline
+from tests.orchestrator.conftest import status
+from tests.orchestrator.foreign_fmus import python_fmu_of, run, scene
+
+
+def system(path: object, folder: Path, *options: str) -> System:
+    read = open_scene.load(str(path), options)
+    time = timeline(read)
+    return from_scene(read, time, fmu_files(read, time, folder))
+
+
+# --- FMUs of others -----------------------------------------------------------------------
+
+FOREIGN = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.u, self.y = [0.0] * 4, [0.955, -0.296, 0.296, 0.955]
+        for i, entry in enumerate(("1,1", "1,2", "2,1", "2,2")):
+            self.add("u[%s]" % entry, Fmi2Causality.input, self.u, i)
+            self.add("{matrix}[%s]" % entry, Fmi2Causality.output, self.y, i)
+        for name in ("x", "v", "F_hand"):
+            kind = Fmi2Causality.input if name == "F_hand" else Fmi2Causality.output
+            self.add(name, kind, [0.0], 0)
+
+    def add(self, name, causality, values, i):
+        self.register_variable(Real(name, causality=causality, getter=lambda: values[i],
+                                    setter=lambda v: values.__setitem__(i, v)))
+
+    def do_step(self, time, size):
+        if "{matrix}" == "seen":
+            self.y[:] = self.u
+        return True
+"""
+ROTATION = np.array([0.955, -0.296, 0.296, 0.955])
+
+
+def rotating(folder: Path, matrix: str) -> str:
+    """A rotation matrix on a port `matrix` at 16 Hz, held at first order by a fast FMU."""
+    for name, port in (("Slow", matrix), ("Fast", "seen")):
+        python_fmu_of(folder, FOREIGN.format(name=name, matrix=port), uuid.uuid4().hex)
+    return f"""
+hold = "foh"
+[[fmu]]
+name = "slow"
+path = "Slow.fmu"
+rate = 16
+[[fmu]]
+name = "fast"
+path = "Fast.fmu"
+[[connection]]
+from = "slow.{matrix}"
+to = "fast.u"
+"""
+
+
+@pytest.mark.parametrize("matrix", ["M", "P_c", "Lambda_inv", "D", "contacts"])
+def test_a_foreign_matrix_passes_unchanged_whatever_its_name(tmp_path: Path, matrix: str) -> None:
+    experiment, found = run(tmp_path, rotating(tmp_path, matrix))
+    assert found.run["holds"] == {f"slow.{matrix} -> fast.u": "foh"}
+    assert found.run["held_as"] == {}
+    assert experiment.outcome.fault is None
+    seen = np.stack([found.haptics[f"fast.seen[{e}]"] for e in ("1,1", "1,2", "2,1", "2,2")], 1)
+    np.testing.assert_array_equal(seen[1:], np.broadcast_to(ROTATION, seen[1:].shape))
+
+
+def test_a_scene_says_what_a_foreign_matrix_is(tmp_path: Path) -> None:
+    text = rotating(tmp_path, "M") + '[kinds]\n"slow.M" = "semidefinite"\n'
+    _, found = run(tmp_path, text)
+    assert found.run["held_as"] == {"slow.M -> fast.u": "semidefinite"}
+    assert abs(found.haptics["fast.seen[1,2]"][-1]) < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ('[holds]\n"slow.x" = "foh-derivative"', "does not put out the derivative of x"),
+        ('[holds]\n"slow.x" = "passive"', "it carries no power that is known"),
+    ],
+)
+def test_nothing_is_guessed_from_the_name_of_a_foreign_port(
+    tmp_path: Path, more: str, why: str
+) -> None:
+    wire = '[[connection]]\nfrom = "slow.x"\nto = "fast.F_hand"\n'
+    text = rotating(tmp_path, "M") + wire + more
+    with pytest.raises(SceneFault, match=why):
+        system(scene(tmp_path, text), tmp_path)
+
+
+DERIVATIVES = """
+[[fmu]]
+name = "slow"
+path = "Slow.fmu"
+rate = 16
+derivatives = {{ {} }}
+[[fmu]]
+name = "fast"
+path = "Fast.fmu"
+[[connection]]
+from = "slow.x"
+to = "fast.F_hand"
+hold = "foh-derivative"
+"""
+
+
+def test_a_scene_says_which_output_is_a_derivative_and_its_ssp_too(tmp_path: Path) -> None:
+    rotating(tmp_path, "M")
+    path = scene(tmp_path, DERIVATIVES.format('x = "v"'))
+    assert status("export", path, "--out", tmp_path) == 0
+    for made in (path, tmp_path / "scene.ssp"):
+        (wire,) = system(made, tmp_path).connections
+        assert wire.hold == "foh-derivative"
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ('y = "v"', "no output 'y'; there are M, x, v"),
+        ('x = "F_hand"', "F_hand is no output, its causality is input"),
+        ('x = "M"', "M has 4 entries for the 1 of x"),
+    ],
+)
+def test_a_derivative_that_cannot_be_is_refused(tmp_path: Path, said: str, why: str) -> None:
+    rotating(tmp_path, "M")
+    with pytest.raises(SceneFault, match=why) as refused:
+        system(scene(tmp_path, DERIVATIVES.format(said)), tmp_path)
+    assert "line 9: fmu[0] (slow).derivatives" in str(refused.value)
+
+
+# --- the project's own, under other names -------------------------------------------------
+
+WIRES = (
+    ("mechanism.x", "control.x_S"),
+    ("mechanism.v", "control.v_S"),
+    ("device.x", "control.x_D"),
+    ("device.v", "control.v_D"),
+    ("device.M", "control.M"),
+    ("control.F_motor", "device.F_motor"),
+    ("control.F_drift", "mechanism.F_drift"),
+    ("mechanism.Lambda_inv", "control.Lambda_inv"),
+    ("mechanism.P_c", "control.P_c"),
+)
+BLOCKS = {"control": "controller", "device": "haptic_device", "mechanism": "virtual_mechanism"}
+
+
+def twice(folder: Path, start: str = "") -> Path:
+    """Two loops of the blocks of `closed-loop-direct`, by other names; the mechanisms at 30 Hz."""
+    assert status("build", "closed-loop-direct", "--out", folder) == 0
+    text = 'hold = "foh"\n'
+    for side in ("left", "right"):
+        for name, block in BLOCKS.items():
+            rate = "rate = 30\n" if name == "mechanism" else ""
+            text += f'[[fmu]]\nname = "{side}_{name}"\npath = "{block}.fmu"\n{rate}'
+            text += start if (side, name) == ("right", "control") else ""
+        for source, target in WIRES:
+            text += f'[[connection]]\nfrom = "{side}_{source}"\nto = "{side}_{target}"\n'
+    return scene(folder, text, rate=512)
+
+
+HOLDS = [
+    f'holds."{side}_{end}"="{hold}"'
+    for side in ("left", "right")
+    for end, hold in (
+        ("control.x_S", "pspm"), ("control.v_S", "pspm"), ("mechanism.F_drift", "passive"),
+    )
+]  # fmt: skip
+
+
+def test_two_of_each_block_keep_what_their_ports_mean(tmp_path: Path) -> None:
+    made = system(twice(tmp_path, "start.K_pc = [5, 6, 7]\n"), tmp_path, *HOLDS)
+    for side in ("left", "right"):
+        kinds = {c.source_port: c.kind for c in made.connections if c.source.startswith(side)}
+        assert kinds.pop("Lambda_inv") == "semidefinite"
+        assert kinds.pop("P_c") == "projector"
+        assert set(kinds.values()) == {None}
+    power = {p.effort: (p.displacement, p.sign) for p in made.power}
+    assert power["left_mechanism.F_drift"] == ("left_mechanism.x", -1.0)
+    assert power["right_device.F_motor"] == ("right_device.x_true", 1.0)
+    gains = {s.set_position: (s.position, s.stiffness, s.damping) for s in made.springs}
+    damping = (20.0, 20.0, 0.02)
+    assert gains == {
+        "left_control.x_S": ("left_control.x_D", (100.0, 100.0, 0.1), damping),
+        "right_control.x_S": ("right_control.x_D", (5.0, 6.0, 7.0), damping),
+    }
+    assert not made.refused
+    assert {c.hold for c in made.connections} == {None, "foh", "pspm", "passive"}
+
+
+def test_the_derivative_is_the_blocks_own_too(tmp_path: Path) -> None:
+    holds = [f'holds."left_mechanism.{port}"="foh-derivative"' for port in ("x", "Lambda_inv")]
+    path = twice(tmp_path)
+    assert system(path, tmp_path, holds[0])
+    with pytest.raises(SceneFault, match="does not put out the derivative of Lambda_inv"):
+        system(path, tmp_path, holds[1])
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ("start.K_pc = [-5, 6, 7]\n", r"a gain of its spring is below 0: \[-5.0, 6.0, 7.0\]"),
+        ("", "sets no spring whose energy is known"),
+    ],
+)
+def test_a_spring_of_gains_that_do_not_do_is_refused(tmp_path: Path, more: str, why: str) -> None:
+    path = twice(tmp_path, more)
+    if not more:  # gains that come over a connection are not known before the run
+        wire = '[[connection]]\nfrom = "left_mechanism.x"\nto = "right_control.K_pc"\n'
+        path.write_text(path.read_text() + wire + "convert = false\n")
+    with pytest.raises(SceneFault, match=why):
+        system(path, tmp_path, *HOLDS)
+
+
+def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path: Path) -> None:
+    options = ("duration=0.2", "hold=pspm", "holds.virtual_mechanism.F_drift=passive")
+    flags = [text for option in options for text in ("--set", option)]
+    assert status("export", "closed-loop-direct", "--out", tmp_path, *flags) == 0
+    path, renamed = tmp_path / "closed-loop-direct.ssp", tmp_path / "renamed.ssp"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(renamed, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name.endswith(".ssd"):
+                blocks = "|".join(("hand", *BLOCKS.values()))
+                content = re.sub(rf"\b({blocks})\b(?!\.fmu)", r"my_\1", content.decode()).encode()
+            new.writestr(name, content)
+    own = simulate("closed-loop-direct", tmp_path / "own", options)
+    again = simulate(str(renamed), tmp_path / "renamed")
+    assert again.outcome.fault is None
+    for table in ("haptics.csv", "graphics.csv"):
+        _, rows = (tmp_path / "own" / table).read_text().split("\n", 1)
+        assert (tmp_path / "renamed" / table).read_text().split("\n", 1)[1] == rows
+    for key in ("holds", "held_as", "energies"):
+        expected, found = (experiment.results.run[key] for experiment in (own, again))
+        assert {re.sub(r"\bmy_", "", name): value for name, value in found.items()} == expected
+    assert len(own.results.run["energies"]) == 2
+
+
+def test_none_is_a_kind_too(tmp_path: Path) -> None:
+    """Mobility, its entries held each for itself; P_c stays what it is."""
+    option = 'kinds."virtual_environment.Lambda_inv"="none"'
+    made = system("closed-loop", tmp_path, "hold=foh", option)
+    kinds = {c.source_port: c.kind for c in made.connections if c.source == "virtual_environment"}
+    assert kinds == {"Lambda_inv": None, "P_c": "projector"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "why"),
+    [("projector", "x has 3 entries, and a projector matrix is square"),
+     ("rotation", "'projector', 'semidefinite', 'angle', 'table' or 'none'")],
+)  # fmt: skip
+def test_a_kind_that_cannot_be_is_refused_at_its_key(tmp_path: Path, kind: str, why: str) -> None:
+    with pytest.raises(SceneFault, match=why) as refused:
+        system("closed-loop", tmp_path, f'kinds."virtual_mechanism.x"="{kind}"')
+    assert "--set" in str(refused.value)
