@@ -34,6 +34,8 @@ def pose_error(results: Results) -> Tracking:
     mechanism, device = table_of(results, MECHANISM), table_of(results, DEVICE)
     if mechanism is None or device is None:
         raise KeyError(f"tracking needs the signals {MECHANISM} and {DEVICE}")
+    if not len(device["time"]):  # a fault before the first row
+        return Tracking(*np.zeros((3, 0)))
     time = mechanism["time"]
     time = time[time <= device["time"][-1]]
     x, y, theta = (

@@ -123,6 +123,17 @@ def test_a_fault_of_the_run_is_told_with_its_results(bar: Path, tmp_path: Path) 
     assert hl.run(bar).fault is None
 
 
+def test_a_fault_before_the_first_step_has_no_samples() -> None:
+    far = {"linkage.operational_point": {"body": "link2", "at": [0.9, 0.0]}}
+    lost = hl.run("closed-loop", far)
+    assert "outside the device's workspace" in str(lost.fault)
+    assert [len(part) for part in lost.tracking()] == [0, 0, 0]
+    assert lost.figures() == {}
+    (row,) = hl.sweep("closed-loop", {"duration": [0.1]}, far, jobs=1).rows
+    assert row["end"] == "fault"
+    assert "outside the device's workspace" in row["message"]
+
+
 def test_what_a_killed_run_has_written_can_be_looked_at(bar: Path, tmp_path: Path) -> None:
     whole = hl.run(bar, out=tmp_path)
     run = tmp_path / "run.json"
