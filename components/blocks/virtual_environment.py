@@ -1,12 +1,7 @@
 """The virtual environment (the report's graphics block): a copy of the linkage at graphics rate.
 
-A PD graphics controller pulls the copy to the haptic mechanism (section 4.2.2). With the
-report's gains, B_g on an inertia of about 0.002 kg.m2 is stiff far beyond any explicit step of
-10 to 60 Hz, so the pull is integrated linearly implicitly (h substep, velocity terms explicit):
-
-    (D + h J'B_g J + h^2 J'K_g J) qd+
-        = D qd + h (J'(K_g (x_ref - x) + B_g v_ref) - C qd + W' lambda)
-    W qd+ = 0,   q+ = q + h qd+, then projected on the closures
+It follows the mechanism by its coordinates, moved onto the closures, or is pulled by a PD graphics
+controller as in section 4.2.2 (`follow_mechanism`).
 
 It computes what the haptic side is too busy for: Lambda^-1 (B.13), the projector on the resisted
 directions (in place of B.14) and their number, the contact geometry, and whether it is on the
@@ -20,14 +15,12 @@ import numpy as np
 
 from hapticlink.components.component import POSE, TWIST, Block, Component, Variable
 from hapticlink.components.contact import contact_forces
+from hapticlink.components.dynamics import follow_mechanism
 from hapticlink.components.dynamics import local_model as held_matrices
-from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_closed
-from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.constrained_directions import resisted_directions
 from hapticlink.components.dynamics.massless_bodies import require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.projection import MU, projection
 from hapticlink.components.dynamics.variables import (
     direction_outputs,
     direction_parameters,
@@ -58,27 +51,15 @@ def virtual_environment(
 
     Raises AssemblyError where a loop does not close, MasslessError where a massless body is free.
     """
-    joint_sync = copy.sync == "joint"
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     units = coordinate_units(linkage)
-    rates = tuple(f"{u}/s" for u in units)
-    n = len(units)
-    inputs = [
-        Variable("x_ref", (3,), POSE, description="pose of the mechanism's operational point"),
-        Variable("v_ref", (3,), TWIST, description="its velocity"),
-    ]
-    if joint_sync or linkage.loop:
-        inputs.append(Variable("q_ref", (n,), units, description="the mechanism's coordinates"))
-    if joint_sync:
-        inputs = inputs[2:]
-        inputs.append(Variable("qd_ref", (n,), rates, description="the mechanism's joint rates"))
     block = Block(
-        inputs=inputs,
+        inputs=follow_mechanism.inputs(linkage, copy),
         parameters=[
             *parameters(linkage),
             *start_parameters(linkage),
-            *_gains(copy),
+            *follow_mechanism.gains(copy),
             *(_direction_parameters(linkage, directions) if directions else []),
             *(contact_forces.detection_parameters(linkage, contacts) if contacts else []),
         ],
@@ -93,7 +74,7 @@ def virtual_environment(
         ],
     )
     model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
-    q1, qd1 = _pulled(block, model, joint_sync)
+    q1, qd1 = follow_mechanism.step(block, model, copy)
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial, step = {"q": q0, "qd": qd0}, {"q": q1, "qd": qd1}
     output = {"x": model.x_h, "v": model.v_h, "q": model.q}
@@ -117,25 +98,12 @@ def virtual_environment(
         initial=initial,
         step=step,
         output=output,
-        substeps=copy.substeps,
+        substeps=1 if copy.sync == "exact" else copy.substeps,
         documentation=__doc__ or "",
     )
     require_closed(component, model)
     require_inertia(component, model)
     return component
-
-
-def _gains(copy: GraphicsCopy) -> list[Variable]:
-    if copy.sync == "joint":
-        return [
-            Variable("K_g", (), "1/s2", copy.joint_stiffness, "pull on a coordinate's error"),
-            Variable("B_g", (), "1/s", copy.joint_damping, "pull on its rate"),
-        ]
-    stiffness, damping = ("N/m", "N/m", "N.m/rad"), ("N.s/m", "N.s/m", "N.m.s/rad")
-    return [
-        Variable("K_g", (3,), stiffness, copy.stiffness, "stiffness of the graphics controller"),
-        Variable("B_g", (3,), damping, copy.damping, "damping of the graphics controller"),
-    ]
 
 
 def _direction_parameters(linkage: Linkage, directions: Directions) -> list[Variable]:
@@ -158,28 +126,6 @@ def _branch_outputs(linkage: Linkage) -> list[Variable]:
         Variable("branch_ok", description="1 on the mechanism's branch, 0 folded"),
         Variable("q_error", (), "1", description="norm of q_ref - q"),
     ]
-
-
-def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX, ca.SX]:
-    """(q, qd) after one linearly implicit substep."""
-    u, p, h, q, qd = block.u, block.p, block.h, model.q, model.qd
-    D = TreeInertia(model)
-    if joint_sync:
-        solver = ClosedLoopSolver(D, model.W, MU)
-        pull = D.apply(p["K_g"] * (u["q_ref"] - q) + p["B_g"] * u["qd_ref"])
-        weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
-    else:
-        K_g, B_g = ca.diag(p["K_g"]), ca.diag(p["B_g"])
-        held = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
-        solver = ClosedLoopSolver(TreeInertia(model, held), model.W, MU)
-        pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
-        weight = ca.SX(1)
-    momentum = D.apply(qd) + h * (pull - model.C_qd)
-    qd1, _ = solver.solve(momentum / weight, ca.SX(solver.m, 1))
-    # Twice: a frame's motion is large for one chord of the closures.
-    project = projection(model, D)
-    closed, rate = project(*project(q + h * qd1, qd1, p.vector), p.vector)
-    return closed, rate
 
 
 def _branch(block: Block, model: LinkageModel) -> dict[str, ca.SX]:

@@ -243,11 +243,12 @@ class Mechanism:
 
 @dataclass(frozen=True, kw_only=True)
 class GraphicsCopy:
-    """The graphics-rate copy of the mechanism and the PD controller that pulls it (section B.6)."""
+    """The graphics-rate copy, and how it follows the mechanism (section B.6)."""
 
-    sync: Literal["operational", "joint"] = "operational"
-    """operational: the copy is pulled at the operational pose (the report), and may fold to the
-    other assembly of links; joint: at every joint coordinate."""
+    sync: Literal["exact", "operational", "joint"] = "exact"
+    """exact: the copy takes the mechanism's coordinates, moved onto the closures; operational: a PD
+    controller pulls it at the operational pose (the report), and it may fold to the other assembly
+    of links; joint: it is pulled at every joint coordinate."""
     stiffness: Stiffness = (1000.0, 1000.0, 10000.0)
     """K_g, on the operational pose."""
     damping: Damping = (100.0, 100.0, 10000.0)
@@ -257,4 +258,4 @@ class GraphicsCopy:
     joint_damping: Annotated[float, Quantity("1/s", ge=0)] = 200.0
     """Joint acceleration for an error of the joint velocity, with sync = "joint"."""
     substeps: Substeps = 20
-    """Integration steps within a frame."""
+    """Integration steps within a frame, of the pulls."""

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hapticlink.components.blocks.virtual_environment import virtual_environment
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
@@ -40,7 +42,7 @@ def test_mobility_and_projector_at_the_start():
 @pytest.mark.parametrize("substeps", [1, 20])
 def test_report_gains_are_stable_at_any_graphics_rate(rate, substeps):
     """Displaced by 5 mm and 0.2 rad, the copy settles on a reference at rest."""
-    component = environment(substeps=substeps)
+    component = environment(sync="operational", substeps=substeps)
     block = Running(component)
     elsewhere = block.y["q"] + np.array([0.1, 0.1, 0.0, 0.0])
     target = Running(component, parameters={"q_start": elsewhere}).y
@@ -86,8 +88,42 @@ def test_joint_synchronisation_stays_on_the_branch_where_the_pose_alone_folds():
     assert joint[:, 1].max() < 1.0 < pose[:, 1].max()
 
 
+@pytest.mark.parametrize("rate", [10, 30, 60])
+def test_exact_synchronisation_is_where_the_mechanism_was_when_the_frame_began(rate):
+    leader = Running(virtual_mechanism(five_bar(), Mechanism(), step_s=1 / 512))
+    leader.set(F_hand=WRENCH)
+    copy = Running(environment())
+    for k in range(1, 3 * rate + 1):
+        began = leader.y
+        copy.set(q_ref=began["q"], qd_ref=began["qd"])
+        copy.step(1 / rate)
+        np.testing.assert_allclose(copy.y["q"], began["q"], atol=1e-12)
+        np.testing.assert_allclose(copy.y["v"], began["v"], atol=1e-11 * np.abs(began["v"]).max())
+        assert copy.y["branch_ok"] == 1
+        while leader.t < k / rate - 1e-9:
+            leader.step(1 / 512)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1))
+def test_exact_synchronisation_closes_what_its_reference_leaves_open(seed):
+    """Off by up to a milliradian, more than Baumgarte stabilisation leaves."""
+    rng = np.random.default_rng(seed)
+    copy = Running(environment())
+    q = copy.y["q"] + rng.uniform(-1e-3, 1e-3, 4)
+    qd = rng.uniform(-5, 5, 4)
+    copy.set(q_ref=q, qd_ref=qd)
+    copy.step(1 / 30)
+    l = TABLE_6_1["l"]  # noqa: E741
+    np.testing.assert_allclose(appendix_a.h(copy.y["q"], l), 0, atol=1e-12)
+    np.testing.assert_allclose(copy.y["q"], q, atol=0.01)
+    closed = copy.x[4:8]
+    np.testing.assert_allclose(appendix_a.W(copy.y["q"], l) @ closed, 0, atol=1e-6)
+    assert copy.y["branch_ok"] == 1
+
+
 def test_folded_copy_is_told():
-    component = environment()
+    component = environment(sync="operational")
     block = Running(component)
     q = block.y["q"]
     block.set(q_ref=q)

@@ -96,7 +96,7 @@ def test_a_truss_resists_in_all_three_directions(mass):
     )
     blocks = (
         virtual_mechanism(truss, Mechanism(), Directions(), step_s=1 / 512),
-        virtual_environment(truss, GraphicsCopy(), Directions()),
+        virtual_environment(truss, GraphicsCopy(sync="operational"), Directions()),
     )
     for block in map(Running, blocks):
         for _ in range(3):

@@ -1,0 +1,92 @@
+"""How the graphics copy follows the mechanism over a frame: three ways, `graphics.sync`.
+
+exact        The mechanism's q and qd are moved onto the closures (`projection`), once: the copy is
+             where the mechanism was when the frame began. It cannot fold, whatever the rate.
+operational  A PD graphics controller pulls the copy at the operational point (section 4.2.2). With
+             the report's gains, B_g on an inertia of about 0.002 kg.m2 is stiff far beyond any
+             explicit step of 10 to 60 Hz, so the pull is integrated linearly implicitly (h substep,
+             velocity terms explicit):
+
+    (D + h J'B_g J + h^2 J'K_g J) qd+
+        = D qd + h (J'(K_g (x_ref - x) + B_g v_ref) - C qd + W' lambda)
+    W qd+ = 0,   q+ = q + h qd+, then projected on the closures
+
+             Links that the operational point does not see can fold to the other assembly.
+joint        The same with every coordinate pulled, by an acceleration K_g (q_ref - q) + B_g qd_ref.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from hapticlink.components.component import POSE, TWIST, Block, Variable
+from hapticlink.components.dynamics.articulated_body import TreeInertia
+from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
+from hapticlink.components.dynamics.projection import MU, projection
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import coordinate_units
+from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
+
+
+def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
+    """What the copy is told of the mechanism; q_ref also where only its branch is compared."""
+    units = coordinate_units(linkage)
+    n, rates = len(units), tuple(f"{u}/s" for u in units)
+    x_ref = Variable("x_ref", (3,), POSE, description="pose of the mechanism's operational point")
+    v_ref = Variable("v_ref", (3,), TWIST, description="its velocity")
+    q_ref = Variable("q_ref", (n,), units, description="the mechanism's coordinates")
+    qd_ref = Variable("qd_ref", (n,), rates, description="the mechanism's joint rates")
+    if copy.sync == "operational":
+        return [x_ref, v_ref, *([q_ref] if linkage.loop else [])]
+    return [q_ref, qd_ref]
+
+
+def gains(copy: GraphicsCopy) -> list[Variable]:
+    if copy.sync == "exact":
+        return []
+    if copy.sync == "joint":
+        return [
+            Variable("K_g", (), "1/s2", copy.joint_stiffness, "pull on a coordinate's error"),
+            Variable("B_g", (), "1/s", copy.joint_damping, "pull on its rate"),
+        ]
+    stiffness, damping = ("N/m", "N/m", "N.m/rad"), ("N.s/m", "N.s/m", "N.m.s/rad")
+    return [
+        Variable("K_g", (3,), stiffness, copy.stiffness, "stiffness of the graphics controller"),
+        Variable("B_g", (3,), damping, copy.damping, "damping of the graphics controller"),
+    ]
+
+
+def step(block: Block, model: LinkageModel, copy: GraphicsCopy) -> tuple[ca.SX, ca.SX]:
+    """(q, qd) after a frame (exact) or a substep of it (pulled)."""
+    if copy.sync == "exact":
+        return _exact(block, model)
+    return _pulled(block, model, copy.sync == "joint")
+
+
+def _exact(block: Block, model: LinkageModel) -> tuple[ca.SX, ca.SX]:
+    n = model.q.numel()
+    at = LinkageModel(model.linkage, block.p, ca.SX.sym("q", n), ca.SX.sym("qd", n))
+    project = projection(at, TreeInertia(at))
+    closed, rate = project(block.u["q_ref"], block.u["qd_ref"], block.p.vector)
+    return closed, rate
+
+
+def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX, ca.SX]:
+    u, p, h, q, qd = block.u, block.p, block.h, model.q, model.qd
+    D = TreeInertia(model)
+    if joint_sync:
+        solver = ClosedLoopSolver(D, model.W, MU)
+        pull = D.apply(p["K_g"] * (u["q_ref"] - q) + p["B_g"] * u["qd_ref"])
+        weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
+    else:
+        K_g, B_g = ca.diag(p["K_g"]), ca.diag(p["B_g"])
+        held = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
+        solver = ClosedLoopSolver(TreeInertia(model, held), model.W, MU)
+        pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
+        weight = ca.SX(1)
+    momentum = D.apply(qd) + h * (pull - model.C_qd)
+    qd1, _ = solver.solve(momentum / weight, ca.SX(solver.m, 1))
+    # Twice: a frame's motion is large for one chord of the closures.
+    project = projection(model, D)
+    closed, rate = project(*project(q + h * qd1, qd1, p.vector), p.vector)
+    return closed, rate
