@@ -6,11 +6,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.report import chapter1, chapter3, chapter6, page, section_b6
+from hapticlink.orchestrator.report import (
+    chapter1,
+    chapter3,
+    chapter6,
+    graphics_copy,
+    page,
+    section_b6,
+)
 from hapticlink.orchestrator.report.entry import Entry, Runs
 from hapticlink.orchestrator.results import folders
 
-CHAPTERS = (chapter1, chapter3, chapter6, section_b6)
+CHAPTERS = (chapter1, chapter3, chapter6, graphics_copy, section_b6)
 
 
 def reproduce(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Path:

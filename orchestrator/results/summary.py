@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.results.tables import Results
-from hapticlink.orchestrator.results.tracking import DEVICE, table_of
+from hapticlink.orchestrator.results.tracking import DEVICE, folded, table_of
 
 
 def ending(results: Results) -> str:
@@ -25,6 +25,12 @@ def lines(results: Results) -> Iterator[str]:
     """A line for each kind of thing in run.json, and for each joint whose start was moved far."""
     run = results.run
     yield from _start(results)
+    off, frames = folded(results)
+    if off:
+        yield (
+            f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
+            "Lambda_inv, P_c and contacts: take graphics.sync = 'exact'"
+        )
     for fmu, count in run["held_outputs"].items():
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
     for fmu, count in run["smaller_steps"].items():

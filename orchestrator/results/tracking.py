@@ -1,4 +1,5 @@
-"""The tracking error: what lies between the operational point and the handle, x_S - x_D."""
+"""How the parts of a run follow each other: the tracking error x_S - x_D between operational point
+and handle, and the frames in which the graphics copy is folded."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import numpy as np
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 MECHANISM, DEVICE = "virtual_mechanism.x", "haptic_device.x_true"
+BRANCH = "virtual_environment.branch_ok"
 
 
 class Tracking(NamedTuple):
@@ -49,3 +51,12 @@ def tracking(results: Results) -> tuple[Vector, Vector]:
     """(time s, |x_S - x_D| mm, rotation apart)."""
     time, distance, _ = pose_error(results)
     return time, distance
+
+
+def folded(results: Results) -> tuple[int, int]:
+    """(frames in which the graphics copy is on another assembly of its loops than the mechanism,
+    all frames); (0, 0) where no copy tells."""
+    table = table_of(results, BRANCH)
+    if table is None:
+        return 0, 0
+    return int((table[BRANCH] == 0).sum()), len(table[BRANCH])

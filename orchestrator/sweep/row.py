@@ -11,7 +11,7 @@ import numpy as np
 
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.tables import Results, Vector
-from hapticlink.orchestrator.results.tracking import has_tracking, pose_error
+from hapticlink.orchestrator.results.tracking import folded, has_tracking, pose_error
 
 Row = dict[str, Any]
 
@@ -34,6 +34,7 @@ def measure(experiment: Experiment) -> Row:
         **_tracking(results),
         **_largest(results, "closure_max_m", "virtual_mechanism.closure_error"),
         **_switches(results),
+        **_folded(results),
     }
     if made:
         found["held_energy_made_J"] = sum(made.values())
@@ -74,6 +75,11 @@ def _rms(values: Vector) -> float:
 def _largest(results: Results, column: str, signal: str) -> Row:
     found = next((t[signal] for t in results.tables.values() if signal in t), None)
     return {} if found is None or not len(found) else {column: float(np.abs(found).max())}
+
+
+def _folded(results: Results) -> Row:
+    count, frames = folded(results)
+    return {"folded_frames": count} if frames else {}
 
 
 def _switches(results: Results) -> Row:
