@@ -21,7 +21,7 @@ def power(fmus: Iterable[Fmu]) -> Iterator[PowerPort]:
 def springs(fmus: Iterable[Fmu], connections: Collection[Connection]) -> Iterator[SetSpring]:
     """The springs within FMUs, with the gains that they start with; not those whose gains a
     connection sets, which are known only when the run begins."""
-    fed = {(c.target, s.port) for c in connections if c.initial for s in c.inputs}
+    fed = {(c.target, s.port) for c in connections if c.to_parameter for s in c.inputs}
     for fmu in fmus:
         for declared in fmu.description.springs:
             if not {(fmu.name, declared.stiffness), (fmu.name, declared.damping)} & fed:
