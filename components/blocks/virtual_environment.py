@@ -17,7 +17,7 @@ from hapticlink.components.component import POSE, TWIST, Block, Component, Varia
 from hapticlink.components.contact import contact_forces
 from hapticlink.components.dynamics import follow_mechanism
 from hapticlink.components.dynamics import local_model as held_matrices
-from hapticlink.components.dynamics.assembly import assemble, require_closed
+from hapticlink.components.dynamics.assembly import assemble, require_assembled
 from hapticlink.components.dynamics.constrained_directions import resisted_directions
 from hapticlink.components.dynamics.massless_bodies import require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
@@ -101,7 +101,7 @@ def virtual_environment(
         substeps=1 if copy.sync == "exact" else copy.substeps,
         documentation=__doc__ or "",
     )
-    require_closed(component, model)
+    require_assembled(component, model)
     require_inertia(component, model)
     return component
 

@@ -20,7 +20,7 @@ from hapticlink.components.contact import contact_forces
 from hapticlink.components.contact.detection import touches
 from hapticlink.components.dynamics import closure_diagnostics, further_points, local_model
 from hapticlink.components.dynamics.articulated_body import TreeInertia
-from hapticlink.components.dynamics.assembly import assemble, require_closed
+from hapticlink.components.dynamics.assembly import assemble, require_assembled
 from hapticlink.components.dynamics.constrained_directions import resisted_directions
 from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
@@ -135,7 +135,7 @@ def virtual_mechanism(
         shared=not frame_s,
         tables=tables,
     )
-    require_closed(component, model)
+    require_assembled(component, model)
     require_inertia(component, model)
     return component
 

@@ -1,31 +1,41 @@
-"""Assembly of a start pose: Newton steps of least norm on the loop closures.
+"""Assembly of a start pose, and of the start velocity that the loops allow.
 
-    q_{k+1} = q_k - W' (W W')^-1 h(q_k)
+    q_{k+1} = q_k - W' (W W')^-1 h(q_k)               Newton steps of least norm
+    qd_{k+1} = qd_k - Z W' (W Z W')^-1 W qd_k         Z = diag(0 where a rate is given, else 1)
 
-The number of steps is fixed, so that an FMU can assemble again, with changed geometry, in
-initialisation mode. Where W loses rank the step is that of the regularised system.
+Rates that the scene gives are kept and the others follow; where the loops leave some of these free,
+by the least change. The number of steps is fixed, so that an FMU can assemble again, with changed
+geometry, in initialisation mode. Where W loses rank the step is that of the regularised system.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.components.component import Component
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, UnitInertia
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import loop_name
+from hapticlink.components.linkage.parameters import COORDINATES, coordinates, loop_name
+from hapticlink.components.specs.linkage import Linkage
 
 STEPS = 12
-MU = 1e-9  # as in closure.py
-TOLERANCE = 1e-9  # of the start pose's gap, m
+RATE_STEPS = 4  # each leaves a share of about MU
+MU = 1e-9  # as in closed_loop_solver.py
+TOLERANCE = 1e-9  # of the start pose's gap, m, and of a given rate, as a share of the largest
 
 
 class AssemblyError(ValueError):
-    """A loop that does not close from the start pose that the scene gives."""
+    """A loop that does not close from the start pose that the scene gives, or start rates that the
+    loops do not allow together."""
 
 
 def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
-    """(q, qd) closest to the model's own that satisfy h = 0 and W qd = 0, as expressions."""
+    """(q, qd) that satisfy h = 0 and W qd = 0, as expressions: q closest to the model's own; qd with
+    the rates that `start_velocity` gives, or closest to them where they cannot be together."""
     q, qd = model.q, model.qd
     if not model.linkage.loop:
         return q, qd
@@ -38,21 +48,35 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     newton = ca.Function(
         "newton", [symbols[0], parameters], [symbols[0] - least.constrain(at.h)], shared
     )
-    project = ca.Function(
-        "project", [*symbols, parameters], [symbols[1] - least.constrain(at.W @ symbols[1])], shared
-    )
+
+    def projected(solver: ClosedLoopSolver) -> ca.Function:
+        rates = symbols[1] - solver.constrain(at.W @ symbols[1])
+        return ca.Function("project", [*symbols, parameters], [rates], shared)
+
     for _ in range(STEPS):
         q = newton(q, parameters)
-    return q, project(q, qd, parameters)
+    if model.linkage.start_velocity:
+        Z = ca.diag(ca.SX(~_given(model.linkage)))
+        others = projected(ClosedLoopSolver(UnitInertia(n), ca.sparsify(at.W @ Z), MU))
+        for _ in range(RATE_STEPS):
+            qd = others(q, qd, parameters)
+    return q, projected(least)(q, qd, parameters)
 
 
-def require_closed(component: Component, model: LinkageModel) -> None:
-    """Raises AssemblyError naming each loop that stays open from the default start pose."""
-    start = component.initialize(component.start_inputs, component.start_parameters)
+def _given(linkage: Linkage) -> NDArray[np.bool_]:
+    """Of each coordinate, whether `start_velocity` gives its rate."""
+    named = {j.name: (1.0,) * COORDINATES[j.type] for j in linkage.joint}
+    given = {name: value for name, value in named.items() if name in linkage.start_velocity}
+    return np.array(coordinates(linkage, given), dtype=bool)
+
+
+def require_assembled(component: Component, model: LinkageModel) -> None:
+    """Raises AssemblyError naming each loop that stays open from the default start pose, and start
+    rates that were not kept, with the nearest that the loops allow."""
     n = model.q.numel()
-    gaps = ca.Function("h", [model.q, model.p.vector], [model.h])(
-        start[:n], component.start_parameters
-    )
+    start = component.initialize(component.start_inputs, component.start_parameters)
+    q, qd = start[:n], np.array(start[n : 2 * n]).ravel()
+    gaps = ca.Function("h", [model.q, model.p.vector], [model.h])(q, component.start_parameters)
     for i, loop in enumerate(model.linkage.loop):
         left = float(ca.norm_2(gaps[2 * i : 2 * i + 2]))
         if not left < TOLERANCE:
@@ -62,3 +86,22 @@ def require_closed(component: Component, model: LinkageModel) -> None:
                 f"{left:.3g} m are left from the start pose given; "
                 "check the lengths, or start nearer to a closed pose"
             )
+    wanted = np.array(coordinates(model.linkage, model.linkage.start_velocity))
+    largest = np.abs([*wanted, *qd]).max(initial=0.0)
+    if (np.abs(qd - wanted) > TOLERANCE * largest)[_given(model.linkage)].any():
+        raise AssemblyError(
+            f"`linkage.start_velocity` gives {', '.join(_rates(model.linkage, wanted))}, and the "
+            "loops do not allow these rates together: leave out those that follow from others, or "
+            f"give what is nearest, {', '.join(_rates(model.linkage, qd))}"
+        )
+
+
+def _rates(linkage: Linkage, qd: NDArray[np.float64]) -> Iterator[str]:
+    """`crank = 2` for each joint that `start_velocity` names."""
+    place = 0
+    for j in linkage.joint:
+        found = qd[place : place + COORDINATES[j.type]].tolist()
+        place += len(found)
+        if j.name in linkage.start_velocity:
+            value = f"{found[0]:.10g}" if len(found) == 1 else str(found)
+            yield f"{j.name} = {value}"

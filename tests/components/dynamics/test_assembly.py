@@ -1,0 +1,99 @@
+"""Start rates: what a scene gives is kept, the rest is that of the geometry, by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hapticlink.components.blocks.virtual_environment import virtual_environment
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.dynamics.assembly import AssemblyError
+from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
+from hapticlink.orchestrator import open_scene
+from tests.blocks import Running
+
+
+def moving(name: str, **rates: float) -> tuple[Linkage, Running]:
+    scene = open_scene.load(name)
+    assert scene.linkage
+    linkage = replace(scene.linkage, start_velocity=rates)
+    return linkage, Running(virtual_mechanism(linkage, scene.mechanism, step_s=1 / 512))
+
+
+def test_a_given_crank_moves_a_four_bar_as_its_velocity_loop_says() -> None:
+    """i w_a a + i w_b b = i w_c c with the links as complex numbers; joint rates are differences."""
+    _, block = moving("four-bar", crank=2.0)
+    crank, wrist, rocker = block.y["q"]
+    a, b, c = (
+        length * np.exp(1j * angle)
+        for length, angle in ((0.04, crank), (0.12, crank + wrist), (0.09, rocker))
+    )
+    loop = np.array([[b.real, -c.real], [b.imag, -c.imag]])
+    coupler, follower = np.linalg.solve(loop, [-2.0 * a.real, -2.0 * a.imag])
+    np.testing.assert_allclose(block.y["qd"], [2.0, coupler - 2.0, follower], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("joint", "rate"), [("crank", 10.0), ("cylinder", -0.3)])
+def test_a_slider_crank_takes_the_rate_of_either_end(joint: str, rate: float) -> None:
+    """x = r cos a + sqrt(l^2 - r^2 sin^2 a), b = -a - asin(r/l sin a)."""
+    _, block = moving("slider-crank", **{joint: rate})
+    a, r, rod = block.y["q"][0], 0.05, 0.15
+    height = math.sqrt(rod**2 - (r * math.sin(a)) ** 2)
+    slope = -r * math.sin(a) * (1 + r * math.cos(a) / height)
+    crank = rate if joint == "crank" else rate / slope
+    expected = [crank, -crank * (1 + r * math.cos(a) / height), crank * slope]
+    np.testing.assert_allclose(block.y["qd"], expected, rtol=1e-12)
+    given = {"crank": 0, "cylinder": 2}[joint]
+    assert block.y["qd"][given] == pytest.approx(rate, rel=1e-14)
+
+
+def test_what_the_loops_leave_free_changes_least() -> None:
+    """The five-bar has two: of all rates with the given one, the shortest."""
+    linkage, block = moving("five-bar", shoulder1=1.5)
+    still = Running(block.component)
+    free = []
+    for name in ("shoulder2", "elbow1"):
+        rates = {"shoulder1": 0.0, name: 1.0}
+        free.append(moving("five-bar", **rates)[1].y["qd"])
+    base = moving("five-bar", shoulder1=1.5, shoulder2=0.0)[1].y["qd"]
+    along = np.array(free[0])
+    np.testing.assert_allclose(free[1] / free[1][2], along, rtol=1e-10)  # one direction is left
+    shortest = base - along * (along @ base) / (along @ along)
+    np.testing.assert_allclose(block.y["qd"], shortest, rtol=1e-9)
+    np.testing.assert_array_equal(still.y["qd"], block.y["qd"])
+    assert linkage.start_velocity == {"shoulder1": 1.5}
+
+
+def test_too_many_rates_are_refused_with_the_nearest_that_fit() -> None:
+    with pytest.raises(AssemblyError, match=r"gives crank = 2, rocker = 0, .* nearest, ") as told:
+        moving("four-bar", crank=2.0, rocker=0.0)
+    nearest = {}
+    for part in str(told.value).split("nearest, ")[1].split(", "):
+        name, value = part.split(" = ")
+        nearest[name] = float(value)
+    linkage, block = moving("four-bar", crank=nearest["crank"])
+    assert block.y["qd"][2] == pytest.approx(nearest["rocker"], rel=1e-8)
+    twice = replace(linkage, start_velocity=nearest)
+    again = Running(virtual_mechanism(twice, open_scene.load("four-bar").mechanism, step_s=1e-3))
+    np.testing.assert_allclose(again.y["qd"], block.y["qd"], rtol=1e-8)
+
+
+def test_a_copy_starts_with_the_same_rates() -> None:
+    linkage, block = moving("slider-crank", crank=3.0)
+    copy = Running(virtual_environment(linkage, GraphicsCopy(), None))
+    np.testing.assert_allclose(copy.y["v"], block.y["v"], rtol=1e-13)
+
+
+def test_a_piston_at_its_dead_centre_has_no_rate() -> None:
+    scene = open_scene.load("slider-crank")
+    assert scene.linkage
+    dead = {"crank": 0.0, "big_end": 0.0, "cylinder": 0.2}
+    stuck = replace(scene.linkage, start=dead, start_velocity={"cylinder": 0.1})
+    with pytest.raises(AssemblyError, match="cylinder = 0.1"):
+        virtual_mechanism(stuck, scene.mechanism, step_s=1e-3)
+    turning = replace(scene.linkage, start=dead, start_velocity={"crank": 4.0})
+    block = Running(virtual_mechanism(turning, scene.mechanism, step_s=1e-3))
+    np.testing.assert_allclose(block.y["qd"], [4.0, -4.0 * (1 + 0.05 / 0.15), 0.0], atol=1e-12)
