@@ -33,7 +33,8 @@ class Variable:
 
     unit is an SI unit as FMI writes it ("m", "N.m", "rad/s", "1/kg"; "1" has none);
     start one value for all entries or one for each; variability is for parameters. kind and
-    derivative_of, the output that it is the time derivative of, are for outputs; power for inputs.
+    derivative_of, the output that it is the time derivative of, are for outputs, and max, beyond
+    which (None: there is no such size) it has left what the block models; power for inputs.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Variable:
     kind: Kind | None = None
     derivative_of: str | None = None
     power: Power | None = None
+    max: float | None = None
 
     @property
     def size(self) -> int:

@@ -118,4 +118,4 @@ def build_block(
 
         material["compiler"] = compiler_version()
         material["platforms"] = list(platforms) or [host_platform()]
-    return cache.cached(material, make)
+    return cache.cached(material, make, room)

@@ -48,8 +48,11 @@ def build_native(
     """
     from hapticlink.fmus.native import archive, host_platform
 
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     made = archive.entries(
         component,
+        folder,
         stop_time=stop_time,
         step_size=step_size,
         platforms=tuple(platforms) or (host_platform(),),

@@ -5,11 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import sys
 import tempfile
+import time
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -18,7 +21,10 @@ from typing import Any
 
 import hapticlink.components
 import hapticlink.fmus
+from hapticlink.fmus.atomic_file import atomic_file
 
+LONGEST = 3600.0
+"""Seconds that no build takes."""
 VERSIONS = ("hapticlink", "casadi", "pythonfmu")
 
 
@@ -59,11 +65,16 @@ def sources(*packages: ModuleType) -> str:
     return sha.hexdigest()
 
 
-def cached(key_material: Mapping[str, Any], build_function: Callable[[Path], Path]) -> Path:
+def cached(
+    key_material: Mapping[str, Any],
+    build_function: Callable[[Path], Path],
+    room: Path | None = None,
+) -> Path:
     """The FMU for `key_material`, made by `build_function(folder) -> path` if it is not there.
 
     Runs that race build each their own, and the last rename wins: the bytes are the same. A
-    cached file that is damaged is built again. With the cache off, the FMU lands in a new
+    cached file that is damaged is built again. It is built in `room`, which is the caller's to
+    remove, beside its final place where there is none. With the cache off, the FMU lands in a new
     temporary folder, which is the caller's to remove.
     """
     root = folder()
@@ -74,10 +85,26 @@ def cached(key_material: Mapping[str, Any], build_function: Callable[[Path], Pat
         if _is_whole(path):
             return path
     place.mkdir(parents=True, exist_ok=True)
-    # Built beside its final place and moved in whole, so a reader never sees half a file.
-    with tempfile.TemporaryDirectory(prefix=".", dir=place) as room:
-        built = build_function(Path(room))
-        return built.replace(place / built.name)
+    _clear(place)
+    room = room or place
+    room.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=room, prefix=".") as making:
+        built = build_function(Path(making))
+        with atomic_file(place / built.name) as beside:
+            shutil.copyfile(built, beside)
+    return place / built.name
+
+
+def _clear(place: Path) -> None:
+    """Remove what a build left that was killed, on whichever machine that shares the cache."""
+    for left in place.glob(".*"):
+        with suppress(OSError):  # another build removes its own
+            if time.time() - left.stat().st_mtime < LONGEST:
+                continue
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink()
 
 
 def _is_whole(path: Path) -> bool:

@@ -9,6 +9,10 @@ class UnknownOperation(FmuError):
     """A CasADi operation has no straight-line Python form."""
 
 
+class CompilerError(FmuError):
+    """The compiler does not compile."""
+
+
 class UnsupportedPlatform(FmuError):
     """pythonfmu has no binary for this operating system and processor."""
 

@@ -131,6 +131,8 @@ def _model_variables(root: ET.Element, component: Component) -> None:
         real = ET.SubElement(scalar, "Real", unit=unit)
         if start is not None:
             real.set("start", repr(float(start)))
+        if v.max is not None:
+            real.set("max", repr(float(v.max)))
 
     for v, name, unit, start in scalars(component.inputs):
         add(v, name, unit, start, causality="input", variability="continuous")

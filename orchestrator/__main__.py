@@ -1,6 +1,17 @@
-"""`python -m hapticlink.orchestrator`: the command `hapticlink`."""
+"""The command `hapticlink`, and `python -m hapticlink.orchestrator`: signals are held before the
+imports, and from here to the end of the process."""
 
-from hapticlink.orchestrator.commands import main
+import signal
+
+from hapticlink.orchestrator.base import interrupt
+
+
+def main() -> None:
+    with interrupt.held(interrupt.end_process, after=signal.SIG_IGN):
+        from hapticlink.orchestrator.commands import main as command
+
+        command()
+
 
 if __name__ == "__main__":
     main()

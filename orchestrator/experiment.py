@@ -2,43 +2,58 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext, suppress
-from dataclasses import asdict, dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import Any
+
+import numpy as np
 
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.results import folders
-from hapticlink.orchestrator.results.files import write_json, write_over
-from hapticlink.orchestrator.results.tables import Results, load
+from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.tables import Results, Table, load
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.event_loop import Outcome, Progress, run
 from hapticlink.orchestrator.run.open_fmus import isolated
+from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run_json import _ending, _story
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 
-ROOM = 1 << 14
-"""Bytes that run.json keeps for its end, so that a disk which fills up meanwhile has them."""
-
 
 @dataclass(frozen=True)
 class Experiment:
-    """A finished run: its results on disk and how it ended."""
+    """A finished run and how it ended. `run` is what run.json says: in `folder`, unless the run had
+    no row and left there those of an earlier one."""
 
     scene: Scene
     system: System
     outcome: Outcome
     folder: Path
+    run: dict[str, Any]
 
     @property
     def results(self) -> Results:
-        return load(self.folder)
+        if self.outcome.published:
+            return load(self.folder)
+        none: dict[str, Table] = {}
+        for clock, names in _columns(self.system).items():
+            columns = ("time", *names)
+            none[clock] = Table(columns, np.zeros((0, len(columns))), none)
+        return Results(self.folder, self.run, none)
+
+
+def _columns(system: System) -> dict[str, list[str]]:
+    """By clock."""
+    signals = SignalVector(system)
+    return {clock.name: signals.columns(clock.name) for clock in system.timeline.clocks}
 
 
 def simulate(
@@ -49,31 +64,37 @@ def simulate(
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, into `folder`.
 
-    Raises InputFault before anything runs; a fault of the run itself is in the outcome, and
-    its results are kept.
+    Raises InputFault before anything runs, Interrupted where a signal comes before that; a fault of
+    the run itself is in the outcome, and its results are kept. Those of an earlier run in `folder`
+    go when the first rows of this one are there.
     """
+    with interrupt.held():
+        return _simulated(scene, Path(folder), options, progress)
+
+
+def _simulated(
+    scene: str | Path | Scene, folder: Path, options: Options, progress: Progress | None
+) -> Experiment:
     begin = perf_counter()
     read = open_scene.load(scene, options)
-    folder = Path(folder)
     with built(read) as system:
         plan = Plan(system)
-        ages = delays(plan)  # makes all blocks: a ring of sampled blocks is found here
+        plan.check()
         build_time = perf_counter() - begin
-        folders.clear(folders.made(folder))
-        story = _story(read, system) | {"delays": {k: asdict(v) for k, v in ages.items()}}
-        write_json(folder / "run.json", story | {"end": {"reason": "running"}}, ROOM)
+        story = _story(read, system)
         alone = isolated(system.fmus)
         risky = any(fmu.name not in alone for fmu in read.fmu)
-        with crash_monitor.beside(folder) if risky else nullcontext():
-            outcome = run(plan, folder, progress)
-    try:
-        write_json(folder / "run.json", story | _ending(system, outcome, build_time))
-    except OSError as error:
-        if outcome.fault is None:
-            outcome.fault = Fault(f"{folder}: {error.strerror or error}")
-            outcome.reason = "fault"
-        ending = _ending(system, outcome, build_time)
-        least = {key: ending[key] for key in ("end", "fault")}
-        with suppress(OSError):  # a disk that does not write in place keeps "running"
-            write_over(folder / "run.json", story | ending, story | least)
-    return Experiment(read, system, outcome, folder)
+        with RunFolder(folders.made(folder), story) as results:
+            with crash_monitor.beside(folder) if risky else nullcontext():
+                outcome = run(plan, results, progress)
+            ending = _ending(system, outcome, build_time)
+            try:
+                results.end(ending, _columns(system))
+            except OSError as error:
+                if outcome.fault is None:
+                    outcome.fault = Fault(f"{folder}: {error.strerror or error}")
+                    outcome.reason = "fault"
+                ending = _ending(system, outcome, build_time)
+                results.end_in_place(ending)
+            outcome.published = results.published
+    return Experiment(read, system, outcome, folder, story | ending)

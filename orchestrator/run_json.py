@@ -11,6 +11,7 @@ from typing import Any
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan import dependency_order
 from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.event_loop import Outcome
 from hapticlink.orchestrator.scene.blocks import blocks
@@ -129,9 +130,11 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
         "message": str(fault),
     }
     return {
-        "end": {"reason": outcome.reason, "time": outcome.end_time},
+        "end": {"reason": outcome.reason, "time": outcome.end_time}
+        | ({"asked": outcome.asked} if outcome.asked else {}),
         "fault": failed,
         "calls": outcome.calls,
+        "delays": {name: asdict(age) for name, age in outcome.delays.items()},
         "links": outcome.links,
         "isolated": outcome.isolated,
         "held_outputs": outcome.held,
@@ -142,6 +145,7 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
             "steps": outcome.step_time,
         },
         "iterations": outcome.iterations and asdict(outcome.iterations),
+        "unstable": unstable(outcome.energies),
         "controlled_steps": {clock: asdict(steps) for clock, steps in outcome.steps.items()},
     } | energies(system, outcome.energies)
 

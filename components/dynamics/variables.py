@@ -90,7 +90,9 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
     ]
     if m:
         found.append(Variable("lambda", (m,), "N", description="Lagrange multipliers of the loops"))
-        found.append(Variable("closure_error", (), "m", description="largest gap over the loops"))
+        gap = "largest gap over the loops"
+        apart = mean_link_length(linkage)  # a loop that is open by a link is none
+        found.append(Variable("closure_error", (), "m", description=gap, max=apart))
     return found
 
 

@@ -25,9 +25,14 @@ WRAPPER = Path(__file__).parent / "fmi2.c"
 
 
 def entries(
-    component: Component, *, stop_time: float, step_size: float, platforms: Sequence[str]
+    component: Component,
+    folder: Path,
+    *,
+    stop_time: float,
+    step_size: float,
+    platforms: Sequence[str],
 ) -> dict[str, bytes]:
-    """Every file of the FMU, with a binary for each of `platforms`.
+    """Every file of the FMU, with a binary for each of `platforms`, compiled in `folder`.
 
     The GUID is a hash of what the binaries are made of, so a platform's binary does not depend on
     which others are there. Raises FmuError where the component gives no FMU.
@@ -53,7 +58,7 @@ def entries(
     }
     guid = f"{{{uuid.UUID(digest(content)[:32])}}}"
     files["modelDescription.xml"] = describe(guid)
-    with tempfile.TemporaryDirectory(prefix="hapticlink-") as name:
+    with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
         head = f'#define GUID "{guid}"\n'.encode()
         (room / "component.h").write_bytes(head + content["component.h"])

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import fmpy
 
-from hapticlink.fmus.errors import FmuError
+from hapticlink.fmus.errors import CompilerError, FmuError
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
 TARGETS = {
@@ -66,15 +66,15 @@ def compile_library(
 
     platform is one of PLATFORMS, this machine's by default. The FMI headers are on the include
     path, and only what is declared FMI2_Export is exported; `options` are further arguments of
-    the compiler (-DNAME=VALUE, -fvisibility=default). Raises FmuError, with the compiler's
-    words where the source does not compile.
+    the compiler (-DNAME=VALUE, -fvisibility=default). Raises FmuError, CompilerError with the
+    compiler's words where the source does not compile.
     """
     compiler_version()
     source, library = Path(source).resolve(), Path(library).resolve()
     targets = TARGETS.get(platform or host_platform())
     if targets is None:
         raise FmuError(f"no platform {platform!r}; there are {', '.join(PLATFORMS)}")
-    with tempfile.TemporaryDirectory(prefix="hapticlink-") as room:
+    with tempfile.TemporaryDirectory(dir=library.parent) as room:
         slices = [_compiled(source, Path(room), target, options) for target in targets]
         library.write_bytes(slices[0] if len(slices) == 1 else universal(slices))
     return library
@@ -93,7 +93,7 @@ def _compiled(source: Path, room: Path, target: str, options: Iterable[str]) -> 
         command, cwd=made, env=environment, capture_output=True, text=True, check=False
     )
     if done.returncode:
-        raise FmuError(f"{source.name} does not compile for {target}:\n{done.stderr.strip()}")
+        raise CompilerError(f"{source.name} does not compile for {target}:\n{done.stderr.strip()}")
     return (made / "library").read_bytes()
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hapticlink.orchestrator.api.result import Run
-from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan import explain
@@ -34,19 +34,20 @@ def run(
     """Run a scene, changed by `options` (see `scene`).
 
     The results are in memory, or in the folder `out` too: a CSV a rate, run.json, plan.txt and
-    figures, in place of those of an earlier run there. `progress` is told the simulated time (s)
-    now and then.
+    figures, in place of those of an earlier run there, from this one's first row on. `progress` is
+    told the simulated time (s) now and then.
 
     Raises InputFault before anything runs. A fault of the run itself is no exception: look at
     `fault` of what is returned, whose results go as far as the run did. Ctrl-C raises
     RunInterrupted, with the results so far as its `run`.
     """
-    if out is None:
-        with temporary_folders.room() as room:
-            found = simulate(scene, room, options, progress).results
-        made = Run(None, found.run, found.tables)
-    else:
-        made = _in_folder(scene, Path(out), options, progress)
+    with interrupt.held():
+        if out is None:
+            with temporary_folders.room() as room:
+                found = simulate(scene, room, options, progress).results
+            made = Run(None, found.run, found.tables)
+        else:
+            made = _in_folder(scene, Path(out), options, progress)
     if made.run["end"]["reason"] == "interrupted":
         raise RunInterrupted(made)
     return made
@@ -61,12 +62,16 @@ def _in_folder(
     ended = simulate(scene, folder, options, progress)
     found = ended.results
     run = found.run
-    if ended.outcome.end_time > 0:
+    if not ended.outcome.published:
+        return Run(None, run, found.tables)
+    if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
         try:
             with (folder / "plan.txt").open("w", encoding="utf-8") as file:
-                file.writelines(f"{line}\n" for line in explain.explain(Plan(ended.system)))
+                for line in explain.explain(Plan(ended.system)):
+                    interrupt.check()
+                    file.write(f"{line}\n")
             run = folders.add(folder, ["plan.txt", *figures.save(figures.figures(found), folder)])
-        except KeyboardInterrupt:
+        except Interrupted:
             message = f"interrupted: {folder} has the results of the run, not all of its figures"
             raise Fault(message) from None
     return Run(folder, run, found.tables)

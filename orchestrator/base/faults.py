@@ -8,15 +8,20 @@ from dataclasses import dataclass
 
 
 class Fault(Exception):
-    """A failure told to the user in one message, without a traceback."""
+    """A failure told to the user in one message, without a traceback.
+
+    repeatable: the scene gives it again, anywhere and at any time; others come from the machine, as
+    a full disk or a process that was killed."""
 
     exit_status = 1
+    repeatable = False
 
 
 class InputFault(Fault):
     """Something the user wrote cannot be used."""
 
     exit_status = 2
+    repeatable = True
 
 
 @dataclass(frozen=True)
@@ -75,11 +80,20 @@ class FmuFault(Fault):
         time: float,
         messages: Sequence[str] = (),
         passing: bool = False,
+        repeatable: bool = False,
     ) -> None:
         self.fmu, self.what, self.time, self.messages = fmu, what, time, tuple(messages)
-        self.passing = passing
+        self.passing, self.repeatable = passing, repeatable
         said = "".join(f"\n  {fmu} says: {m}" for m in messages)
         super().__init__(f"{fmu}: {what} at t = {time:.6g} s{said}")
+
+
+class Diverged(FmuFault):
+    """A run that has left physics, though its numbers are finite."""
+
+
+class AsksToEnd(FmuFault):
+    """An FMU that asks to end the simulation within a step; nothing is wrong."""
 
 
 class Interrupted(Fault):

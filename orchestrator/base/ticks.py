@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
+from typing import overload
 
 
 def exact(number: int | float | str) -> Fraction:
@@ -25,6 +26,30 @@ def exact(number: int | float | str) -> Fraction:
     if len(text) > 50 or re.search(r"[eE][+-]?\d{4}", text):
         raise ValueError(f"{text[:50]!r}: too long a number")
     return Fraction(text)
+
+
+class Frames(Sequence[int]):
+    """`at(0)` to `at(count - 1)`, made when they are asked for: a run may be of any length. The
+    spacing comes round after `round` of them."""
+
+    def __init__(self, at: Callable[[int], int], count: int, round: int) -> None:
+        self._at, self._count, self.round = at, count, round
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, i: int) -> int: ...
+    @overload
+    def __getitem__(self, i: slice) -> tuple[int, ...]: ...
+    def __getitem__(self, i: int | slice) -> int | tuple[int, ...]:
+        if isinstance(i, slice):
+            return tuple(map(self._at, range(self._count)[i]))
+        return self._at(range(self._count)[i])
+
+    def times(self, factor: int) -> Frames:
+        at = self._at
+        return Frames(lambda i: at(i) * factor, self._count, self.round)
 
 
 @dataclass(frozen=True)
@@ -45,16 +70,22 @@ class Clock:
     @cached_property
     def longest(self) -> int:
         """The longest step (ticks)."""
-        if isinstance(self.starts, range):
-            return self.starts.step
-        return max(b - a for a, b in pairwise(self.starts))
+        return max(self._steps)
 
     @cached_property
     def shortest(self) -> int:
         """The shortest step (ticks) after the first."""
-        if isinstance(self.starts, range):
-            return self.starts.step
-        return min((b - a for a, b in pairwise(self.starts[1:])), default=self.longest)
+        return min(self._steps[1:], default=self.longest)
+
+    @cached_property
+    def _steps(self) -> list[int]:
+        """Every step there is (ticks), the first one first."""
+        starts = self.starts
+        if isinstance(starts, range):
+            return [starts.step]
+        if isinstance(starts, Frames):
+            starts = starts[: starts.round + 2]
+        return [b - a for a, b in pairwise(starts)]
 
     @property
     def period(self) -> int | None:
@@ -101,12 +132,11 @@ def periodic(
     begin = first / base
     if begin.denominator != 1:
         raise ValueError(f"a phase of {first} s is not a whole number of ticks of {base} s")
-    return (0, *range(int(begin), end + 2 * int(ticks) + 1, int(ticks)))
+    later = range(int(begin), end + 2 * int(ticks) + 1, int(ticks))
+    return Frames(lambda i: later[i - 1] if i else 0, len(later) + 1, 1)
 
 
-def aligned(
-    period: Fraction, base: Fraction, end: int, first: Fraction | None = None
-) -> tuple[int, ...]:
+def aligned(period: Fraction, base: Fraction, end: int, first: Fraction | None = None) -> Frames:
     """Frame i at the first tick at or after i periods: ceil(i period / base); or at or after
     `first` (s) and i - 1 periods.
 
@@ -116,7 +146,15 @@ def aligned(
         raise ValueError(f"{1 / period} Hz on ticks of {base} s: take align = 'exact'")
     frames = math.ceil(end * base / period) + 2
     early = Fraction(0) if first is None else period - first
-    return (0, *(math.ceil((i * period - early) / base) for i in range(1, frames + 2)))
+    return Frames(
+        lambda i: math.ceil((i * period - early) / base) if i else 0,
+        frames + 2,
+        min((period / base).denominator, frames),
+    )
+
+
+MOST_DRAWN = 1_000_000
+"""Periods, 100 MB and some seconds; at 60 Hz, 4.6 h."""
 
 
 def variable(
@@ -125,13 +163,18 @@ def variable(
     """Whole-tick periods drawn uniformly between 1/fastest and 1/slowest (rates, Hz).
 
     The generator is numpy's PCG64 with `seed`. Raises ValueError where no whole number of
-    ticks lies between the bounds.
+    ticks lies between the bounds, and for more than MOST_DRAWN periods.
     """
     import numpy as np
 
     low, high = math.ceil(1 / (fastest * base)), math.floor(1 / (slowest * base))
     if not 1 <= low <= high:
         raise ValueError(f"no period between {fastest} and {slowest} Hz is a whole haptic tick")
+    if end // low > MOST_DRAWN:
+        raise ValueError(
+            f"up to {end // low} periods would be drawn before the run, at most {MOST_DRAWN} are: "
+            "take a shorter duration or a fixed rate"
+        )
     generator = np.random.Generator(np.random.PCG64(seed))
     starts = [0]
     while starts[-1] <= end + high:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
 from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError
@@ -17,7 +15,6 @@ app = App(
     name="hapticlink",
     help="Haptic rendering of linkages: FMUs, co-simulated at separate rates.",
     version_flags=["--version"],
-    suppress_keyboard_interrupt=False,  # told below, with the exit status of every other end
 )
 _COMMANDS = {
     "run": "Run a scene: results, run.json and figures.",
@@ -36,35 +33,28 @@ for _name, _help in _COMMANDS.items():
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit: 0 done, 1 the run failed (results kept), 2 bad input."""
-    before = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
-    on_main = threading.current_thread() is threading.main_thread()
-    interrupt.came.raised = False
-    for number, handler in before.items():
-        # SIGTERM as Ctrl-C, so that what is open is closed and temporary folders are removed.
-        if on_main and handler != signal.SIG_IGN:
-            signal.signal(number, interrupt.remember)
-    temporary_folders.clear()
+    with interrupt.held(interrupt.end_process):
+        temporary_folders.clear()
+        try:
+            sys.exit(_status(arguments))
+        finally:
+            temporary_folders.clear()  # of processes of its own that have crashed
+
+
+def _status(arguments: Sequence[str] | None) -> int:
     try:
+        interrupt.check()
         status = app(arguments, result_action="return_value", exit_on_error=False)
         sys.stdout.flush()
+        return status or 0
     except CycloptsError:  # cyclopts has printed it
-        sys.exit(2)
+        return 2
     except Fault as fault:
         print(f"hapticlink: {fault}", file=sys.stderr)
-        sys.exit(fault.exit_status)
+        return fault.exit_status
     except BrokenPipeError:  # whoever reads has enough, as `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+        return 0
     except OSError as error:  # a full disk, a folder that may not be written
         print(f"hapticlink: {error}", file=sys.stderr)
-        sys.exit(1)
-    except KeyboardInterrupt:
-        print("hapticlink: interrupted", file=sys.stderr)
-        sys.exit(1)
-    finally:
-        for number, handler in before.items():
-            if on_main:
-                signal.signal(number, handler)
-        interrupt.came.raised = False
-        temporary_folders.clear()  # of processes of its own that have crashed
-    sys.exit(status or 0)
+        return 1

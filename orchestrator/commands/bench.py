@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.commands.options import Out
 
@@ -46,6 +47,7 @@ def bench(
         task = bar.add_task(what)
 
         def told(text: str, done: int, total: int) -> None:
+            interrupt.check()
             bar.update(task, description=text, completed=done, total=total)
 
         command = f"hapticlink bench {what}{' --quick' * quick}"

@@ -49,9 +49,10 @@ def info(scene: Scene | None = None, /, *, set: Set = None, out: Out = None) -> 
     for connection in made.connections:
         if connection.initial:
             note = "once, at the start"
-        else:
-            age = ages[connection.name]
+        elif age := ages.get(connection.name):
             note = f"{age['least'] * 1e3:.3g} to {age['most'] * 1e3:.3g}"
+        else:
+            note = "at the start only"
         print(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
     if read.device:
         _workspace(read, [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)], out)

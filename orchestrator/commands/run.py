@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
 from hapticlink.orchestrator.commands.progress import progress
 
@@ -31,8 +31,6 @@ def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain =
             made = api.run(read, out=folder, progress=told)
     except api.RunInterrupted as ended:
         made = ended.run
-    except KeyboardInterrupt:  # a run takes those that come while it goes on
-        raise Interrupted from None
     if made.fault:
         print(f"hapticlink: {made.fault}", file=sys.stderr)
     print(f"{default_folder('runs', scene).name}: {summary.ending(made)}")
@@ -43,5 +41,8 @@ def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain =
     print(f"  {wall_time:.2f} s of run time, {speed:.1f} times real time")
     tables = (f"{rate}.csv" for rate in made.tables)
     others = (name for name in made.run["files"] if not name.endswith(".csv"))
-    print(f"  {folder}/: {', '.join([*tables, *others])}")
+    if made.folder:
+        print(f"  {folder}/: {', '.join([*tables, *others])}")
+    else:
+        print(f"  {folder}/ is as it was: the run has no row")
     return Fault.exit_status if made.fault else 0

@@ -49,6 +49,13 @@ def _outside(entry: zipfile.ZipInfo) -> str:
     return ""
 
 
+def require_whole(archive: zipfile.ZipFile) -> None:
+    """Raises InputFault where an entry is not what its CRC-32 was made from."""
+    damaged = archive.testzip()
+    if damaged is not None:
+        raise InputFault(f"{archive.filename}: damaged: entry {damaged!r} has another checksum")
+
+
 def read_xml(archive: zipfile.ZipFile, entry: str) -> bytes:
     """An XML entry, well-formed and without a document type: neither FMI nor SSP has one, and
     entities that expand without end need one. Raises InputFault."""

@@ -18,7 +18,7 @@ from hapticlink.components.base_units import BASES
 from hapticlink.components.ports import Kind, Power, Spring
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi import annotation
-from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.archive import opened, read_xml, require_whole
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import (
     TYPES,
@@ -103,15 +103,19 @@ def describe(path: Path) -> Description:
                 f"{tree.find('CoSimulation') is not None}; "
                 "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
             )
+        block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
         try:
             model = read_model_description(_only_xml(content), validate=False)
             relative, units = differences(tree), {u.name: _unit(u) for u in model.unitDefinitions}
             scalars = tuple(
-                s for v in model.modelVariables for s in numbers(v, version[0], v.name in relative)
+                s
+                for v in model.modelVariables
+                for s in numbers(v, version[0], v.name in relative, bounded=block is not None)
             )
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
         _require_binary(archive, model.coSimulation.modelIdentifier, version[0])
+        require_whole(archive)
     try:
         declared = annotation.read(tree, scalars, units)
     except ValueError as error:

@@ -22,13 +22,15 @@ from fmpy import extract, fmi2
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, FmuFault
+from hapticlink.orchestrator.fmi.bounds import Bounds
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
 from hapticlink.orchestrator.fmi.python_exit import release_at_exit
 from hapticlink.orchestrator.fmi.retry import Retry, Saved
+from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
 from hapticlink.orchestrator.fmi.units import SAME
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
@@ -62,11 +64,15 @@ _CALLBACKS.freeMemory = fmi2.defaultCallbacks.freeMemory
 
 
 class Instance:
-    """A loaded FMU, from instantiation to removal; a context manager.
+    """A loaded FMU, from instantiation to removal; a context manager, which raises FmuFault where
+    the FMU fails in its last call and nothing else has failed.
 
     `outputs` is the view that `get` fills. `connect` gives what writes the values of a board at
     the connected places. `held` counts the outputs that a policy has held at their last value.
+    `ended`: the FMU has asked to end the simulation, so it is only read from then on.
     """
+
+    ended = False
 
     def __init__(
         self,
@@ -85,7 +91,7 @@ class Instance:
         self._good: Vector | None = None
         self._initialized = False
         self.step_time = 0.0
-        self._zeros = np.zeros(len(outputs))
+        self._bounds = Bounds(description, outputs)
         self._status = 0
         self._slave: Any = None
         self._key = next(_keys)
@@ -99,8 +105,10 @@ class Instance:
             raise
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        fault = self.close()
+        if fault and not isinstance(error, Fault | KeyboardInterrupt):
+            raise fault
 
     def _load(self) -> None:
         _messages[self._key] = []
@@ -140,7 +148,25 @@ class Instance:
         do_step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
         # noSetFMUStatePriorToCurrentPoint: whoever can go back may be asked to.
         forward = int("canGetAndSetFMUstate" not in self.description.flags)
-        return lambda time, size: do_step(component, time, size, forward)
+        ended = ended_in_discard(self._slave)
+
+        def advance(time: float, size: float) -> int:
+            status: int = do_step(component, time, size, forward)
+            if status == DISCARD and (end := ended(time)) is not None:
+                self._end(end)
+                return 0
+            return status
+
+        return advance
+
+    def _end(self, end: float) -> None:
+        """The FMU asks to end the simulation at `end` (s). Raises AsksToEnd where its step would
+        have gone on."""
+        time, size = self._stepping
+        if end < time + (1 - SHARE) * size:
+            what = f"asks to end the simulation at {end:.6g} s, within its step"
+            raise AsksToEnd(self.name, what, time, passing=True)
+        self.ended = True
 
     def _transfers(self, verb: str, scalars: Sequence[Scalar], values: Vector) -> list[Transfer]:
         return transfers(self._slave, self.description.fmi, verb, scalars, values)
@@ -158,6 +184,8 @@ class Instance:
         values, setting = self._setting([scalars[i] for i in order])
 
         def set_from(board: Vector) -> None:
+            if self.ended:
+                return
             board.take(where, out=values, mode="clip")  # "raise" would copy through a buffer
             if not plain:
                 values.__imul__(factors).__iadd__(offsets)
@@ -166,7 +194,7 @@ class Instance:
                     if (status := call()) > WARNING:
                         raise self._failed(name, status)
             except Unfit as why:
-                raise self._fault(str(why), self.time) from None
+                raise self._fault(str(why), self.time, repeatable=True) from None
 
         return set_from
 
@@ -180,7 +208,7 @@ class Instance:
             self._retry.renew = varying.renew
 
         def set_from(board: Vector) -> None:
-            if (status := varying.set(board)) > WARNING:
+            if not self.ended and (status := varying.set(board)) > WARNING:
                 raise self._failed(varying.name, status)
 
         return set_from
@@ -216,6 +244,7 @@ class Instance:
 
     def _start_loop(self) -> None:
         self._initialized = True
+        self._bounds.start()
         if self.policy.nan == "hold":
             self._good = self.outputs.copy()
 
@@ -238,17 +267,26 @@ class Instance:
 
     def get(self) -> None:
         """All outputs. Raises FmuFault naming the first that is not finite, unless the policy is
-        to keep its last value."""
+        to keep its last value, and Diverged for the first that is beyond its bound."""
         self.read()
-        if self.outputs.dot(self._zeros) != 0.0:  # 0 x NaN and 0 x inf are NaN
-            if self._good is None:
-                self.require_finite()
-            else:
-                lost = ~np.isfinite(self.outputs)
-                self.outputs[lost] = self._good[lost]
-                self.held += int(lost.sum())
+        if not self._bounds.kept():
+            self._judge()
         if self._good is not None:
             self._good[:] = self.outputs
+
+    def _judge(self) -> None:
+        if self._good is None:
+            self.require_finite()
+        else:
+            lost = ~np.isfinite(self.outputs)
+            self.outputs[lost] = self._good[lost]
+            self.held += int(lost.sum())
+        if beyond := self._bounds.first_beyond():
+            scalar, value, bound = beyond
+            what = f"output {scalar.name} is {value:.3g}, beyond {bound:.3g}: the run has diverged"
+            remedy = "take a higher rate, a finer integrator, or weaker gains"
+            said = f"{what} ({remedy})"
+            raise Diverged(self.name, said, self.time, passing=True, repeatable=True)
 
     @property
     def smaller_steps(self) -> int:
@@ -263,11 +301,14 @@ class Instance:
     def require_finite(self) -> None:
         for scalar, value in zip(self.description.outputs, self.outputs.tolist(), strict=True):
             if not np.isfinite(value):
-                raise self._fault(f"output {scalar.name} is {value!r}", self.time, passing=True)
+                what = f"output {scalar.name} is {value!r}"
+                raise self._fault(what, self.time, passing=True, repeatable=True)
 
     def step(self, time: float, end: float, size: float) -> None:
         """fmi2DoStep from `time` over `size`, to `end` (s)."""
-        self.time = time
+        self.time, self._stepping = time, (time, size)
+        if self.ended:
+            raise AsksToEnd(self.name, "has asked to end the simulation", time)
         begin = clock.perf_counter()
         status = self._advance(time, size)
         self.step_time += clock.perf_counter() - begin
@@ -289,7 +330,7 @@ class Instance:
         if (status := self._saved[slot].restore()) > WARNING:
             raise self._failed(f"fmi{self.description.fmi}SetFMUstate", status)
         self.time = self._saved_time[slot]
-        self._status = 0
+        self._status, self.ended = 0, False
 
     # --- ends -----------------------------------------------------------------------------
 
@@ -299,14 +340,20 @@ class Instance:
         if status == DISCARD and self.policy.discard == "retry":
             why = "in steps of 1/1024 too" if self._retry else Retry.why_not(self.description)
             named += f" ({why})"
-        return self._fault(f"{call} returned {named}", self.time, passing)
+        what = f"{call} returned {named}"
+        return self._fault(what, self.time, passing, repeatable=status == DISCARD)
 
-    def _fault(self, what: str, time: float, passing: bool = False) -> FmuFault:
-        return FmuFault(self.name, what, time, _messages.get(self._key, [])[-5:], passing)
+    def _fault(
+        self, what: str, time: float, passing: bool = False, repeatable: bool = False
+    ) -> FmuFault:
+        said = _messages.get(self._key, [])[-5:]
+        return FmuFault(self.name, what, time, said, passing, repeatable)
 
-    def close(self) -> None:
-        """Terminate where FMI allows it, free, unload, remove the folder; in every state."""
+    def close(self) -> FmuFault | None:
+        """Terminate where FMI allows it, free, unload, remove the folder; in every state. The
+        fault of an FMU that fails in that, which is not called again after a fatal one."""
         slave, self._slave = self._slave, None
+        fault = None
         try:
             if slave is not None and self._status < FATAL:
                 if self._retry is not None:
@@ -314,9 +361,12 @@ class Instance:
                 for saved in self._saved.values():
                     saved.free()
                 if self._status < ERROR and self._initialized:
-                    terminate = slave.dll[f"fmi{self.description.fmi}Terminate"]
-                    terminate(ctypes.c_void_p(slave.component))
-                slave.freeInstance()
+                    terminate = f"fmi{self.description.fmi}Terminate"
+                    status = slave.dll[terminate](ctypes.c_void_p(slave.component))
+                    fault = self._failed(terminate, status) if status > WARNING else None
+                if self._status < FATAL:
+                    slave.freeInstance()
+            return fault
         finally:
             _messages.pop(self._key, None)
             # pythonfmu puts resources/ on sys.path for good.

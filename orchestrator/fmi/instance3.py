@@ -39,7 +39,8 @@ class Instance3(Instance):
         do_step, component = self._slave.dll["fmi3DoStep"], self._slave.component
         event, end, early = (ctypes.c_bool() for _ in range(3))
         told = [ctypes.byref(flag) for flag in (event, end, early)]
-        last = ctypes.byref(ctypes.c_double())
+        reached = ctypes.c_double()
+        last = ctypes.byref(reached)
         forward = ctypes.c_bool("canGetAndSetFMUState" not in self.description.flags)
         instance = ctypes.c_void_p(component)
 
@@ -47,7 +48,7 @@ class Instance3(Instance):
             at, over = ctypes.c_double(time), ctypes.c_double(size)
             status: int = do_step(instance, at, over, forward, *told, last)
             if end and status <= WARNING:
-                raise self._fault("asks to end the simulation", time + size)
+                self._end(reached.value)
             return status
 
         return advance

@@ -8,12 +8,11 @@ answered when somebody asks, so that several FMUs step at the same time (`rounds
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 from hapticlink.orchestrator.fmi.variables import Scalar
@@ -33,6 +32,8 @@ class Isolated(Instance):
     """Outputs that have come with a step and not been read, or why they could not be."""
     _smaller = 0
     _dismissed = False
+    _lost: FmuFault | None = None
+    """How the process ended that was to close its FMU."""
 
     def _load(self) -> None:
         self._pending: list[tuple[int, bytes]] = []
@@ -61,8 +62,8 @@ class Isolated(Instance):
             kind, answer = self._process.answer()
         except Died as how:
             raise self._died(how) from None
-        if kind == "fault":
-            raise FmuFault(self.name, *answer)
+        if kind != "answer":
+            raise {"fault": FmuFault, "end": AsksToEnd}[kind](self.name, *answer)
         return answer
 
     def _ask(self, call: str, *arguments: Any) -> Any:
@@ -96,7 +97,8 @@ class Isolated(Instance):
         where = np.array(places, dtype=np.intp)
 
         def set_from(board: Vector) -> None:
-            self._pending.append((key, board[where].tobytes()))
+            if not self.ended:
+                self._pending.append((key, board[where].tobytes()))
 
         return set_from
 
@@ -124,14 +126,16 @@ class Isolated(Instance):
         return self._smaller
 
     def step(self, time: float, end: float, size: float) -> None:
-        self.time, self._end = time, end
+        if self.ended:
+            raise AsksToEnd(self.name, "has asked to end the simulation", time)
+        self.time, self._until = time, end
         self._send("step", time, end, size)
 
     def finish(self) -> None:
         """Wait for the step. Raises its FmuFault."""
-        outputs, fault, self.step_time, self._smaller = self._answer()
+        outputs, fault, self.ended, self.step_time, self._smaller = self._answer()
         self._fresh = outputs if fault is None else FmuFault(self.name, *fault)
-        self.time = self._end
+        self.time = self._until
 
     def save(self, slot: int = 0) -> None:
         self._ask("save", slot)
@@ -140,7 +144,7 @@ class Isolated(Instance):
     def rollback(self, slot: int = 0) -> None:
         self._pending = []  # inputs are part of the state
         self._ask("rollback", slot)
-        self.time = self._saved_time[slot]
+        self.time, self.ended = self._saved_time[slot], False
 
     def dismiss(self) -> None:
         """Have the FMU closed; `close` waits for that, so that all of a run close together."""
@@ -148,20 +152,24 @@ class Isolated(Instance):
         if process is None or self._dismissed:
             return
         self._dismissed = True
-        with suppress(Died):  # the run has its results, and the process ends in any case
+        try:
             if process.busy:
                 process.answer(CLOSING)
             process.send(([], "close", ()), CLOSING)
+        except Died as how:
+            self._lost = self._died(how)
 
-    def close(self) -> None:
+    def close(self) -> FmuFault | None:
         process = self._process
         try:
             self.dismiss()
             if process is not None and process.busy:
-                with suppress(Died):
-                    process.answer()
+                self._answer()
+        except FmuFault as fault:
+            self._lost = fault
         finally:
             self._process = None
             if process is not None:
                 process.end()
             super().close()
+        return self._lost

@@ -29,7 +29,8 @@ class Scalar:
     """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array.
 
     `conversion` is what a connection does to a value on its way in, `nominal` a size that counts,
-    1 where the FMU gives none (FMI 2.0.5 section 2.2.7).
+    1 where the FMU gives none (FMI 2.0.5 section 2.2.7), `bound` the size beyond which a block of
+    this project has left what it models.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Scalar:
     entry: int = 0
     conversion: Linear = SAME
     nominal: float = 1.0
+    bound: float | None = None
     initial: str | None = None
     items: tuple[tuple[str, int], ...] = ()
     """Of an enumeration: name and value of each."""
@@ -80,8 +82,9 @@ def differences(tree: ElementTree.Element) -> set[str | None]:
     }
 
 
-def numbers(variable: Any, fmi: str, relative: bool) -> Iterator[Scalar]:
-    """The numbers of a variable; entries of an FMI 3.0 array row by row, named from 1."""
+def numbers(variable: Any, fmi: str, relative: bool, bounded: bool = False) -> Iterator[Scalar]:
+    """The numbers of a variable; entries of an FMI 3.0 array row by row, named from 1. bounded: its
+    `max` is one that a run must keep to."""
     kind = _CALLED.get((fmi, variable.type), variable.type)
     if kind not in TYPES:
         return
@@ -102,6 +105,7 @@ def numbers(variable: Any, fmi: str, relative: bool) -> Iterator[Scalar]:
             relative or bool(declared and declared.relativeQuantity == "true"),
             i,
             nominal=_nominal(variable),
+            bound=float(variable.max) if bounded and variable.max else None,
             initial=variable.initial,
             items=tuple((i.name, int(i.value)) for i in declared.items) if declared else (),
         )

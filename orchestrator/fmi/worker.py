@@ -9,11 +9,12 @@ import pickle
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.instance3 import Instance3
 
@@ -67,14 +68,16 @@ class Worker:
         return self.instance.outputs.tobytes()
 
     def step(self, time: float, end: float, size: float) -> Any:
-        """(outputs, or why they cannot be read, time in steps, steps taken in smaller ones)."""
+        """(outputs, or why they cannot be read, whether it has asked to end, time in steps, steps
+        taken in smaller ones)."""
         outputs, fault = b"", None
-        self.instance.step(time, end, size)
+        instance = self.instance
+        instance.step(time, end, size)
         try:
             outputs = self.read()
         except FmuFault as failed:  # told when somebody reads
             fault = _told(failed)
-        return outputs, fault, self.instance.step_time, self.instance.smaller_steps
+        return outputs, fault, instance.ended, instance.step_time, instance.smaller_steps
 
     def save(self, slot: int) -> None:
         self.instance.save(slot)
@@ -84,12 +87,12 @@ class Worker:
 
     def close(self) -> None:
         instance, self._instance = self._instance, None
-        if instance is not None:
-            instance.close()
+        if instance is not None and (fault := instance.close()):
+            raise fault
 
 
 def _told(fault: FmuFault) -> tuple[Any, ...]:
-    return fault.what, fault.time, fault.messages, fault.passing
+    return fault.what, fault.time, fault.messages, fault.passing, fault.repeatable
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
@@ -105,10 +108,11 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             worker.set_all(pending)
             answer = ("answer", getattr(worker, call)(*arguments))
         except FmuFault as fault:
-            answer = ("fault", _told(fault))
+            answer = ("end" if isinstance(fault, AsksToEnd) else "fault", _told(fault))
         pickle.dump(answer, answers)
         answers.flush()
-    worker.close()
+    with suppress(FmuFault):  # there is nobody left to be told
+        worker.close()
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ A watchdog kills a process that is late; the waiting read then ends like any oth
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
 import subprocess
@@ -13,6 +14,8 @@ import threading
 from contextlib import suppress
 from time import monotonic
 from typing import Any
+
+from hapticlink.orchestrator.base import interrupt
 
 ENDING = 10.0
 """Seconds that a process may take to end when nobody asks it anything any more."""
@@ -47,14 +50,23 @@ class Process:
         self._ended = threading.Event()
         self._deadline: float | None = None
         self._late = self.busy = False
+        interrupt.add(self._kill)
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
         while not self._ended.wait(WATCH):
             if self._deadline is not None and monotonic() > self._deadline:
                 self._late = True
-                self._popen.kill()
+                self._kill()
                 return
+
+    def _kill(self) -> None:
+        """The process and those that its FMU has started, its group."""
+        if sys.platform == "win32":
+            self._popen.kill()
+        else:
+            with suppress(OSError):  # there is none any more
+                os.killpg(self._popen.pid, signal.SIGKILL)
 
     def send(self, message: Any, allowed: float) -> None:
         """Raises Died. The answer may take `allowed` seconds from now."""
@@ -91,13 +103,17 @@ class Process:
         return Died(f"ended with exit status {code}")
 
     def end(self) -> int:
-        """The exit status of a process that has nothing more to do; killed where it lingers."""
+        """The exit status of a process that has nothing more to do; killed where it lingers, and
+        so is what it leaves behind."""
         self._ended.set()
+        interrupt.remove(self._kill)
         for stream in (self._requests, self._answers):
             with suppress(OSError):  # bytes that a dead process has not taken
                 stream.close()
         try:
             return self._popen.wait(ENDING)
         except subprocess.TimeoutExpired:
-            self._popen.kill()
+            self._kill()
             return self._popen.wait()
+        finally:
+            self._kill()

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from itertools import groupby
 
-from hapticlink.orchestrator.base.ticks import Clock, exact
+from hapticlink.orchestrator.base.ticks import Clock
 from hapticlink.orchestrator.plan import dependency_order
 from hapticlink.orchestrator.plan.operations import Event, Operation, Repeat
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import uses
+from hapticlink.orchestrator.plan.sample_ages import comes_round, uses
 from hapticlink.orchestrator.system.system import System
 
 LEGEND = """\
@@ -27,7 +26,7 @@ PRINTED = 600
 
 def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
     """Clocks, the block of each kind of event, then a table of the whole run, or of as much of it
-    as tells the rest (`_last`); of the first `rows` events where it is to be cut."""
+    as tells the rest (`comes_round`); of the first `rows` events where it is to be cut."""
     system, timeline = plan.system, plan.system.timeline
     base = timeline.base
     yield LEGEND
@@ -42,7 +41,7 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
     yield from _holds(system)
     for loop in dependency_order.loops(system):
         yield f"  loop {loop.ring}: {', '.join(loop.fmus)} in this order"
-    last, names = _last(system), dict[Event, str]()
+    last, names = comes_round(system), dict[Event, str]()
     events: dict[int, str] = {}
     cut = False
     for tick, event in plan:
@@ -62,20 +61,6 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
         yield f"{tick:>8}  {timeline.seconds(tick):<12.9g} {events[tick]:<3} {target}: {inputs}"
     if cut:
         yield f"cut after {rows} events; a run writes them all to plan.txt"
-
-
-def _last(system: System) -> int:
-    """The last tick of the table: that of the first hyperperiod in which all phases have begun and
-    constant latencies are over, the end of a run in which nothing comes round."""
-    timeline = system.timeline
-    clocks, late = timeline.clocks, [c.latency for c in system.connections if c.latency]
-    drawn = any(way.loss or way.max not in (None, way.min) for way in late)
-    periods = [c.period for c in clocks if c.period]
-    if drawn or len(periods) < len(clocks):
-        return timeline.end
-    begun = max(c.first % c.longest for c in clocks)
-    begun += max((math.ceil(exact(way.min) / timeline.base) for way in late), default=0)
-    return min(timeline.end, begun + math.lcm(*periods))
 
 
 def _letters(n: int) -> str:

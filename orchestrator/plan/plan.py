@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import NamedTuple
 
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
@@ -46,6 +46,11 @@ class Plan:
             return step_control.block(self.system, kind, scheme)
         return scheme(self.system, kind)
 
+    def check(self) -> None:
+        """Raises InputFault where the blocks cannot be made: at the first event all clocks fire, so
+        what their FMUs do to each other is found there."""
+        tuple(self.unrolled(next(iter(self)).event))
+
     def unrolled(self, event: Event) -> Iterator[Operation]:
         """The operations of `event`: a repetition carried out once, step control in one step."""
         for operation in flat(self.block(event)):
@@ -67,9 +72,8 @@ def moments(timeline: Timeline) -> Iterator[Moment]:
 
 def _firings(order: int, clock: Clock, end: int) -> Iterator[tuple[int, int, Firing]]:
     """A step that would end after the end of the run is `final`: it only completes the row."""
-    starts = clock.starts
-    for i in range(len(starts) - 1):
-        start, dticks = starts[i], starts[i + 1] - starts[i]
+    for start, after in pairwise(clock.starts):
         if start > end:
             return
+        dticks = after - start
         yield start, order, Firing(clock.name, dticks, start + dticks > end)

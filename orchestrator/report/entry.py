@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
 
@@ -35,6 +36,7 @@ class Runs:
             self.tell(f"running {command(scene, *options)}")
             folder = self.room / str(len(self._made))
             self._made[key] = simulate(scene, folder, options).results
+            interrupt.check()
         return self._made[key]
 
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 CONTACT = "virtual_mechanism.F_env"
 _ENDS = {
     "stop_when": "stop_when ended the run",
+    "terminated": "an FMU ended the run",
+    "diverged": "the run diverged",
     "interrupted": "the run was interrupted",
     "running": "the last row so far",
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,18 +19,37 @@ class Recorder:
     """Rows of one CSV: `time` and the values of a view, as the shortest text that reads back
     to the same float. A context manager. Each row is on its way to the disk when `row` returns, so
     that a crash loses none; chunks would save no time, which goes into the digits. `last` is the
-    time of the last whole row."""
+    time of the last whole row, None before the first.
 
-    def __init__(self, path: Path, columns: Sequence[str], view: Vector) -> None:
-        self._view, self.last = view, 0.0
-        self._file = path.open("wb", buffering=0)
-        self._write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
+    The file is in its place from `publish` on, which `first` is to see to: it is called when the
+    first row is written."""
+
+    def __init__(
+        self, path: Path, columns: Sequence[str], view: Vector, first: Callable[[], object]
+    ) -> None:
+        self.path, self._view, self._first = path, view, first
+        self.last: float | None = None
+        self._unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+        self._file = self._unfinished.open("wb", buffering=0)
+        try:
+            self._write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
+        except OSError:
+            self.__exit__()
+            raise
 
     def row(self, time: float) -> None:
         # pydantic's JSON writes floats ten times faster than repr, and round-trips too.
         text = to_json([time, *self._view.tolist()], inf_nan_mode="constants")
         self._write(text[1:-1] + b"\n")
-        self.last = time
+        before, self.last = self.last, time
+        if before is None:
+            self._first()
+
+    def publish(self) -> None:
+        """Put the file in the place of an earlier one."""
+        self._file.close()  # Windows moves no open file
+        os.replace(self._unfinished, self.path)
+        self._file = self.path.open("ab", buffering=0)
 
     def _write(self, text: bytes) -> None:
         """All of `text`; or nothing, where the disk is full."""
@@ -49,6 +68,7 @@ class Recorder:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+        self._unfinished.unlink(missing_ok=True)
 
 
 def _quoted(name: str) -> str:

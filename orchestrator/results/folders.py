@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +26,6 @@ def made(folder: Path | str) -> Path:
             return folder
         why = "may not be written to"
     raise InputFault(f"--out {folder}: {why}; name a folder that can be written to")
-
-
-def clear(folder: Path) -> None:
-    """Remove the files that the run.json of an earlier run there lists, and nothing else."""
-    with suppress(OSError, ValueError, AttributeError):
-        for name in json.loads((folder / "run.json").read_text(encoding="utf-8")).get("files", ()):
-            if isinstance(name, str) and Path(name).name == name:
-                (folder / name).unlink(missing_ok=True)
 
 
 def add(folder: Path, names: Iterable[str]) -> dict[str, Any]:

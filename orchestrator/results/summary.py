@@ -17,7 +17,11 @@ def ending(results: Results) -> str:
     run, end = results.run, results.run["end"]
     if "time" not in end:
         return "it has not ended: it still runs, or its process was killed"
-    how = {"stop_when": f"ended by {run['stop_when']}", "duration": "done"}
+    how = {
+        "stop_when": f"ended by {run['stop_when']}",
+        "terminated": f"ended: {end.get('asked')},",
+        "duration": "done",
+    }
     return f"{how.get(end['reason'], end['reason'])} at {end['time']:.6g} s"
 
 
@@ -45,6 +49,8 @@ def lines(results: Results) -> Iterator[str]:
         if link["lost"] or link["overtaken"]:
             lost = f"{link['lost']} of {link['sent']} samples were lost"
             yield f"{name}: {lost}, {link['overtaken']} overtaken"
+    if why := run.get("unstable"):
+        yield f"{why}: the loop is not passive"
     refused = sorted(run["holds_that_did_not_fit"].items(), key=lambda item: item[1]["hold"])
     for hold, group in groupby(refused, key=lambda item: item[1]["hold"]):
         gave_way = [f"{name} ({why['reason']})" for name, why in group]

@@ -3,6 +3,7 @@ crashes the run, it records the end in run.json and removes the temporary folder
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -11,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base import interrupt, temporary_folders
 
 
 @contextmanager
@@ -20,9 +21,11 @@ def beside(folder: Path) -> Iterator[None]:
     command = [sys.executable, "-P", "-m", __name__, str(folder.resolve()), str(os.getpid())]
     # A session of its own: Ctrl-C is for the run. Its input ends when this process does.
     with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
+        interrupt.add(process.kill)
         try:
             yield
         finally:
+            interrupt.remove(process.kill)
             process.kill()
 
 
@@ -32,20 +35,35 @@ def finish(folder: Path, process: int) -> None:
     from hapticlink.orchestrator.results.tables import load
 
     temporary_folders.clear(process)
+    for unfinished in folder.glob(f".*.{process}"):
+        unfinished.unlink()
+    remedy = (
+        "an FMU may have crashed it: with isolate = true it has a process of its own, and the run "
+        "tells which"
+    )
+    if _process(folder) != process:  # the folder has no row of that run
+        print(f"hapticlink: the process ended before its first row; {remedy}", file=sys.stderr)
+        return
     results = load(folder)
     story = dict(results.run)
-    rows = results.tables[story["rates"][0]]["time"]
-    time = float(rows[-1]) if len(rows) else 0.0
-    message = (
-        f"the process of the run ended after t = {time!r} s; an FMU may have crashed it: with "
-        "isolate = true it has a process of its own, and the run tells which"
-    )
+    time = float(results.tables[story["rates"][0]]["time"][-1])
+    message = f"the process of the run ended after t = {time!r} s; {remedy}"
     story |= {
         "end": {"reason": "fault", "time": time},
         "fault": {"kind": "Crash", "message": message},
     }
     write_json(folder / "run.json", story)
     print(f"hapticlink: {message}; results are in {folder}", file=sys.stderr)
+
+
+def _process(folder: Path) -> int | None:
+    """That of the run which goes on in `folder`, by its run.json."""
+    try:
+        end = json.loads((folder / "run.json").read_text(encoding="utf-8"))["end"]
+        process: int | None = end.get("process")
+    except (OSError, ValueError, KeyError):
+        return None
+    return process
 
 
 def main() -> None:

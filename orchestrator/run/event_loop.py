@@ -6,13 +6,12 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
 from hapticlink.orchestrator.plan.operations import (
     Event,
     Get,
@@ -24,78 +23,84 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
 )
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import Ages, Delay
+from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.bind import Binder, Stop
+from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.fixed_point import Iterations, total
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.step_control import Steps
+from hapticlink.orchestrator.system.haptic_loop import WORKSPACE
 
 Progress = Callable[[float], None]
 
 
 @dataclass
 class Outcome:
-    """How a run ended: `fault` is None for a good end, end_time the last recorded row's time;
-    times in s, counts by FMU and call. isolated says why an FMU ran in a process of its own, held
+    """How a run ended: `fault` is None for a good end, end_time the last recorded row's time, asked
+    which FMU asked for the end; published: it has rows, in place of those of an earlier run. Times
+    in s, counts by FMU and call. isolated says why an FMU ran in a process of its own, held
     how often an output was held for not being finite, smaller_steps how many were retried."""
 
     end_time: float = 0.0
     reason: str = "duration"
     fault: Fault | None = None
+    asked: str = ""
+    published: bool = False
     wall_time: float = 0.0
     step_time: dict[str, float] = field(default_factory=dict)
     calls: dict[str, dict[str, int]] = field(default_factory=dict)
     isolated: dict[str, str] = field(default_factory=dict)
     held: dict[str, int] = field(default_factory=dict)
     smaller_steps: dict[str, int] = field(default_factory=dict)
+    delays: dict[str, Delay] = field(default_factory=dict)
     energies: dict[str, Energy] = field(default_factory=dict)
     links: dict[str, dict[str, int]] = field(default_factory=dict)
     iterations: Iterations | None = None
     steps: dict[str, Steps] = field(default_factory=dict)
 
 
-def run(plan: Plan, folder: Path, progress: Progress | None = None) -> Outcome:
-    """Run to the end or to the first fault; what was recorded until then is in `folder`.
+def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Outcome:
+    """Run to the end or to the first fault; what was recorded until then is in `results`.
 
     progress is told the simulated time (s) now and then.
     """
     outcome = Outcome()
     simulation: Simulation | None = None
-
-    def last() -> float:
-        return simulation.recorders[plan.system.timeline.clocks[0].name].last if simulation else 0.0
-
+    ages, counting = Ages(plan), True
     begin = perf_counter()
     try:
         # Values that are not finite are found by 0 x NaN, without numpy's own warning.
-        with ExitStack() as stack, np.errstate(invalid="ignore"):
-            simulation = Simulation(plan.system, folder, stack)
+        with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
+            interrupt.check()
+            simulation = Simulation(plan.system, results, stack)
             bound = _Bound(plan, simulation)
-            interrupted = stack.enter_context(interrupt.watch())
             simulation.start()
             begin = perf_counter()
             for count, (tick, event) in enumerate(plan):
                 for call in bound.calls(event):
                     call(tick)
-                if interrupted:
-                    raise Interrupted(simulation.seconds(tick))
+                if counting:
+                    counting = ages.event(tick, event)
+                interrupt.check(simulation.seconds(tick))
                 if progress and not count % 64:
                     progress(simulation.seconds(tick))
     except Stop:
         outcome.reason = "stop_when"
+    except AsksToEnd as end:
+        outcome.reason, outcome.asked = "terminated", f"{end.fmu} {end.what}"
     except Fault as fault:
-        outcome.reason, outcome.fault = (
-            "interrupted" if isinstance(fault, Interrupted) else "fault",
-            fault,
-        )
+        outcome.reason, outcome.fault = _reason(fault), fault
     except OSError as error:  # a full disk, most of all
-        outcome.fault, outcome.reason = Fault(f"{folder}: {error.strerror or error}"), "fault"
+        full = Fault(f"{results.folder}: {error.strerror or error}")
+        outcome.reason, outcome.fault = "fault", full
     except KeyboardInterrupt:  # a second signal does not wait for the end of the event
-        outcome.fault, outcome.reason = Interrupted(last()), "interrupted"
+        outcome.reason, outcome.fault = "interrupted", Interrupted(results.last)
     finally:
-        outcome.wall_time = perf_counter() - begin
+        outcome.wall_time, outcome.published = perf_counter() - begin, results.published
         if simulation:
-            outcome.end_time = last()
+            outcome.end_time = results.last
             outcome.step_time = {n: i.step_time for n, i in simulation.instances.items()}
             outcome.isolated = simulation.isolated
             outcome.held = {n: i.held for n, i in simulation.instances.items() if i.held}
@@ -103,12 +108,31 @@ def run(plan: Plan, folder: Path, progress: Progress | None = None) -> Outcome:
             outcome.smaller_steps = {n: s for n, s in smaller.items() if s}
             outcome.energies = simulation.meters.energies()
             outcome.links = simulation.links()
+            outcome.delays = ages.delays()
             outcome.calls = bound.counts()
             outcome.steps = bound.steps()
             outcome.iterations = bound.iterations()
+            if outcome.fault is None and (why := _judged(outcome, simulation)):
+                outcome.reason, outcome.fault = "diverged", why
     if progress:
         progress(outcome.end_time)
     return outcome
+
+
+def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
+    """Why a run that came to its end has left physics on the way."""
+    condition = simulation.system.ends_when
+    left = condition and (condition.fmu, condition.variable) == WORKSPACE
+    if outcome.reason == "stop_when" and left and (why := unstable(outcome.energies)):
+        what = f"left its workspace, and {why}: the loop is unstable"
+        remedy = "take higher rates, weaker gains, another coupling or hold"
+        return Diverged(WORKSPACE[0], f"{what} ({remedy})", outcome.end_time, repeatable=True)
+    return simulation.balance.judge(outcome.energies, outcome.end_time)
+
+
+def _reason(fault: Fault) -> str:
+    ends = {Interrupted: "interrupted", Diverged: "diverged"}
+    return next((reason for kind, reason in ends.items() if isinstance(fault, kind)), "fault")
 
 
 class _Bound:

@@ -51,6 +51,8 @@ def total(counts: Iterable[Iterations]) -> Iterations | None:
 class Unconverged(Fault):
     """The iteration did not converge; names the connection with the largest residual."""
 
+    repeatable = True
+
 
 class FixedPoint:
     """One Repeat, its operations bound.

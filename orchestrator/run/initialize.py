@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.results.summary import outside
@@ -34,6 +35,7 @@ def initialize(system: System, instances: Mapping[str, Instance], signals: Signa
     holds = [(signals.hold(c.name), signals.sources(c)) for c in system.connections if c.hold]
     setters = []
     for fmu in system.fmus:
+        interrupt.check()
         instance = instances[fmu.name]
         longest = timeline.clock(fmu.clock).longest
         instance.enter_initialization(timeline.seconds(timeline.end + longest))
@@ -132,7 +134,8 @@ def _raise_unsettled(
                 what = f"output {scalar.name} does not settle in initialisation, nor by Newton"
                 values = f"{before[i]!s} on its way round gives {signals.values[i]!s}"
                 remedy = "its feed-through loop has no start values: take a connection out of it"
-                raise FmuFault(fmu.name, f"{what}: {values}; {remedy}", 0.0)
+                said = f"{what}: {values}; {remedy}"
+                raise FmuFault(fmu.name, said, 0.0, repeatable=True)
 
 
 DEVICE = "haptic_device"
@@ -149,6 +152,6 @@ def require_finite(instances: Mapping[str, Instance]) -> None:
         margin = start.get("workspace_margin", 0.0)
         if margin < 0:
             pose = [start.get(f"x_true[{i}]", np.nan) for i in (1, 2, 3)]
-            raise FmuFault(DEVICE, outside(pose, margin), 0.0)
+            raise FmuFault(DEVICE, outside(pose, margin), 0.0, repeatable=True)
     for instance in instances.values():
         instance.require_finite()

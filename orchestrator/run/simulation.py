@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
-from pathlib import Path
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results.files import Recorder
+from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meters import Meters
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
@@ -21,35 +23,29 @@ Call = Callable[[int], object]
 
 
 class Simulation:
-    """What `stack` closes again; rows go to `folder`.
+    """What `stack` closes again; rows go to `results`.
 
     setters, varying_setters and now_setters fill the inputs of an FMU from the signals: as its
     connections hold them, with derivatives beside, and as their sources stand now.
     """
 
-    def __init__(self, system: System, folder: Path, stack: ExitStack) -> None:
+    def __init__(self, system: System, results: RunFolder, stack: ExitStack) -> None:
         self.system, self.signals = system, SignalVector(system)
         self.seconds = system.timeline.seconds
+        self._results, self._stack = results, stack
         values = self.signals.values
-        self.recorders = {
-            c.name: stack.enter_context(
-                Recorder(
-                    folder / f"{c.name}.csv",
-                    self.signals.columns(c.name),
-                    values[self.signals.clock(c.name)],
-                )
-            )
-            for c in system.timeline.clocks
-        }
         self.isolated = isolated(system.fmus)
         self.instances: dict[str, Instance] = {}
         for fmu in system.fmus:
+            interrupt.check()
             view = values[self.signals.fmu(fmu.name)]
             made = instance(fmu, view, system.faults, fmu.name in self.isolated)
             self.instances[fmu.name] = stack.enter_context(made)
         stack.callback(self._dismiss)
         self.holds, self.springs = make_holds(system, self.signals)
         self.meters = Meters(system, self.signals)
+        self.balance = Balance(system, self.signals)
+        self.recorders: dict[str, Recorder] = {}
         self.setters: dict[str, Call] = {}
         self.varying_setters: dict[str, Call] = {}
         self.now_setters: dict[str, Call] = {}
@@ -60,13 +56,15 @@ class Simulation:
                 made.dismiss()
 
     def start(self) -> None:
-        """Initialise the FMUs, push the samples of t = 0 into the holds, and bind the setters."""
+        """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and open
+        the files of the rows."""
         initialize(self.system, self.instances, self.signals)
         values = self.signals.values
         for c in self.system.connections:
             if c.hold:
                 self.holds[c.name].push(0, values[self.signals.sources(c)], 0)
         self.meters.start()
+        self.balance.start()
         for fmu in self.system.fmus:
             incoming = self.system.into(fmu.name)
             if not incoming:
@@ -82,6 +80,10 @@ class Simulation:
             if fmu.name in self.system.get_after_set:
                 sources = [p for c in incoming for p in self.signals.sources(c)]
                 self.now_setters[fmu.name] = _from(connect(scalars, sources), self.signals)
+        for clock in self.system.timeline.clocks:
+            view = values[self.signals.clock(clock.name)]
+            made = self._results.recorder(clock.name, self.signals.columns(clock.name), view)
+            self.recorders[clock.name] = self._stack.enter_context(made)
 
     def _derived(
         self, incoming: Iterable[Connection]

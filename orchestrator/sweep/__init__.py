@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.sweep import cluster, job, pool, table
 from hapticlink.orchestrator.sweep.job import Job
-from hapticlink.orchestrator.sweep.row import DIED, REFUSED, Row, failed, measure
+from hapticlink.orchestrator.sweep.row import DIED, INTERRUPTED, REFUSED, Row, failed, measure
 
 Measure = Callable[[Experiment], Row]
 Tell = Callable[[int], None]
@@ -34,13 +35,25 @@ def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row
     assert each.scene is not None
     if job.key(each.scene) != each.key:
         return failed(DIED, "this worker has another version of hapticlink or of what it uses")
-    with tempfile.TemporaryDirectory(dir=room) as folder:
+    with tempfile.TemporaryDirectory(dir=room) if room else temporary_folders.room() as folder:
         try:
-            return measure(simulate(each.scene, folder))
+            experiment = simulate(each.scene, folder)
+            row, fault = measure(experiment), experiment.outcome.fault
+            return row if fault is None or _of_scene(fault) else row | {"end": _apart(fault)}
         except Fault as fault:
-            return failed(REFUSED, str(fault))
+            return failed(REFUSED if _of_scene(fault) else _apart(fault), str(fault))
         except Exception as error:  # one run of many: the others go on
             return failed(DIED, f"{type(error).__name__}: {error}")
+
+
+def _of_scene(fault: Fault) -> bool:
+    """Whether the scene gives the fault again, wherever and whenever it is run."""
+    return fault.repeatable and not isinstance(fault.__cause__, OSError)
+
+
+def _apart(fault: Fault) -> str:
+    """The end of a run that tells nothing of its scene: it is made again by the next sweep."""
+    return INTERRUPTED if isinstance(fault, Interrupted) else DIED
 
 
 def sweep(
@@ -53,9 +66,22 @@ def sweep(
 ) -> list[Row]:
     """The rows of `jobs`, in their order, each with its point; `tell` hears how many are done.
 
-    A row is kept in `folder`/rows when its run ends, and not made again by a later call. Raises
-    Fault where it is interrupted, with table.csv of the rows so far, or where the disk is full.
+    A row is kept in `folder`/rows when its run ends, and not made again by a later call, unless the
+    run failed for a reason that is not its scene's. Raises Fault where it is interrupted, with
+    table.csv of the rows so far, or where the disk is full.
     """
+    with interrupt.held():
+        return _rows(jobs, folder, processes, scheduler, tell, measure)
+
+
+def _rows(
+    jobs: Sequence[Job],
+    folder: Path,
+    processes: int,
+    scheduler: str | None,
+    tell: Tell,
+    measure: Measure,
+) -> list[Row]:
     try:
         rows = table.Rows(folder / "rows")
         found = {j.key: kept for j in jobs if j.scene and (kept := rows.find(j.key))}
@@ -67,17 +93,16 @@ def sweep(
             return refused + sum(j.key in found for j in jobs if j.scene)
 
         tell(done())
-        interrupted = False
         try:
             for each, made in _finished(missing, folder, processes, scheduler, measure):
-                if made["end"] == "interrupted":  # a signal reached the worker too
+                if made["end"] == INTERRUPTED:  # a signal reached the worker too
                     continue
                 if made["end"] != DIED:  # the next sweep tries those again
                     rows.keep(each.key, made)
                 found[each.key] = made
                 tell(done())
-        except KeyboardInterrupt:
-            interrupted = True
+        except Interrupted:
+            pass
         told = [
             {**j.point, **(found[j.key] if j.scene else failed(REFUSED, j.refusal))}
             for j in jobs
@@ -86,7 +111,7 @@ def sweep(
         table.write(folder / "table.csv", told)
     except OSError as error:
         raise Fault(f"{folder}: {error}") from error
-    if interrupted or len(told) < len(jobs):
+    if len(told) < len(jobs):
         raise Unfinished(len(told), len(jobs), folder)
     return told
 

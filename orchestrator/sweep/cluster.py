@@ -7,7 +7,9 @@ the Python FMUs of a process share one interpreter.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.pool import Done, Work
@@ -17,7 +19,7 @@ from hapticlink.orchestrator.sweep.row import DIED, failed
 def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
     """Each job with its row, as they finish. Raises InputFault without Dask or a scheduler."""
     try:
-        from dask.distributed import Client, as_completed
+        from dask.distributed import Client, wait
     except ImportError:
         raise InputFault(
             "--scheduler needs Dask; pip install '.[distributed]' in the checkout"
@@ -29,12 +31,18 @@ def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
         raise InputFault(message) from error
     with client:
         futures = {client.submit(work, j, key=f"hapticlink-{j.key}", pure=False): j for j in jobs}
+        left = set(futures)
         try:
-            for future in as_completed(futures):
-                try:
-                    row = future.result()
-                except Exception as error:  # whatever a cluster can break of
-                    row = failed(DIED, f"{type(error).__name__}: {error}")
-                yield futures[future], row
+            while left:
+                interrupt.check()
+                with suppress(TimeoutError):
+                    wait(left, timeout=0.2, return_when="FIRST_COMPLETED")
+                for future in [future for future in left if future.done()]:
+                    left.remove(future)
+                    try:
+                        row = future.result()
+                    except Exception as error:  # whatever a cluster can break of
+                        row = failed(DIED, f"{type(error).__name__}: {error}")
+                    yield futures[future], row
         finally:
             client.cancel(list(futures))

@@ -33,31 +33,28 @@ RUNS = 200
 
 
 def in_processes(work: Work, jobs: Sequence[Job], count: int) -> Iterator[Done]:
-    """Each job with its row, as they finish. Raises KeyboardInterrupt at SIGINT or SIGTERM, when
-    all processes have ended."""
+    """Each job with its row, as they finish. Raises Interrupted at SIGINT or SIGTERM, when all
+    processes have ended."""
     queue = deque(jobs)
-    with interrupt.watch() as interrupted:
-        while queue:
-            suspects = yield from _spread(work, queue, count, interrupted)
-            for job in suspects:
-                if (yield from _spread(work, deque([job]), 1, interrupted)):
-                    yield job, failed(DIED, "the process of this run crashed")
+    while queue:
+        suspects = yield from _spread(work, queue, count)
+        for job in suspects:
+            if (yield from _spread(work, deque([job]), 1)):
+                yield job, failed(DIED, "the process of this run crashed")
 
 
-def _spread(
-    work: Work, queue: deque[Job], count: int, interrupted: interrupt.Flag
-) -> Generator[Done, None, list[Job]]:
+def _spread(work: Work, queue: deque[Job], count: int) -> Generator[Done, None, list[Job]]:
     """Take jobs from `queue` until it is empty, or a process dies: then what was under way."""
     under_way: dict[Future[Row], Job] = {}
     with _executor(min(count, len(queue))) as pool:
         while queue or under_way:
             try:
                 while queue and len(under_way) < count:
-                    under_way[pool.submit(work, queue[0])] = queue[0]
+                    with _signals_blocked():
+                        under_way[pool.submit(work, queue[0])] = queue[0]
                     queue.popleft()
                 ready = wait(under_way, timeout=0.2, return_when=FIRST_COMPLETED).done
-                if interrupted:
-                    raise KeyboardInterrupt
+                interrupt.check()
                 for future in ready:
                     row = future.result()
                     yield under_way.pop(future), row
@@ -83,11 +80,18 @@ class _Worker(SpawnProcess):
 @contextmanager
 def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
     before = set(multiprocessing.active_children())
+
+    def kill() -> None:
+        for process in set(multiprocessing.active_children()) - before:
+            process.kill()
+            process.join(1.0)
+
     context = SpawnContext()  # FMUs hold threads and libraries: no fork
     context.Process = _Worker  # type: ignore[misc]
     pool = ProcessPoolExecutor(
         count, mp_context=context, initializer=_follow, max_tasks_per_child=RUNS
     )
+    interrupt.add(kill)
     try:
         yield pool
     except BaseException:
@@ -97,6 +101,21 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown()
+        interrupt.remove(kill)
+
+
+@contextmanager
+def _signals_blocked() -> Iterator[None]:
+    """Processes and threads that are made within get no Ctrl-C from the terminal, not at their
+    imports either."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _follow() -> None:

@@ -16,9 +16,10 @@ from hapticlink.orchestrator.results.tracking import folded, has_tracking, pose_
 Row = dict[str, Any]
 
 METRIC = "tracking_max_mm"
-REFUSED, DIED = "refused", "died"
-FAILED = ("fault", REFUSED, DIED)
-"""Ends in bad order: a fault of the run, bad input, a process that crashed."""
+REFUSED, DIED, INTERRUPTED = "refused", "died", "interrupted"
+FAILED = ("fault", "diverged", REFUSED, DIED)
+"""Ends in bad order: a fault of the run, one that left physics, bad input, and what is not the
+scene's fault: a process that crashed or hung, a full disk."""
 
 
 def measure(experiment: Experiment) -> Row:

@@ -57,6 +57,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         scene.step_control,
         refused,
         rules.springs,
+        haptic_loop.energy_in_play(scene),
     )
 
 

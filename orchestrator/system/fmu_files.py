@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.fmus.blocks import build_block
-from hapticlink.fmus.errors import FmuError
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.fmus.errors import CompilerError, FmuError
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.blocks import BlockPlan, blocks
 from hapticlink.orchestrator.scene.scene import Scene
@@ -32,6 +33,7 @@ def fmu_files(
     """
     files = {}
     for block in blocks(scene):
+        interrupt.check()
         try:
             files[block.name] = build_block(
                 block.made_by,
@@ -42,6 +44,9 @@ def fmu_files(
                 packaging=scene.packaging,
                 platforms=platforms,
             )
+        except CompilerError as error:
+            interrupt.check()  # Ctrl-C in a terminal ends the compiler too
+            raise Fault(str(error)) from error
         except FmuError as error:
             raise InputFault(str(error)) from error
     return files

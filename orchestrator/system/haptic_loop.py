@@ -8,6 +8,7 @@ the measured one; without a device it holds the operational point itself.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from hapticlink.orchestrator.fmi.description import Description
@@ -15,6 +16,8 @@ from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 
 Row = tuple[str, str]
+MECHANISM, WORKSPACE = "virtual_mechanism", ("haptic_device", "workspace_margin")
+"""The block whose `energy` is judged; the output that is negative out of the device's workspace."""
 
 _LOOP: tuple[Row, ...] = (
     ("virtual_mechanism.x", "haptic_device.x_start"),
@@ -82,3 +85,16 @@ def _rows(scene: Scene) -> tuple[Row, ...]:
         (f"{giver}.Lambda_inv", "controller.Lambda_inv"),
         (f"{giver}.P_c", "controller.P_c"),
     )
+
+
+def energy_in_play(scene: Scene) -> float | None:
+    """J that gravity can turn over in the linkage; None where more than wrenches at its points put
+    energy into it: drives, matrices or contacts that are held."""
+    linkage = scene.linkage
+    held = scene.local_model or (scene.contacts and scene.contacts.detection == "graphics")
+    if linkage is None or held or any(j.drive for j in linkage.joint):
+        return None
+    spans = [p for j in linkage.joint for p in (j.at_parent, j.at_child) if p]
+    spans += [b.center for b in linkage.body if b.center]
+    mass = sum(b.mass for b in linkage.body)
+    return math.hypot(*linkage.gravity or (0.0,)) * mass * sum(math.hypot(*p) for p in spans)

@@ -74,6 +74,8 @@ class System:
     power: the ports that carry it. substeps: steps that a plant takes between two reads, its
     held inputs renewed at each. get_after_set: plants that may be read again after new inputs
     are set. refused: default holds that did not fit. springs: what set positions set.
+    energy_in_play (J): what gravity can turn over in the mechanism, None where its energy is not
+    judged.
     """
 
     fmus: tuple[Fmu, ...]
@@ -89,6 +91,7 @@ class System:
     step_control: StepControl | None = None
     refused: tuple[Refused, ...] = ()
     springs: tuple[SetSpring, ...] = ()
+    energy_in_play: float | None = None
 
     @cached_property
     def fmu(self) -> Mapping[str, Fmu]:

@@ -10,6 +10,7 @@ from fractions import Fraction
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.base.ticks import (
     Clock,
+    Frames,
     Timeline,
     aligned,
     common_base,
@@ -37,10 +38,14 @@ def timeline(scene: Scene) -> Timeline:
     found = []
     for name, pace in given.paces.items():
         if not pace.on_ticks:
-            starts = periodic(_period(pace), base, steps * a_tick, pace.first)
+            starts: Sequence[int] = periodic(_period(pace), base, steps * a_tick, pace.first)
         else:
             try:
-                starts = tuple(start * a_tick for start in _on_ticks(pace, haptic, steps))
+                frames = _on_ticks(pace, haptic, steps)
+                if isinstance(frames, Frames):
+                    starts = frames.times(a_tick)
+                else:
+                    starts = tuple(frame * a_tick for frame in frames)
             except ValueError as error:
                 raise SceneFault(scene.title, [scene.place(pace.path, str(error))]) from error
         found.append(Clock(name, starts))

@@ -16,6 +16,7 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
 from hapticlink.orchestrator.system.assign_holds import Rules
@@ -167,7 +168,7 @@ def system(
 
 
 def simulate(made: System, folder: Path) -> tuple[Outcome, Table]:
-    return run(Plan(made), folder), read_table(folder / "haptics.csv")
+    return run(Plan(made), RunFolder(folder)), read_table(folder / "haptics.csv")
 
 
 def error(table: Table) -> float:

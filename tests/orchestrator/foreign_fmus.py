@@ -108,6 +108,24 @@ def c_fmu(folder: Path, guid: str = "{faults}") -> Path:
     return _packed(folder, "fault_fmu.c", "faults", platform, DESCRIPTION.format(guid=guid))
 
 
+STAIR = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="stair" guid="stair">
+<CoSimulation modelIdentifier="stair" {flags}/>
+<ModelVariables>
+<ScalarVariable name="counter" valueReference="0" causality="output" variability="discrete">
+<Integer/></ScalarVariable>
+</ModelVariables>
+<ModelStructure><Outputs><Unknown index="1"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def stair_fmu(folder: Path, **flags: str) -> Path:
+    """The FMU of stair_fmu.c, with capability flags."""
+    said = " ".join(f'{name}="{value}"' for name, value in flags.items())
+    return _packed(folder, "stair_fmu.c", "stair", platform, STAIR.format(flags=said))
+
+
 def _packed(folder: Path, source: str, name: str, where: str, description: str) -> Path:
     library, path = compiled(source, folder, name), folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:

@@ -21,6 +21,7 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
 from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
@@ -170,7 +171,7 @@ def system(
 
 def simulate(system: System, folder: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(times, rows of x1, v1, x2, v2)."""
-    outcome: Outcome = run(Plan(system), folder)
+    outcome: Outcome = run(Plan(system), RunFolder(folder))
     assert outcome.fault is None
     found = read_table(folder / "haptics.csv")
     names = ("one.x", "one.v", "two.x", "two.v")

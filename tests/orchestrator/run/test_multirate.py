@@ -23,6 +23,7 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.system.system import Fmu, System
@@ -121,7 +122,7 @@ def forces(
         unit("linkage", linkage, "graphics"),
     )
     connections = connected(units, [*FAST, *ROWS[linkage]], timeline)[0]
-    outcome = run(Plan(System(units, connections, timeline, "gauss-seidel")), folder)
+    outcome = run(Plan(System(units, connections, timeline, "gauss-seidel")), RunFolder(folder))
     assert outcome.fault is None
     return np.abs(read_table(folder / "haptics.csv")["spring.F"])
 

@@ -14,6 +14,7 @@ import pytest
 from hapticlink.orchestrator.base.faults import FmuFault, Interrupted
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.scene.conditions import parse_condition
@@ -43,7 +44,7 @@ def test_stamped_signals(
     coupling: str,
     late: int,
 ) -> None:
-    outcome = run(Plan(stamped(timeline, coupling)), tmp_path)
+    outcome = run(Plan(stamped(timeline, coupling)), RunFolder(tmp_path))
     assert outcome.fault is None
     fast, slow = table(tmp_path), table(tmp_path, "graphics")
     time, frames = fast["time"], slow["time"]
@@ -67,7 +68,7 @@ def test_stamped_signals(
 def test_same_run_same_bytes(stamped: Callable[[Timeline, str], System], tmp_path: Path) -> None:
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        run(Plan(stamped(TIMELINES["variable"], "gauss-seidel")), tmp_path / name)
+        run(Plan(stamped(TIMELINES["variable"], "gauss-seidel")), RunFolder(tmp_path / name))
     for file in ("haptics.csv", "graphics.csv"):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
@@ -97,7 +98,7 @@ def test_a_fault_names_fmu_variable_and_time_and_keeps_results(
     slave: Slave, tmp_path: Path, name: str, body: str, message: str
 ) -> None:
     before, plan = left_behind(), alone(slave(name, body))
-    outcome = run(plan, tmp_path)
+    outcome = run(plan, RunFolder(tmp_path))
     assert isinstance(outcome.fault, FmuFault)
     assert str(outcome.fault).startswith(f"{name}: {message}")
     assert outcome.end_time == 0.5
@@ -110,14 +111,14 @@ def test_a_fault_names_fmu_variable_and_time_and_keeps_results(
 def test_what_the_fmu_said_is_in_the_fault(slave: Slave, tmp_path: Path) -> None:
     body = "self.log('the belt slipped', 3); return False"
     unit = slave("Talks", body.replace("3", "__import__('pythonfmu').enums.Fmi2Status.error"))
-    outcome = run(alone(unit), tmp_path)
+    outcome = run(alone(unit), RunFolder(tmp_path))
     assert "the belt slipped" in str(outcome.fault)
 
 
 def test_ctrl_c_ends_between_events_with_results(slave: Slave, tmp_path: Path) -> None:
     before, handler = left_behind(), signal.getsignal(signal.SIGINT)
     body = f"if time == 0.25: __import__('os').kill({os.getpid()}, 2)"
-    outcome = run(alone(slave("Interrupts", body)), tmp_path)
+    outcome = run(alone(slave("Interrupts", body)), RunFolder(tmp_path))
     assert isinstance(outcome.fault, Interrupted)
     assert outcome.reason == "interrupted"
     assert table(tmp_path)["time"][-1] == outcome.end_time
@@ -127,7 +128,7 @@ def test_ctrl_c_ends_between_events_with_results(slave: Slave, tmp_path: Path) -
 
 
 def test_stop_when_ends_in_good_order_with_its_row(slave: Slave, tmp_path: Path) -> None:
-    outcome = run(alone(slave("Stops"), stop_when="Stops.y >= 0.5"), tmp_path)
+    outcome = run(alone(slave("Stops"), stop_when="Stops.y >= 0.5"), RunFolder(tmp_path))
     assert (outcome.fault, outcome.reason, outcome.end_time) == (None, "stop_when", 0.5)
     assert table(tmp_path)["Stops.y"].tolist() == [k / 64 for k in range(33)]
 
@@ -138,7 +139,7 @@ def test_an_fmu_that_cannot_be_loaded_is_named_and_leaves_nothing(
     unit = slave("Absent")
     before = left_behind()
     unit.description.path.unlink()
-    outcome = run(alone(unit), tmp_path)
+    outcome = run(alone(unit), RunFolder(tmp_path))
     assert str(outcome.fault).startswith("Absent: could not be loaded")
     assert left_behind() == before
 
@@ -146,11 +147,11 @@ def test_an_fmu_that_cannot_be_loaded_is_named_and_leaves_nothing(
 def test_a_full_disk_is_a_fault(slave: Slave, tmp_path: Path) -> None:
     plan, before = alone(slave("Full"), steps=600), left_behind()
     (tmp_path / "haptics.csv").symlink_to("/dev/full")
-    outcome = run(plan, tmp_path)
+    outcome = run(plan, RunFolder(tmp_path))
     assert "No space left on device" in str(outcome.fault)
     assert left_behind() == before
 
 
 def test_calls_are_counted(slave: Slave, tmp_path: Path) -> None:
-    outcome = run(alone(slave("Counted")), tmp_path)
+    outcome = run(alone(slave("Counted")), RunFolder(tmp_path))
     assert outcome.calls == {"Counted": {"get": 64, "step": 64}}

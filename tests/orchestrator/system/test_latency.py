@@ -17,6 +17,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import uses
 from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.scene.records import Latency
@@ -77,7 +78,7 @@ def test_what_the_plan_says_is_what_the_fmus_see(
         "device.stamp": Latency(min=0.003),
     }
     system = late(stamped(timeline, coupling), delays)
-    outcome = run(Plan(system), tmp_path)
+    outcome = run(Plan(system), RunFolder(tmp_path))
     table = read_table(tmp_path / "haptics.csv")
     for name, column in ((LATE, "controller.seen_g"), ("device.stamp -> hand.d", "hand.seen_d")):
         said = [timeline.seconds(u.stamp) for u in uses(Plan(system)) if u.connection == name]
@@ -97,7 +98,7 @@ def test_extrapolated_stamps_are_the_time_itself(stamped: Make, tmp_path: Path, 
 
     timeline = fixed(Fraction(512), Fraction(rate), 256)
     for delays in ({}, {LATE: Latency(min=0.001, max=0.04, loss=0.2, seed=1)}):
-        run(Plan(late(stamped(timeline, "gauss-seidel"), delays, "foh")), tmp_path)
+        run(Plan(late(stamped(timeline, "gauss-seidel"), delays, "foh")), RunFolder(tmp_path))
         table = read_table(tmp_path / "haptics.csv")
         time, seen = table["time"], table["controller.seen_g"]
         started = int(np.argmax(seen > 0))

@@ -22,6 +22,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import uses
 from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.scene.rates import VariableRate
@@ -84,7 +85,7 @@ def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(
     shares = {"controller": Fraction(1, 4), "mechanism": Fraction(2, 3), "graphics": Fraction(1, 7)}
     time = timeline(scene_of(Fraction(512), 200, rates, shares))
     system = stamped(time, coupling)
-    assert run(Plan(system), tmp_path).fault is None
+    assert run(Plan(system), RunFolder(tmp_path)).fault is None
     tables = {c.name: read_table(tmp_path / f"{c.name}.csv") for c in time.clocks}
     assert len(tables) == 5
     said = list(uses(Plan(system)))

@@ -1,0 +1,117 @@
+"""The folder of a run while it goes on. Rows of an earlier run go when the first ones of this run
+are on the disk, not before."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import Interrupted
+from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
+from hapticlink.orchestrator.results.tables import Vector
+
+ROOM = 1 << 14
+"""Bytes that run.json keeps for its end, so that a disk which fills up meanwhile has them."""
+RUN = "run.json"
+
+
+class RunFolder:
+    """`story` is what run.json says from the first row on; without it there is no run.json.
+
+    A context manager: within, a second signal, which ends the process at once, is told too.
+    `published`: the results there are this run's.
+    """
+
+    def __init__(self, folder: Path, story: dict[str, Any] | None = None) -> None:
+        self.folder, self.published = folder, False
+        self._story = story
+        self._recorders: list[Recorder] = []
+
+    def __enter__(self) -> RunFolder:
+        interrupt.add(self._interrupted)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        interrupt.remove(self._interrupted)
+
+    def recorder(self, clock: str, columns: Sequence[str], view: Vector) -> Recorder:
+        """The rows of a clock. All are made before the first row of one."""
+        path = self.folder / f"{clock}.csv"
+        self._recorders.append(Recorder(path, columns, view, self._publish))
+        return self._recorders[-1]
+
+    @property
+    def last(self) -> float:
+        """The time (s) of the last row of the first clock."""
+        return self._recorders[0].last or 0.0 if self._recorders else 0.0
+
+    def _publish(self) -> None:
+        """A recorder has its first row: with the last of them, files take their places."""
+        if any(recorder.last is None for recorder in self._recorders):
+            return
+        earlier = _listed(self.folder)
+        if self._story is not None:
+            end = {"reason": "running", "process": os.getpid()}
+            write_json(self.folder / RUN, self._story | {"end": end}, ROOM)
+        for recorder in self._recorders:
+            recorder.publish()
+        for name in earlier - {RUN, *(recorder.path.name for recorder in self._recorders)}:
+            (self.folder / name).unlink(missing_ok=True)
+        self.published = True
+
+    def end(self, ending: dict[str, Any], columns: Mapping[str, Sequence[str]]) -> None:
+        """run.json tells how the run ended; one without rows, with tables of these `columns` by
+        clock, only where no other has rows. Raises OSError where the disk is too full for that."""
+        if not self.published and not _has_rows(self.folder):
+            for clock, names in columns.items():
+                with self.recorder(clock, names, np.zeros(0)) as empty:
+                    empty.publish()
+            self.published = True
+        if self.published and self._story is not None:
+            write_json(self.folder / RUN, self._story | ending)
+
+    def end_in_place(self, ending: dict[str, Any]) -> None:
+        """The same on a full disk, in the room that was kept: all, or how it ended, or nothing
+        where the disk does not write in place."""
+        if self.published and self._story is not None:
+            least = {key: ending[key] for key in ("end", "fault")}
+            with suppress(OSError):
+                write_over(self.folder / RUN, self._story | ending, self._story | least)
+
+    def _interrupted(self) -> None:
+        fault = Interrupted(self.last)
+        told = {"kind": type(fault).__name__, "time": self.last, "message": str(fault)}
+        for left in self.folder.glob(".run.*.json"):  # what was being written
+            left.unlink()
+        ending = {"end": {"reason": "interrupted", "time": self.last}, "fault": told}
+        if self.published and self._story is not None:
+            write_json(self.folder / RUN, self._story | ending)
+        for recorder in self._recorders:
+            recorder.__exit__()
+
+
+def _has_rows(folder: Path) -> bool:
+    """Whether an earlier run in `folder` has a row: a line after a table's first."""
+    for name in _listed(folder):
+        if name.endswith(".csv"):
+            with suppress(OSError), (folder / name).open("rb") as file:
+                if len(list(islice(file, 2))) == 2:
+                    return True
+    return False
+
+
+def _listed(folder: Path) -> set[str]:
+    """The files that the run.json of an earlier run in `folder` lists, but for those elsewhere."""
+    try:
+        names = json.loads((folder / RUN).read_text(encoding="utf-8")).get("files", ())
+        return {n for n in names if isinstance(n, str) and Path(n).name == n}
+    except (OSError, ValueError, AttributeError, TypeError):
+        return set()

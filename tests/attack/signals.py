@@ -1,0 +1,197 @@
+"""Ctrl-C at random instants from the start of `hapticlink run` to its end.
+
+Each case has an earlier run in its folder and gets one SIGINT, or a second one soon after, sent to
+its process group as a terminal does. Whatever the instant: the process ends by itself with status
+0 or 1 and a message, what stands in the folder is whole and true, and no process and no file stays
+behind. Only a signal that comes before Python has read the first line of this project is Python's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from hapticlink.orchestrator.results import tables
+
+MARK = "HAPTICLINK_ATTACK"
+COMMAND = [sys.executable, "-m", "hapticlink.orchestrator", "run", "closed-loop"]
+KINDS = {
+    "in process": [],
+    "isolated": ["--set", "isolate=true"],
+    "building": [],  # with an empty cache
+}
+OUTCOMES = ("before", "done", "told", "lost", "crashed", "hung")
+"""before: Python's own start; done: after the last thing that asks; told: status 1, interrupted."""
+PATIENCE = 120.0
+"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """Instants (s) of the signals after the start of the process."""
+
+    kind: str
+    instants: tuple[float, ...]
+
+
+def cases(number: int, seed: int, lasts: dict[str, float]) -> Iterator[Case]:
+    """`lasts`: how long (s) an undisturbed run of each kind takes."""
+    draw = random.Random(seed)
+    kinds = [k for k in lasts for _ in range(1 if k == "building" else 3)]
+    for i in range(number):
+        kind = kinds[i % len(kinds)]
+        first = draw.uniform(0.0, 1.05 * lasts[kind])
+        second = first + draw.uniform(0.0, 0.3)
+        yield Case(kind, (first, second) if draw.random() < 0.25 else (first,))
+
+
+class Attack:
+    """Cases in a folder of their own."""
+
+    def __init__(self, folder: Path, duration: float) -> None:
+        self._folder, self._out = folder, folder / "out"
+        self._temporary, self._cache = folder / "temporary", folder / "cache"
+        self._temporary.mkdir()
+        self._duration = ["--set", f"duration={duration}"]
+        self._environment = os.environ | {
+            "TMPDIR": str(self._temporary),
+            "HAPTICLINK_CACHE": str(self._cache),
+            MARK: str(folder),
+        }
+        self.lasts = {}
+        for kind in ("building", "in process", "isolated"):
+            begin = time.monotonic()
+            process = self._started(kind, fresh=kind == "building")
+            said = process.communicate(timeout=PATIENCE)[1]
+            assert process.returncode == 0, said.decode()
+            self.lasts[kind] = time.monotonic() - begin
+        shutil.copytree(self._out, folder / "earlier")
+
+    def _started(self, kind: str, fresh: bool) -> subprocess.Popen[bytes]:
+        if fresh:
+            shutil.rmtree(self._cache, ignore_errors=True)
+        command = [*COMMAND, "--out", str(self._out), *self._duration, *KINDS[kind]]
+        return subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            env=self._environment, start_new_session=True,
+        )  # fmt: skip
+
+    def made(self, case: Case) -> tuple[str, str]:
+        """One of OUTCOMES, and what was wrong."""
+        shutil.rmtree(self._out)
+        shutil.copytree(self._folder / "earlier", self._out)
+        begin = time.monotonic()
+        process = self._started(case.kind, fresh=case.kind == "building")
+        for instant in case.instants:
+            time.sleep(max(0.0, begin + instant - time.monotonic()))
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGINT)
+        try:
+            said = process.communicate(timeout=PATIENCE)[1].decode()
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+            return "hung", f"no end after {PATIENCE:g} s"
+        if _python_itself(process.returncode, said):
+            return "before", ""
+        if process.returncode not in (0, 1) or "Traceback" in said or "Fatal" in said:
+            return "crashed", f"status {process.returncode}: {said[-500:]}"
+        if wrong := [*self._untrue(process.returncode, said), *self._left_behind()]:
+            return "lost", f"status {process.returncode}: {'; '.join(wrong)}: {said[-300:]}"
+        return "told" if process.returncode else "done", ""
+
+    def _untrue(self, status: int, said: str) -> Iterator[str]:
+        if status and "interrupted" not in said:
+            yield "not told as interrupted"
+        story = (self._out / "run.json").read_bytes()
+        if story == (self._folder / "earlier" / "run.json").read_bytes():
+            if status == 0:
+                yield "done, without results"
+            for path in (self._folder / "earlier").iterdir():
+                if path.read_bytes() != (self._out / path.name).read_bytes():
+                    yield f"{path.name} of the earlier run has changed"
+            return
+        end = json.loads(story)["end"]
+        if end["reason"] not in (("duration",) if status == 0 else ("duration", "interrupted")):
+            yield f"run.json says {end['reason']}"
+        elif tables.load(self._out).haptics["time"][-1] != end["time"]:
+            yield "run.json says another end than the rows"
+        there, listed = {p.name for p in self._out.iterdir()}, set(json.loads(story)["files"])
+        if status == 0 and there != listed:
+            yield f"run.json lists other files: {', '.join(sorted(there ^ listed))}"
+
+    def _left_behind(self) -> Iterator[str]:
+        until = time.monotonic() + 10.0
+        while (found := _marked(str(self._folder))) and time.monotonic() < until:
+            time.sleep(0.05)
+        if found:
+            yield f"processes {', '.join(found)}"
+        if folders := [p.name for p in self._temporary.iterdir()]:
+            yield f"folders {', '.join(folders)}"
+            shutil.rmtree(self._temporary)
+            self._temporary.mkdir()
+        if unfinished := [p.name for p in self._out.glob(".*")]:
+            yield f"files {', '.join(unfinished)}"
+
+
+def _python_itself(status: int, said: str) -> bool:
+    """Whether the signal came before the first line of this project was read."""
+    return status == -signal.SIGINT or ("KeyboardInterrupt" in said and "hapticlink" not in said)
+
+
+def _marked(mark: str) -> list[str]:
+    """The processes of an attack, by their environment."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        try:
+            if f"{MARK}={mark}".encode() in path.read_bytes().split(b"\0"):
+                found.append(path.parent.name)
+        except OSError:  # gone, or somebody else's
+            continue
+    return found
+
+
+def attack(number: int, seed: int, duration: float = 0.2) -> dict[str, Counter[str]]:
+    """Outcomes by kind; what was wrong goes to stderr."""
+    counts: dict[str, Counter[str]] = {}
+    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+        made = Attack(Path(folder), duration)
+        for i, case in enumerate(cases(number, seed, made.lasts)):
+            outcome, wrong = made.made(case)
+            counts.setdefault(case.kind, Counter())[outcome] += 1
+            if wrong:
+                print(f"case {i}, {case}: {outcome}: {wrong}", file=sys.stderr, flush=True)
+    return counts
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Ctrl-C at random instants of a run.")
+    parser.add_argument("--cases", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("results/faults/signals.csv"))
+    given = parser.parse_args()
+    counts = attack(given.cases, given.seed)
+    given.out.parent.mkdir(parents=True, exist_ok=True)
+    with given.out.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["run", "cases", *OUTCOMES])
+        for kind, found in counts.items():
+            writer.writerow([kind, found.total(), *(found[o] for o in OUTCOMES)])
+    print(given.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""A run that leaves physics says so and does not end with 0, though all its numbers are finite."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.base.faults import Diverged
+from hapticlink.orchestrator.experiment import simulate
+from tests.orchestrator.conftest import status
+from tests.orchestrator.foreign_fmus import python_fmu, run
+
+ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
+
+
+@pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
+@pytest.mark.parametrize("start", [0.0, 20.0])
+def test_an_output_beyond_1e12_of_its_start(tmp_path: Path, start: float, isolate: str) -> None:
+    body = f"self.y = {start} + 1e4 ** self.steps"
+    python_fmu(tmp_path, "Grows", body)
+    given = ONE.format("Grows.fmu") + isolate
+    experiment, found = run(tmp_path, given)
+    assert isinstance(experiment.outcome.fault, Diverged)
+    assert experiment.outcome.reason == found.run["end"]["reason"] == "diverged"
+    assert "one: output y is 1e+16, beyond 1e+12" in str(experiment.outcome.fault)
+    np.testing.assert_array_equal(found.haptics["one.y"][1:], start + 1e4 ** np.arange(1.0, 4))
+
+
+def test_a_held_output_is_bounded_too(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Grows", "self.y = float('nan') if self.steps < 3 else 1e13")
+    experiment, found = run(tmp_path, ONE.format("Grows.fmu"), "faults.nan=hold")
+    assert isinstance(experiment.outcome.fault, Diverged)
+    assert found.run["held_outputs"] == {"one": 2}
+
+
+def test_a_whole_number_is_bounded_by_its_type(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "Counts", "self.steps = 2_000_000_000")
+    experiment, found = run(tmp_path, ONE.format("Counts.fmu"))
+    assert experiment.outcome.fault is None
+    assert found.haptics["one.steps"][-1] == 2e9
+
+
+def test_closures_that_come_apart_by_a_link(tmp_path: Path) -> None:
+    """Its links are 40, 120 and 90 mm long, 83 mm in the mean."""
+    options = ["haptics.rate=20", "mechanism.stabilization=none"]
+    outcome = simulate("four-bar", tmp_path, options).outcome
+    assert isinstance(outcome.fault, Diverged)
+    assert "virtual_mechanism: output closure_error is " in str(outcome.fault)
+    assert "beyond 0.0833: the run has diverged" in str(outcome.fault)
+
+
+def test_energy_that_nobody_put_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A pendulum of 2.5 kg and 0.2 m gains with every step that is too long for its method."""
+    fine, coarse = "haptics.rate=100", "haptics.rate=3"
+    heun = "mechanism.integrator=heun"
+    assert simulate("pendulum", tmp_path / "fine", [fine, heun]).outcome.fault is None
+    options = ("--set", coarse, "--set", heun)
+    assert status("run", "pendulum", "--out", tmp_path / "coarse", *options) == 1
+    told = capsys.readouterr()
+    assert "J more than it had at the start and was given: the run has diverged" in told.err
+    assert "pendulum: diverged at 10 s" in told.out
+
+
+def test_what_wrenches_and_drives_put_in_is_no_divergence(tmp_path: Path) -> None:
+    for scene in ("single-body", "four-bar", "two-hands", "obstacles"):
+        assert simulate(scene, tmp_path / scene, ["duration=0.3"]).outcome.fault is None
+
+
+def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path: Path) -> None:
+    """Jacobi hands the drift wrench over a sample late, and motors of 500 N.m follow it; without
+    the topology controller the hand pushes the handle out in good order."""
+    options = ["coupling=jacobi", "device.torque_limit=500"]
+    experiment = simulate("closed-loop", tmp_path / "unstable", options)
+    outcome = experiment.outcome
+    assert outcome.reason == "diverged"
+    said = "haptic_device: left its workspace, and sampling and holding made "
+    assert str(outcome.fault).startswith(said)
+    assert "the loop is unstable" in str(outcome.fault)
+    pushed = simulate("closed-loop", tmp_path / "pushed", ["controller.topology=false"]).outcome
+    assert (pushed.reason, pushed.fault) == ("stop_when", None)
+
+
+def test_holds_that_make_more_than_was_put_in_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status("run", "sampled-spring", "--out", tmp_path) == 0
+    assert "J were put in: the loop is not passive" in capsys.readouterr().out
