@@ -11,7 +11,7 @@ from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find import find, folder_of
 from hapticlink.orchestrator.scene.load import from_source
 from hapticlink.orchestrator.scene.overrides import Options
-from hapticlink.orchestrator.scene.scene import Scene, adapter
+from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.source import Source
 
 
@@ -43,7 +43,9 @@ def _find(scene: str) -> Source:
 def _of(scene: Scene) -> Source:
     if scene.source:
         return scene.source
-    tables = adapter().dump_python(scene, mode="json", by_alias=True, exclude_none=True)
+    tables = adapter().dump_python(scene.plain(), mode="json", by_alias=True, exclude_none=True)
+    if isinstance(scene, WrittenScene):
+        return replace(scene.origin.source, tables=tables, options=(), set_by=scene.origin.set_by)
     return Source(scene.title, tables, {})
 
 

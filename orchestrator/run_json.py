@@ -94,7 +94,7 @@ def energies(system: System, booked: Mapping[str, Energy]) -> dict[str, Any]:
 def _story(scene: Scene, system: System) -> dict[str, Any]:
     base = system.timeline.base
     return {
-        "scene": asdict(scene),
+        "scene": scene.tables(),
         "options": list(scene.source.options) if scene.source else [],
         "versions": {name: version(name) for name in (*PACKAGES, *_compilers(scene))}
         | {"python": platform.python_version()},

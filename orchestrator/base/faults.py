@@ -41,11 +41,6 @@ class Finding:
         return ": ".join(part for part in (place, self.key, self.message) if part)
 
 
-def unplaced(path: Sequence[str | int], message: str) -> Finding:
-    """A finding in a scene that no file wrote."""
-    return Finding(".".join(map(str, path)), message)
-
-
 def near(name: str, known: Iterable[str]) -> str:
     """The nearest of what there is, or all of it."""
     known = list(known)

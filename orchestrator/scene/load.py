@@ -6,18 +6,17 @@ from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Any
 
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.scene import checks, families, overrides
 from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
 from hapticlink.orchestrator.scene.frame_trace import frame_times
-from hapticlink.orchestrator.scene.scene import Scene, adapter
-from hapticlink.orchestrator.scene.source import Source
-from hapticlink.orchestrator.scene.toml_keys import Path, flat, flatten, place_of
+from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
+from hapticlink.orchestrator.scene.source import Origin, Source
+from hapticlink.orchestrator.scene.toml_keys import Path, flat, flatten
 from hapticlink.orchestrator.scene.validation_errors import beyond, problems
 
 
@@ -32,10 +31,10 @@ def read(
 def from_source(source: Source) -> Scene:
     """The scene of the tables of `source` with its options; faults as of `read`."""
     data, options = deepcopy(dict(source.tables)), source.options
-    name, places = source.name, source.places
+    name = source.name
     which = [o for o in options if families.is_argument(overrides.parse(o)[0])]
-    set_by = {overrides.apply(data, option): option for option in which}
-    data = with_family(data, name, places, set_by)
+    set_by = {**source.set_by, **{overrides.apply(data, option): option for option in which}}
+    data = with_family(data, name, source.places, set_by)
     set_by |= {overrides.apply(data, o): o for o in options if o not in which}
     flatten(data)
     wrong: list[tuple[Path, str]] = []
@@ -50,14 +49,7 @@ def from_source(source: Source) -> Scene:
             if isinstance(fmu.get(key), dict):
                 fmu[key] = dict(flat(fmu[key]))
 
-    def place(path: Path, message: str) -> Finding:
-        key = _dotted(path, data)
-        for length in range(len(path), 0, -1):
-            if path[:length] in set_by:
-                return Finding(key, message, option=f"--set {set_by[path[:length]]}")
-        file, line = place_of(path, places)
-        return Finding(key, message, line or None, file=file)
-
+    origin = Origin(source, data, set_by)
     try:
         # As JSON, because strict JSON takes arrays for tuples and still refuses "1" for 1.
         found = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
@@ -65,27 +57,9 @@ def from_source(source: Source) -> Scene:
         wrong += problems(error.errors(include_url=False), data)
     if wrong:
         wrong += beyond(wrong, data)
-        raise SceneFault(name, [place(*problem) for problem in wrong])
-    if findings := [place(path, message) for path, message in checks.check(found)]:
-        raise SceneFault(name, findings)
+        raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
+    if wrong := checks.check(found):
+        raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
     if found.device and found.device.sensing != found.sensing:
         found = replace(found, device=replace(found.device, sensing=found.sensing))
-    object.__setattr__(found, "_place", place)
-    object.__setattr__(found, "_source", source)
-    return found
-
-
-def _dotted(path: Path, data: Any) -> str:
-    """`linkage.body[2] (link3).mass`: entries of arrays from 0, with their name."""
-    text, node = "", data
-    for part in path:
-        try:
-            node = node[part]
-        except (KeyError, IndexError, TypeError):
-            node = None
-        if isinstance(part, int):
-            name = node.get("name") if isinstance(node, dict) else None
-            text += f"[{part}]" + (f" ({name})" if name else "")
-        else:
-            text += f".{part}" if text else part
-    return text
+    return WrittenScene(**vars(found), origin=origin, written=found)

@@ -10,8 +10,8 @@ the virtual environment (not where the mechanism gives the directions itself), [
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from functools import cache
 from typing import Annotated, Any, Literal
 
@@ -24,7 +24,7 @@ from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
-from hapticlink.orchestrator.base.faults import Finding, unplaced
+from hapticlink.orchestrator.base.faults import Finding
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
 from hapticlink.orchestrator.scene.records import (
@@ -36,7 +36,8 @@ from hapticlink.orchestrator.scene.records import (
     StepControl,
     Wire,
 )
-from hapticlink.orchestrator.scene.source import Source
+from hapticlink.orchestrator.scene.source import Origin, Source
+from hapticlink.orchestrator.scene.toml_keys import Path
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,19 +162,22 @@ class Scene:
     packaging: Literal["python", "native"] = "python"
     """native: compiles the scene's own blocks, which then need no Python: [FMUs](fmus.md)."""
 
-    @property
-    def place(self) -> Callable[[tuple[str | int, ...], str], Finding]:
-        """Makes a finding at a path of the scene; where it was read from a file, with its line."""
-        return self.__dict__.get("_place", unplaced)
+    def place(self, path: Path, message: str) -> Finding:
+        """What is wrong at a path of the scene; where it was read from a file, with its line."""
+        return Finding(".".join(map(str, path)), message)
 
     @property
     def source(self) -> Source | None:
         """What it was read from; None where it was made or changed in Python."""
-        return self.__dict__.get("_source")
+        return None
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Without the way back to the file's lines, which no other process takes."""
-        return {key: value for key, value in self.__dict__.items() if key != "_place"}
+    def tables(self) -> dict[str, Any]:
+        """The scene as plain data."""
+        return asdict(self.plain())
+
+    def plain(self) -> Scene:
+        """The scene without where it was written."""
+        return Scene(**{f.name: getattr(self, f.name) for f in fields(Scene)})
 
     @property
     def ends_when(self) -> str:
@@ -181,6 +185,22 @@ class Scene:
         if self.stop_when is None:
             return "haptic_device.workspace_margin < 0" if self.device else ""
         return self.stop_when
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrittenScene(Scene):
+    """A scene that was read, which knows where its keys were written; so do its changed copies."""
+
+    origin: Origin = field(compare=False, repr=False)
+    written: Scene = field(compare=False, repr=False)
+    """What was read, before any change."""
+
+    def place(self, path: Path, message: str) -> Finding:
+        return self.origin.finding(path, message)
+
+    @property
+    def source(self) -> Source | None:
+        return self.origin.source if self.plain() == self.written else None
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
@@ -60,7 +60,7 @@ def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, s
 def key(scene: Scene) -> str:
     """sha256 of the resolved scene, the FMU files that it names, the versions and the sources:
     where one of them changes, a run is made again. Raises InputFault for an FMU not to be read."""
-    whole: dict[str, Any] = {"scene": asdict(scene), "made_with": _made_with()}
+    whole: dict[str, Any] = {"scene": scene.tables(), "made_with": _made_with()}
     try:
         files = [sha256(Path(f.path).read_bytes()).hexdigest() for f in scene.fmu]
     except OSError as error:

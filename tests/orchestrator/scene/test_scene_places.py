@@ -1,5 +1,6 @@
 """Keys of a scene in every spelling of TOML, and faults told where the key really stands."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -259,3 +260,19 @@ def test_iterated_where_no_plants_of_a_rate_are_connected(tmp_path: Path) -> Non
 def test_native_where_no_block_is_ours() -> None:
     text = 'title = "t"\nduration = 1\npackaging = "native"\n[[fmu]]\nname = "a"\npath = "a.fmu"\n'
     assert "packaging: 'native' compiles the scene's own blocks" in told(text)
+
+
+@pytest.mark.parametrize(
+    ("options", "place"), [([], (8, None)), (["hold=foh"], (None, "--set hold=foh"))]
+)
+def test_a_changed_copy_still_knows_where_it_was_written(
+    tmp_path: Path, options: list[str], place: tuple[int | None, str | None]
+) -> None:
+    """`closed-loop` sets no spring, so that `pspm` fits nowhere; its `hold` is on line 8."""
+    changed = replace(open_scene.load("closed-loop", options), hold="pspm")
+    with pytest.raises(SceneFault) as refused:
+        simulate(changed, tmp_path)
+    (found,) = refused.value.findings
+    assert (found.key, found.line, found.option) == ("hold", *place)
+    assert changed.tables()["hold"] == "pspm"
+    assert "origin" not in changed.tables()
