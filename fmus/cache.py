@@ -22,6 +22,7 @@ from typing import Any
 import hapticlink.components
 import hapticlink.fmus
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.components import registry
 
 LONGEST = 3600.0
 """Seconds that no build takes."""
@@ -45,11 +46,14 @@ def folder() -> Path | None:
 
 
 def key(material: Mapping[str, Any]) -> str:
-    """sha256 of the JSON `material`, the versions in VERSIONS and the sources of the equations."""
+    """sha256 of the JSON `material`, the versions in VERSIONS and the sources of the equations,
+    those of plugins too."""
+    plugins = registry.origins("block", "force", "integrator")
     whole = {
         "material": material,
         "versions": {name: version(name) for name in VERSIONS},
         "sources": sources(hapticlink.components, hapticlink.fmus),
+        "plugins": {name: source(name) for name in plugins},
     }
     return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()
 
@@ -63,6 +67,17 @@ def sources(*packages: ModuleType) -> str:
         for path in sorted(p for p in root.rglob("*") if p.suffix in (".py", ".c", ".png")):
             sha.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return sha.hexdigest()
+
+
+@cache
+def source(module: str) -> str:
+    """sha256 of the package that an imported module is in, or of its own file. One without a file
+    (a notebook) is another in every process, since nobody knows whether it has changed."""
+    found = sys.modules[module]
+    if found.__package__:
+        return sources(sys.modules[found.__package__])
+    file = getattr(found, "__file__", None)
+    return hashlib.sha256(Path(file).read_bytes() if file else os.urandom(32)).hexdigest()
 
 
 def cached(

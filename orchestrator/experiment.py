@@ -81,9 +81,9 @@ def _simulated(
         plan = Plan(system)
         plan.check()
         build_time = perf_counter() - begin
-        story = _story(read, system)
+        story = _story(read, plan)
         alone = isolated(system.fmus)
-        risky = any(fmu.name not in alone for fmu in read.fmu)
+        risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
         with RunFolder(folders.made(folder), story) as results:
             with crash_monitor.beside(folder) if risky else nullcontext():
                 outcome = run(plan, results, progress)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path as FilePath
 
+from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.faults import Finding, SceneFault
+from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # by which scenes are checked
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find import find, folder_of
@@ -20,6 +22,7 @@ def load(scene: str | FilePath | Scene, options: Options = ()) -> Scene:
     read from one is read again with its own options and those given; one that was made or changed
     in Python is checked. Raises SceneFault with every finding, InputFault for an option that cannot
     be applied."""
+    plugins.load_installed()
     further = overrides.written(options)
     if isinstance(scene, Scene) and scene.source and not further:
         return scene

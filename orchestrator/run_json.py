@@ -8,9 +8,10 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
+from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.plan import dependency_order
-from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import causal
 from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.event_loop import Outcome
@@ -48,7 +49,6 @@ def holds(system: System) -> dict[str, Any]:
         "substeps": {u.name: system.substeps.get(u.name, 1) for u in system.fmus if not u.sampled},
         "within_a_step": within_a_step(system),
         "get_after_set": list(system.get_after_set),
-        "causal": system.coupling in CAUSAL,
         "power_across_rates": power_across_rates(system),
     }
 
@@ -91,13 +91,14 @@ def energies(system: System, booked: Mapping[str, Energy]) -> dict[str, Any]:
     }
 
 
-def _story(scene: Scene, system: System) -> dict[str, Any]:
-    base = system.timeline.base
+def _story(scene: Scene, plan: Plan) -> dict[str, Any]:
+    system, base = plan.system, plan.system.timeline.base
     return {
         "scene": scene.tables(),
         "options": list(scene.source.options) if scene.source else [],
         "versions": {name: version(name) for name in (*PACKAGES, *_compilers(scene))}
         | {"python": platform.python_version()},
+        "plugins": plugins.loaded(),
         "seeds": _seeds(scene, system),
         "files": ["run.json", *(f"{c.name}.csv" for c in system.timeline.clocks)],
         "rates": [c.name for c in system.timeline.clocks],
@@ -106,7 +107,7 @@ def _story(scene: Scene, system: System) -> dict[str, Any]:
         "base": f"{base.numerator}/{base.denominator} s",
         "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.fmus},
         "coupling": system.coupling,
-        "loops": [asdict(loop) for loop in dependency_order.loops(system)],
+        "loops": [asdict(loop) for loop in plan.loops()],
         "connections": [c.name for c in system.connections],
     } | holds(system)
 
@@ -135,6 +136,7 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
         "fault": failed,
         "calls": outcome.calls,
         "delays": {name: asdict(age) for name, age in outcome.delays.items()},
+        "causal": causal(outcome.delays),
         "links": outcome.links,
         "isolated": outcome.isolated,
         "held_outputs": outcome.held,

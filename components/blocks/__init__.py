@@ -1,1 +1,102 @@
-"""The blocks of the report, one FMU a file."""
+"""The blocks, one FMU a file; `BLOCKS` names them as a scene does.
+
+A block is a function that gives a component. Its first argument is the communication step (s), the
+others are its settings: what a scene may say of it, by their names and annotations. Those here
+import their equations when they are called, so that a scene is read without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from hapticlink.components.registry import Registry
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.control import Controller
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.hand import Hand
+from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
+
+if TYPE_CHECKING:
+    from hapticlink.components.component import Component
+
+
+def _virtual_mechanism(
+    step_s: float,
+    linkage: Linkage,
+    mechanism: Mechanism,
+    directions: Directions | None = None,
+    contacts: Contacts | None = None,
+    length_scale: float | None = None,
+    frame_s: float | None = None,
+) -> Component:
+    from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+
+    return virtual_mechanism(
+        linkage,
+        mechanism,
+        directions,
+        contacts,
+        step_s=step_s,
+        length_scale=length_scale,
+        frame_s=frame_s,
+    )
+
+
+def _virtual_environment(
+    step_s: float,
+    linkage: Linkage,
+    graphics: GraphicsCopy,
+    directions: Directions | None = None,
+    contacts: Contacts | None = None,
+    mobility: bool = True,
+    local_model: bool = False,
+) -> Component:
+    from hapticlink.components.blocks.virtual_environment import virtual_environment
+
+    return virtual_environment(
+        linkage, graphics, directions, contacts, mobility=mobility, local_model=local_model
+    )
+
+
+def _haptic_device(step_s: float, device: Device) -> Component:
+    from hapticlink.components.blocks.haptic_device import haptic_device
+
+    return haptic_device(device)
+
+
+def _controller(
+    step_s: float, controller: Controller, linkage: Linkage, directions: Directions
+) -> Component:
+    from hapticlink.components.blocks import controller as block
+    from hapticlink.components.linkage.parameters import mean_link_length
+
+    length_scale = directions.length_scale
+    if length_scale is None:
+        length_scale = mean_link_length(linkage)
+    return block.controller(controller, length_scale)
+
+
+def _hand(step_s: float, hand: Hand) -> Component:
+    from hapticlink.components.blocks import hand as block
+
+    return block.hand(hand)
+
+
+def _discrete_equivalent(step_s: float, rule: str) -> Component:
+    from hapticlink.components.blocks.discrete_equivalent import discrete_equivalent
+
+    return discrete_equivalent(rule)
+
+
+BLOCKS: Registry[Callable[..., Component]] = Registry(
+    "block",
+    {
+        "virtual_mechanism": _virtual_mechanism,
+        "virtual_environment": _virtual_environment,
+        "haptic_device": _haptic_device,
+        "controller": _controller,
+        "hand": _hand,
+        "discrete_equivalent": _discrete_equivalent,
+    },
+)

@@ -18,7 +18,12 @@ from hapticlink.components import forces, integrators, time_tables
 from hapticlink.components.component import WRENCH, Block, Component, Variable
 from hapticlink.components.contact import contact_forces
 from hapticlink.components.contact.detection import touches
-from hapticlink.components.dynamics import closure_diagnostics, further_points, local_model
+from hapticlink.components.dynamics import (
+    closure_diagnostics,
+    further_points,
+    local_model,
+    stabilization,
+)
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
 from hapticlink.components.dynamics.constrained_directions import resisted_directions
@@ -63,18 +68,14 @@ def virtual_mechanism(
     does not close, MasslessError where a massless body is free, ValueError for an unknown method,
     and for a formulation that does not fit.
     """
-    method = integrators.METHODS.get(mechanism.integrator)
-    if method is None:
-        known = sorted(integrators.METHODS)
-        raise ValueError(f"`integrator`: {mechanism.integrator!r} is unknown; take one of {known}")
     independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     parts = _Parts(linkage, mechanism, directions, contacts, frame_s)
-    block = _block(parts, method, step_s / mechanism.substeps, length_scale)
+    block = _block(parts, step_s / mechanism.substeps, length_scale)
     tables = drives.tables(linkage)
     tabled = ca.SX.sym("tabled", 2 * len(tables))
-    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"], tabled)
+    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"], tabled, block.t)
     space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
     applied = space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
     applied += further_points.efforts(model, block.u)
@@ -151,9 +152,7 @@ class _Parts:
     frame_s: float | None
 
 
-def _block(
-    parts: _Parts, method: integrators.Integrator, step_s: float, length_scale: float | None
-) -> Block:
+def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
     """The variables of the parts."""
     linkage, directions, contacts = parts.linkage, parts.directions, parts.contacts
     inputs = [
@@ -166,9 +165,9 @@ def _block(
             power=Power("x", sign=-1.0),
         ),
     ]
-    baumgarte, period = method.baumgarte, step_s
+    baumgarte, period = stabilization.gains(parts.mechanism.integrator), step_s
     if parts.frame_s:
-        baumgarte, period = local_model.BAUMGARTE, parts.frame_s
+        baumgarte, period = stabilization.HELD, parts.frame_s
     parameters = mechanism_parameters(linkage, parts.mechanism, baumgarte, period)
     outputs = motion_outputs(linkage)
     inputs += further_points.inputs(linkage)

@@ -21,14 +21,9 @@ from hapticlink.components.dynamics.assembly import assemble
 from hapticlink.components.dynamics.light_bodies import added_inertia
 from hapticlink.components.dynamics.operational_space import Terms
 from hapticlink.components.dynamics.variables import parameters, start_parameters
-from hapticlink.components.integrators.base import Baumgarte
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.linkage import Linkage
-
-BAUMGARTE = Baumgarte(alpha_h=0.4, beta=1.0)
-"""With h the frame's period: Wh is stale by up to a frame, and a faster correction overshoots.
-Projection with the held matrices diverges for the same reason."""
 
 
 def ports(linkage: Linkage) -> list[Variable]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hapticlink.components import forces
 from hapticlink.components.component import ACCELERATION, MOBILITY, POSE, TWIST, Variable
-from hapticlink.components.integrators.base import Baumgarte
+from hapticlink.components.dynamics.stabilization import Baumgarte
 from hapticlink.components.linkage.parameters import (
     body_parameters,
     coordinate_units,
@@ -22,10 +22,10 @@ def parameters(linkage: Linkage) -> tuple[Variable, ...]:
 def mechanism_parameters(
     linkage: Linkage, mechanism: Mechanism, default: Baumgarte, period_s: float
 ) -> list[Variable]:
-    """`default` is that of the method, for steps of period_s."""
+    """`default` are the gains for steps of period_s."""
     found = [*parameters(linkage), *start_parameters(linkage)]
     if linkage.loop and mechanism.stabilization == "baumgarte":
-        alpha = default.alpha_h / period_s if mechanism.alpha is None else mechanism.alpha
+        alpha = default.alpha_T / period_s if mechanism.alpha is None else mechanism.alpha
         beta = default.beta if mechanism.beta is None else mechanism.beta
         found.append(Variable("alpha", (), "1/s", alpha, "Baumgarte frequency of (3.3)"))
         found.append(Variable("beta", (), "1", beta, "Baumgarte damping ratio of (3.3)"))

@@ -1,9 +1,10 @@
 """Applied forces of a linkage, one kind a file; a kind that a scene lacks adds no term.
 
-A kind is a module with
+Those of the linkage's own keys are modules with
     parameters(linkage) -> list[Variable]
     efforts(model)      -> generalised forces (n x 1), or None
     energy(model)       -> potential energy (J), or None
+and those that [[linkage.force]] names by its `type` are classes in `FORCES`.
 """
 
 from __future__ import annotations
@@ -14,25 +15,41 @@ import casadi as ca
 
 from hapticlink.components.component import Variable
 from hapticlink.components.forces import drives, gravity, joints, springs
+from hapticlink.components.forces.base import Force
+from hapticlink.components.registry import Registry
 from hapticlink.components.specs.linkage import Linkage
 
 if TYPE_CHECKING:
     from hapticlink.components.linkage.model import LinkageModel
 
 KINDS = (gravity, springs, joints, drives)
+FORCES: Registry[type[Force]] = Registry("force", {})
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
     """Those of the forces alone."""
-    return [v for kind in KINDS for v in kind.parameters(linkage)]
+    own = [v for kind in KINDS for v in kind.parameters(linkage)]
+    return own + [v for force in linkage.force for v in force.parameters()]
 
 
 def efforts(model: LinkageModel) -> ca.SX:
-    """Sum of all generalised forces, n x 1: gravity (-g of (2.3)), springs, friction, drives."""
+    """Sum of all generalised forces, n x 1: gravity (-g of (2.3)), springs, friction, drives, and
+    those of [[linkage.force]]. Raises ValueError for one of another size, or that asks for what the
+    linkage has not."""
     found = [Q for kind in KINDS if (Q := kind.efforts(model)) is not None]
-    return sum(found, start=ca.SX(model.q.numel(), 1))
+    n = model.q.numel()
+    for force in model.linkage.force:
+        try:
+            Q = ca.SX(force.efforts(model))
+        except KeyError as error:  # of frames, joints or parameters
+            raise ValueError(f"force `{force.name}`: the linkage has no {error}") from error
+        if Q.shape != (n, 1):
+            raise ValueError(f"force `{force.name}`: efforts of {Q.shape}, not {(n, 1)}")
+        found.append(Q)
+    return sum(found, start=ca.SX(n, 1))
 
 
 def energy(model: LinkageModel) -> ca.SX:
     """Sum of all potential energies, J."""
-    return sum((V for kind in KINDS if (V := kind.energy(model)) is not None), start=ca.SX(0))
+    found = [V for kind in KINDS if (V := kind.energy(model)) is not None]
+    return sum([*found, *(f.energy(model) for f in model.linkage.force)], start=ca.SX(0))

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import casadi as ca
-
-
-@dataclass(frozen=True)
-class Baumgarte:
-    """Default stabilisation of (3.3) for a method of step h: alpha = alpha_h / h, and beta."""
-
-    alpha_h: float
-    beta: float
+if TYPE_CHECKING:
+    import casadi as ca
 
 
 class Integrator(ABC):
@@ -22,10 +15,8 @@ class Integrator(ABC):
 
     extrapolates: stages weigh earlier ones by far more than 1, and their rounding with them."""
 
-    name: str
     order: int
     extrapolates: bool = False
-    baumgarte: Baumgarte
 
     @abstractmethod
     def step(

@@ -7,26 +7,55 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import casadi as ca
+from hapticlink.components.integrators.base import Integrator
 
-from hapticlink.components.integrators.base import Baumgarte, Integrator
+if TYPE_CHECKING:
+    import casadi as ca
+
+ROUNDING = 1e-13
+"""Of coefficients that are given as decimals, relative to the sum of their magnitudes."""
 
 
 @dataclass(frozen=True)
 class Tableau:
-    """a (strictly lower rows), b, c of an explicit method, and its order."""
+    """a (strictly lower rows), b, c of an explicit method, and its order.
+
+    Raises ValueError where a row of a does not sum to its c, or where the method does not
+    integrate powers of t up to its order: sum_i b_i c_i^(k-1) = 1/k for k = 1..order, of which
+    the first says that b sums to 1. (Hairer, Norsett, Wanner, Solving Ordinary Differential
+    Equations I, II.1 and II.2; the conditions on trees that branch are not checked.)
+    """
 
     a: tuple[tuple[float, ...], ...]
     b: tuple[float, ...]
     c: tuple[float, ...]
     order: int
 
+    def __post_init__(self) -> None:
+        lengths = [len(row) for row in self.a]
+        if lengths != list(range(len(self.b))) or len(self.c) != len(self.b):
+            raise ValueError(
+                f"tableau: {len(self.b)} b, {len(self.c)} c and rows of a of {lengths} entries; "
+                "an explicit method has as many b as c, and i - 1 entries in row i of a"
+            )
+        for i, (row, c) in enumerate(zip(self.a, self.c, strict=True), start=1):
+            _require(row, c, f"row {i} of a should sum to c = {c!r}")
+        for k in range(1, self.order + 1):
+            terms = [b * c ** (k - 1) for b, c in zip(self.b, self.c, strict=True)]
+            name = "b" if k == 1 else f"b c^{k - 1}"
+            total = "1" if k == 1 else f"1/{k}"
+            _require(terms, 1 / k, f"{name} should sum to {total} for order {self.order}")
+
+
+def _require(terms: Sequence[float], total: float, what: str) -> None:
+    if abs(sum(terms) - total) > ROUNDING * (1 + sum(map(abs, terms))):
+        raise ValueError(f"tableau: {what}, and sums to {sum(terms)!r}")
+
 
 class RungeKutta(Integrator):
-    def __init__(self, name: str, tableau: Tableau, baumgarte: Baumgarte) -> None:
-        self.name = name
-        self.baumgarte = baumgarte
+    def __init__(self, tableau: Tableau) -> None:
         self.tableau = tableau
         self.order = tableau.order
         self.extrapolates = any(abs(a) > 10 for row in tableau.a for a in row)

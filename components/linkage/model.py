@@ -11,6 +11,7 @@ h(q) = 0 (2.13). The terms of (2.3), D qdd + C qd + g = J_h' F_h + W' lambda:
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,15 +48,22 @@ class LinkageModel:
     """The terms of (2.3) at q, qd, each built when it is first asked for.
 
     q, qd: n x 1; p: the parameters by name. D n x n, W m x n (m two for each loop),
-    J_h 3 x n. tabled: (y, y') of the drives' tables at the instant. Raises ValueError for bodies
-    that no joint connects to the ground.
+    J_h 3 x n. tabled: (y, y') of the drives' tables at the instant t (s), NaN where the model is at
+    none. Raises ValueError for bodies that no joint connects to the ground.
     """
 
     def __init__(
-        self, linkage: Linkage, p: Signals, q: ca.SX, qd: ca.SX, tabled: ca.SX | None = None
+        self,
+        linkage: Linkage,
+        p: Signals,
+        q: ca.SX,
+        qd: ca.SX,
+        tabled: ca.SX | None = None,
+        t: ca.SX | None = None,
     ) -> None:
         self.linkage, self.p, self.q, self.qd = linkage, p, q, qd
         self.tabled = ca.SX(0, 1) if tabled is None else tabled
+        self.t = ca.SX(math.nan) if t is None else t
 
     @cached_property
     def _offsets(self) -> dict[str, int]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.quantities import (
     Angle,
     Coordinate,
@@ -194,6 +195,9 @@ class Linkage:
     """Cut joints that close loops."""
     spring: tuple[Spring, ...] = ()
     """Springs and dampers between points of bodies."""
+    force: tuple[Any, ...] = ()
+    """Forces of your own: each `type` is a name that a plugin has registered, which says the other
+    keys ([extending](extending.md#a-force))."""
     gravity: tuple[Acceleration, Acceleration] | None = None
     """Gravity on every body."""
     start: Mapping[str, Coordinate | Pose] = field(default_factory=dict)
@@ -220,9 +224,7 @@ class Directions:
 class Mechanism:
     """Time integration of the virtual mechanism."""
 
-    integrator: Literal[
-        "semi-implicit-euler", "heun", "linearly-implicit", "rk4", "dormand-prince-8"
-    ] = "rk4"
+    integrator: Annotated[str, METHODS.names()] = "rk4"
     """Integration method."""
     formulation: Literal["multipliers", "partitioning", "embedding"] = "multipliers"
     """How loops enter (section B.2): by multipliers with a stabilization, or by independent

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+from hapticlink.components.registry import near as near  # told here too
+from hapticlink.components.registry import unknown as unknown
 
 
 class Fault(Exception):
@@ -41,16 +43,6 @@ class Finding:
         return ": ".join(part for part in (place, self.key, self.message) if part)
 
 
-def near(name: str, known: Iterable[str]) -> str:
-    """The nearest of what there is, or all of it."""
-    known = list(known)
-    found = difflib.get_close_matches(name, known, 1)
-    return f"did you mean {found[0]!r}?" if found else f"there are {', '.join(known) or 'none'}"
-
-
-def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """That there is no `kind` of this name, with the nearest that there is."""
-    return f"no {kind} {name!r}; {near(name, known)}"
 
 
 class SceneFault(InputFault):

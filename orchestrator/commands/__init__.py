@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 
-from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.components.registry import Registry
+from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault
 
 app = App(
@@ -16,19 +18,62 @@ app = App(
     help="Haptic rendering of linkages: FMUs, co-simulated at separate rates.",
     version_flags=["--version"],
 )
-_COMMANDS = {
-    "run": "Run a scene: results, run.json and figures.",
-    "build": "Build the FMUs of a scene.",
-    "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
-    "info": "Tell what a scene consists of, or which scenes there are.",
-    "schema": "Print what a scene may say, for editors or as a page.",
-    "sweep": "Run many variants of a scene in parallel: one table and figure.",
-    "study": "Study which hold suits which rate: tables, figures and a page.",
-    "bench": "Measure run time against error, beside other codes.",
-    "reproduce": "Make the report's figures and a page of what was found.",
-}
-for _name, _help in _COMMANDS.items():
-    app.command(f"{__name__}.{_name}:{_name}", name=_name, help=_help)
+COMMANDS: Registry[str | Callable[..., Any]] = Registry(
+    "command",
+    {
+        "run": "Run a scene: results, run.json and figures.",
+        "build": "Build the FMUs of a scene.",
+        "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
+        "info": "Tell what a scene consists of, or which scenes there are.",
+        "schema": "Print what a scene may say, for editors or as a page.",
+        "sweep": "Run many variants of a scene in parallel: one table and figure.",
+        "study": "Study which hold suits which rate: tables, figures and a page.",
+        "bench": "Measure run time against error, beside other codes.",
+        "reproduce": "Make the report's figures and a page of what was found.",
+    },
+)
+"""The help of a command whose function is in the file of its name, imported when it is called; or
+a function, whose arguments and docstring are the command's. It returns the exit status."""
+
+Plugin = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--plugin",
+        consume_multiple=False,
+        negative="",
+        help="Module with parts of your own, installed or in this folder; repeatable.",
+    ),
+]
+Tokens = Annotated[str, Parameter(show=False, allow_leading_hyphen=True)]
+
+
+@app.meta.default
+def _command(*tokens: Tokens, plugin: Plugin = None) -> int | None:
+    """`plugin` has been loaded before the tokens are read."""
+    return app(tokens, result_action="return_value", exit_on_error=False)
+
+
+def _commands(arguments: Sequence[str]) -> None:
+    """Load the plugins that the arguments name, then list all commands; those of installed plugins
+    where a command is called that is not known else."""
+    named, words, rest = [], [], iter(arguments)
+    for each in rest:
+        if each == "--plugin":
+            named.append(next(rest, ""))
+        elif each.startswith("--plugin="):
+            named.append(each.partition("=")[2])
+        elif not each.startswith("-"):
+            words.append(each)
+    plugins.load(filter(None, named))
+    if words and words[0] not in COMMANDS:
+        plugins.load_installed()
+    for name, command in COMMANDS.items():
+        if name in app:
+            continue
+        if isinstance(command, str):
+            app.command(f"{__name__}.{name}:{name}", name=name, help=command)
+        else:
+            app.command(command, name=name)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -44,7 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _status(arguments: Sequence[str] | None) -> int:
     try:
         interrupt.check()
-        status = app(arguments, result_action="return_value", exit_on_error=False)
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        _commands(given)
+        status = app.meta(given, result_action="return_value", exit_on_error=False)
         sys.stdout.flush()
         return status or 0
     except CycloptsError:  # cyclopts has printed it

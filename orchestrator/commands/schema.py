@@ -20,8 +20,11 @@ def schema(*, markdown: Markdown = False) -> int:
     """
     import json
 
+    from hapticlink.orchestrator.base import plugins
+    from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # a scene names them too
     from hapticlink.orchestrator.scene import json_schema, reference
 
+    plugins.load_installed()
     if markdown:
         print(reference.page(), end="")
     else:

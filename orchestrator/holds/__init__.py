@@ -1,14 +1,8 @@
-"""What stands on an input between two samples of its source. One hold a file.
-
-A hold's class says what it `needs` ("derivative": samples are the signal and then its derivative;
-"power": the connection carries it; "spring": it sets one; or None), whether it `gives_samples`,
-unchanged, and the `degree` of the polynomial in time that it is within a step; 0 where it stands.
-"""
+"""What stands on an input between two samples of its source. One hold a file."""
 
 from __future__ import annotations
 
-from typing import Protocol
-
+from hapticlink.components.registry import Registry
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.delayed import Delayed
 from hapticlink.orchestrator.holds.first_order import FirstOrder
@@ -22,34 +16,25 @@ from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.holds.second_order import SecondOrder
 from hapticlink.orchestrator.holds.smooth import Smooth
-from hapticlink.orchestrator.holds.zero_order import ZeroOrder
+from hapticlink.orchestrator.holds.zero_order import Latest, ZeroOrder
 
+__all__ = ["HOLDS", "Hold", "HoldContext"]
 
-class HoldType(Protocol):
-    @property
-    def needs(self) -> str | None: ...
-
-    @property
-    def gives_samples(self) -> bool: ...
-
-    @property
-    def degree(self) -> int: ...
-
-    def __call__(self, context: HoldContext) -> Hold: ...
-
-
-HOLDS: dict[str, HoldType] = {
-    "zoh": ZeroOrder,
-    "lead": Lead,
-    "foh": FirstOrder,
-    "foh-derivative": FirstOrderDerivative,
-    "second-order": SecondOrder,
-    "hermite": Hermite,
-    "delayed": Delayed,
-    "smooth": Smooth,
-    "passive": Passive,
-    "nepce": NearlyEnergyPreserving,
-    "pspm": PassiveSetPosition,
-    "latest": ZeroOrder,
-    "mean": Mean,
-}
+HOLDS: Registry[type[Hold]] = Registry(
+    "hold",
+    {
+        "zoh": ZeroOrder,
+        "lead": Lead,
+        "foh": FirstOrder,
+        "foh-derivative": FirstOrderDerivative,
+        "second-order": SecondOrder,
+        "hermite": Hermite,
+        "delayed": Delayed,
+        "smooth": Smooth,
+        "passive": Passive,
+        "nepce": NearlyEnergyPreserving,
+        "pspm": PassiveSetPosition,
+        "latest": Latest,
+        "mean": Mean,
+    },
+)

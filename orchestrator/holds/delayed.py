@@ -7,19 +7,16 @@ where periods are the same. Continuous, never beyond the samples, and late by H:
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.hold import Hold
 
 
-class Delayed:
-    needs: ClassVar[str | None] = None
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 1
+class Delayed(Hold):
+    degree = 1
 
     def __init__(self, context: HoldContext) -> None:
         self._samples = History(2)

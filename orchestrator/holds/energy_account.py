@@ -14,12 +14,12 @@ knows here.
 from __future__ import annotations
 
 from collections import deque
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.hold import Hold
 
 Vector = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def repayment(excess: Vector, motion: Vector, largest: Vector) -> Vector:
     return np.clip(effort, -largest, largest)
 
 
-class Account:
+class Account(Hold):
     """The base of both holds: zero order, plus `correction` once for every tick that is asked for.
 
     motion: the last displacement. straight, ahead: that of the step to come with the target's
@@ -44,9 +44,7 @@ class Account:
     that was the newest known while it acted.
     """
 
-    needs: ClassVar[str | None] = "power"
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 0
+    needs = "power"
 
     def __init__(self, context: HoldContext) -> None:
         assert context.displacement is not None

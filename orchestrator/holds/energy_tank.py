@@ -8,8 +8,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.hold import Vector
+Vector = NDArray[np.float64]
 
 
 class EnergyTank:

@@ -6,19 +6,18 @@ sample, that sample.
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.hold import Hold
 
 
-class FirstOrder:
-    needs: ClassVar[str | None] = None
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 1
+class FirstOrder(Hold):
+    degree = 1
+    order = 2
+    interpolates = True
 
     def __init__(self, context: HoldContext) -> None:
         self._samples = History(2)

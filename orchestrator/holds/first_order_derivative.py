@@ -7,18 +7,17 @@ sample is y, then yd (1/s of y's unit).
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.hold import Hold
 
 
-class FirstOrderDerivative:
-    needs: ClassVar[str | None] = "derivative"
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 1
+class FirstOrderDerivative(Hold):
+    needs = "derivative"
+    degree = 1
+    order = 2
 
     def __init__(self, context: HoldContext) -> None:
         self._size, self._seconds = context.size, context.seconds

@@ -8,19 +8,19 @@ one sample, the first-order hold of its derivative.
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.hold import Hold
 
 
-class Hermite:
-    needs: ClassVar[str | None] = "derivative"
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 3
+class Hermite(Hold):
+    needs = "derivative"
+    degree = 3
+    order = 4
+    interpolates = True
 
     def __init__(self, context: HoldContext) -> None:
         self._size, self._seconds = context.size, context.seconds

@@ -6,19 +6,16 @@ and no delay at low frequency. With one sample, that sample.
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.hold import Hold
 
 
-class Lead:
-    needs: ClassVar[str | None] = None
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 0
+class Lead(Hold):
+    order = 2
 
     def __init__(self, context: HoldContext) -> None:
         self._samples = History(2)

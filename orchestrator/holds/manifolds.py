@@ -27,7 +27,7 @@ from hapticlink.orchestrator.holds.hold import Hold
 Vector = NDArray[np.float64]
 
 
-class Projector:
+class Projector(Hold):
     """A hold whose values are projectors of the rank of its newest sample."""
 
     def __init__(self, make: Callable[[], Hold], size: int) -> None:
@@ -47,7 +47,7 @@ class Projector:
         return (resisted @ resisted.T).ravel()
 
 
-class Semidefinite:
+class Semidefinite(Hold):
     """A hold whose values are symmetric and have no negative eigenvalue."""
 
     def __init__(self, make: Callable[[], Hold], size: int) -> None:
@@ -67,7 +67,7 @@ class Semidefinite:
         return (root @ root.T * outer).ravel()
 
 
-class Unwrapped:
+class Unwrapped(Hold):
     """A hold of angles: `angles` are the places of the entries that wrap, `turn` what a turn is in
     the unit of each."""
 

@@ -9,20 +9,17 @@ period beside the half of the hold itself; order 1. Where no sample came since, 
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.hold import Hold
 
 Vector = NDArray[np.float64]
 
 
-class Mean:
-    needs: ClassVar[str | None] = None
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 0
+class Mean(Hold):
+    downsamples = True
 
     def __init__(self, context: HoldContext) -> None:
         self._stamp: int | None = None

@@ -26,20 +26,17 @@ What the fast side makes by sampling F itself comes on top, 1/2 dx'K dx a step (
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.hold import Hold
 
 Vector = NDArray[np.float64]
 
 
-class PassiveSetPosition:
-    needs: ClassVar[str | None] = "spring"
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 0
+class PassiveSetPosition(Hold):
+    needs = "spring"
 
     def __init__(self, context: HoldContext) -> None:
         assert context.tank is not None

@@ -8,19 +8,18 @@ omega H = 2.61. With two samples the first-order hold, with one that sample.
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.hold import Hold
 
 
-class SecondOrder:
-    needs: ClassVar[str | None] = None
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 2
+class SecondOrder(Hold):
+    degree = 2
+    order = 3
+    interpolates = True
 
     def __init__(self, context: HoldContext) -> None:
         self._samples = History(3)

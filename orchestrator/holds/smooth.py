@@ -11,21 +11,18 @@ Order 1. The first sample stands until the second arrives.
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.hold import Hold
 
 Vector = NDArray[np.float64]
 
 
-class Smooth:
-    needs: ClassVar[str | None] = None
-    gives_samples: ClassVar[bool] = False
-    degree: ClassVar[int] = 3
+class Smooth(Hold):
+    degree = 3
 
     def __init__(self, context: HoldContext) -> None:
         self._samples = History(2)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.hold import Hold
 
 
-class ZeroOrder:
-    needs: ClassVar[str | None] = None
-    gives_samples: ClassVar[bool] = True
-    degree: ClassVar[int] = 0
+class ZeroOrder(Hold):
+    gives_samples = True
+    interpolates = True
 
     def __init__(self, context: HoldContext) -> None:
         self._newest = np.zeros(context.size)
@@ -23,3 +21,10 @@ class ZeroOrder:
 
     def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
         return self._newest
+
+
+class Latest(ZeroOrder):
+    """The same, by its name where a slow target reads a fast source."""
+
+    interpolates = False
+    downsamples = True

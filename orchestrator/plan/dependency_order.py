@@ -58,18 +58,8 @@ def plants(system: System, units: Iterable[Fmu]) -> Iterator[list[Fmu]]:
         yield [system.fmu[name] for part in parts for name in part]
 
 
-def loops(system: System) -> Iterator[AlgebraicLoop]:
-    """Among the FMUs that the coupling puts in an order: sampled blocks, and plants that read the
-    end of each other's steps."""
-    ordered = [[u for u in system.fmus if u.sampled]]
-    continuous = [u for u in system.fmus if not u.sampled]
-    if system.coupling == "jacobi":
-        return
-    if system.coupling == "gauss-seidel-plants":
-        ordered.append(continuous)
-    if system.coupling == "iterated":
-        clocks = dict.fromkeys(u.clock for u in continuous)
-        ordered += [[u for u in continuous if u.clock == clock] for clock in clocks]
+def loops(system: System, ordered: Iterable[Iterable[Fmu]]) -> Iterator[AlgebraicLoop]:
+    """Within each group of FMUs that a scheme puts in an order."""
     for units in ordered:
         for group in plants(system, units):
             names = tuple(u.name for u in group)

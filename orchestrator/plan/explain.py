@@ -7,7 +7,6 @@ from dataclasses import fields
 from itertools import groupby
 
 from hapticlink.orchestrator.base.ticks import Clock
-from hapticlink.orchestrator.plan import dependency_order
 from hapticlink.orchestrator.plan.operations import Event, Operation, Repeat
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import comes_round, uses
@@ -39,7 +38,7 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
         )
         yield f"  {clock.name}: {_steps(clock)}: {units}"
     yield from _holds(system)
-    for loop in dependency_order.loops(system):
+    for loop in plan.loops():
         yield f"  loop {loop.ring}: {', '.join(loop.fmus)} in this order"
     last, names = comes_round(system), dict[Event, str]()
     events: dict[int, str] = {}

@@ -14,6 +14,8 @@ from itertools import groupby, pairwise
 from typing import NamedTuple
 
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.plan import dependency_order
+from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
 from hapticlink.orchestrator.plan.operations import Advance, Event, Firing, Operation, Part, flat
 from hapticlink.orchestrator.plan.schemes import SCHEMES, step_control
 from hapticlink.orchestrator.system.system import System
@@ -39,7 +41,7 @@ class Plan:
         return self._blocks[kind]
 
     def _made(self, kind: Event | Part) -> Block:
-        scheme = SCHEMES[self.system.coupling]
+        scheme = SCHEMES[self.system.coupling].block
         if isinstance(kind, Part):
             return step_control.part(self.system, kind, scheme)
         if self.system.step_control:
@@ -50,6 +52,11 @@ class Plan:
         """Raises InputFault where the blocks cannot be made: at the first event all clocks fire, so
         what their FMUs do to each other is found there."""
         tuple(self.unrolled(next(iter(self)).event))
+
+    def loops(self) -> tuple[AlgebraicLoop, ...]:
+        """Among FMUs that the scheme puts in an order, and the order taken."""
+        ordered = SCHEMES[self.system.coupling].ordered(self.system)
+        return tuple(dependency_order.loops(self.system, ordered))
 
     def unrolled(self, event: Event) -> Iterator[Operation]:
         """The operations of `event`: a repetition carried out once, step control in one step."""

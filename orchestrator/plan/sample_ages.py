@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
@@ -127,6 +127,11 @@ class Delay:
     least: float
     most: float
     mean: float
+
+
+def causal(ages: Mapping[str, Delay]) -> bool:
+    """Whether nobody reads a value stamped later than the start of its step."""
+    return all(age.least >= 0 for age in ages.values())
 
 
 class Ages:

@@ -53,15 +53,18 @@ def make_hold(
     return hold
 
 
-class _Beside:
+class _Beside(Hold):
     """Sends the derivative along with each sample, so that both are late together."""
 
     def __init__(self, hold: Hold, derivative: Callable[[], Vector]) -> None:
-        self._hold, self._derivative, self.value = hold, derivative, hold.value
+        self._hold, self._derivative = hold, derivative
         self.link: Link | None = getattr(hold, "link", None)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._hold.push(stamp, np.concatenate([sample, self._derivative()]), arrival)
+
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
+        return self._hold.value(tick, ahead)
 
 
 def _context(

@@ -12,6 +12,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.operations import Part
 from hapticlink.orchestrator.run.energy.bonds import bond
 from hapticlink.orchestrator.run.fixed_point import Unconverged
@@ -54,7 +55,7 @@ class Advancer:
             for c in system.connections
             if c.source in plants and c.target in plants and not c.initial
         ]
-        self._order = min((ORDER.get(c.hold or "", 1) for c in between), default=1)
+        self._order = min((HOLDS[c.hold].order if c.hold else 1 for c in between), default=1)
         ours = [c for c in system.connections if c.hold and {c.source, c.target} & {*plants}]
         self._holds = [*(simulation.holds[c.name] for c in ours), *simulation.springs]
         self._bonds = []
@@ -201,10 +202,6 @@ class Steps:
         self.longest = max(self.longest, size)
         self.taken += 1
         self.forced += forced
-
-
-ORDER = {"lead": 2, "foh": 2, "foh-derivative": 2, "second-order": 3, "hermite": 4}
-"""Of the error over a run, by the hold between plants; 1 for any other, and for none."""
 
 
 def integral(error: float, order: int) -> float:

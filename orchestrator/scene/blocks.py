@@ -13,21 +13,28 @@ from hapticlink.orchestrator.scene.scene import Scene
 
 @dataclass(frozen=True)
 class BlockPlan:
-    """A block that the scene asks for: its settings and its rate, "haptics" or "graphics"."""
+    """A block that the scene asks for: its settings and its rate, which of the loop's own blocks is
+    "haptics" or "graphics"."""
 
     name: str
-    rate: str
+    rate: AnyRate
     settings: dict[str, Any]
     kind: str = ""
 
     @property
     def made_by(self) -> str:
-        """The name of the block in `fmus.blocks`."""
+        """Its name in `components.blocks.BLOCKS`."""
         return self.kind or self.name
 
 
 def blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
-    """The blocks of `scene`, in the order of the loop; skip=False with all that they can have."""
+    """All blocks that are built into FMUs: those of the loop, then those that [[fmu]] names."""
+    named = (BlockPlan(f.name, f.rate, dict(f.settings), f.block) for f in scene.fmu if f.block)
+    return (*loop_blocks(scene, skip=skip), *named)
+
+
+def loop_blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
+    """The blocks of the haptic loop, in its order; skip=False with all that they can have."""
     if not skip:
         scene = unskipped(scene)
     found = []

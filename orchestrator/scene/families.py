@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+from hapticlink.components.registry import Registry
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.base.faults import near
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 ARGUMENTS = ("family", "n")
@@ -24,7 +24,7 @@ class FamilyLinkage(Linkage):
     """Bodies, a tree of joints, and the cut joints that close loops; or a family of linkages, over
     which the other keys are laid."""
 
-    family: str | None = None
+    family: Annotated[str, FAMILIES.names()] | None = None
     """A linkage that repeats a pattern: n-four-bar."""
     n: Annotated[int, MEMBERS] | None = None
     """How many members the family's linkage has."""
@@ -81,14 +81,14 @@ def n_four_bar(n: int) -> dict[str, Any]:
     }
 
 
-FAMILIES: dict[str, Callable[[int], dict[str, Any]]] = {"n-four-bar": n_four_bar}
+FAMILIES: Registry[Callable[[int], dict[str, Any]]] = Registry("family", {"n-four-bar": n_four_bar})
 
 
 def members(arguments: dict[str, Any]) -> dict[str, Any]:
     """The tables of the linkage that `family` and `n` name. Raises FamilyError."""
-    family, n = arguments.get("family"), arguments.get("n")
+    family, n = str(arguments.get("family")), arguments.get("n")
     if family not in FAMILIES:
-        raise FamilyError("family", f"no family {family!r}; {near(str(family), FAMILIES)}")
+        raise FamilyError("family", FAMILIES.unknown(family))
     if not isinstance(n, int) or isinstance(n, bool) or n not in MEMBERS:
         raise FamilyError("n", f"{n!r} is out of range: give a whole number {MEMBERS.range}")
     return FAMILIES[family](n)

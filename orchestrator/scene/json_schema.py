@@ -92,6 +92,8 @@ class _Definitions:
         origin, arguments = typing.get_origin(kind), typing.get_args(kind)
         if origin is typing.Literal:
             return {"enum": list(arguments)}
+        if kind is Any:  # a part of a registry says what
+            return {}
         if origin is tuple and Ellipsis in arguments:
             of_tables = is_dataclass(arguments[0])
             return {"type": "array", "items": self._any_of(arguments[0], entry or of_tables)}

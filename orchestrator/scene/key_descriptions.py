@@ -37,7 +37,8 @@ def expected(path: Path, data: Any) -> str:
 def number(path: Path, data: Any) -> str:
     """`number > 0 (kg)`: the number that may stand at `path`, with its range and unit."""
     kinds = [pair for hint in said_of(path, data) for pair in measured(hint)]
-    numbers = [(kind, quantity) for kind, quantity in kinds if kind in (float, int) and quantity]
+    plain = Quantity("1")  # of a part that says no more
+    numbers = [(kind, quantity or plain) for kind, quantity in kinds if kind in (float, int)]
     word = "whole number" if all(kind is int for kind, _ in numbers) else "number"
     quantity = numbers[0][1]
     bounds = "" if quantity.range == "finite" else f" {quantity.range}"

@@ -11,7 +11,7 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
-from hapticlink.orchestrator.scene import checks, families, overrides
+from hapticlink.orchestrator.scene import checks, families, overrides, read_parts
 from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
 from hapticlink.orchestrator.scene.frame_trace import frame_times
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
@@ -50,6 +50,8 @@ def from_source(source: Source) -> Scene:
                 fmu[key] = dict(flat(fmu[key]))
 
     origin = Origin(source, data, set_by)
+    parts, unread = read_parts.read(data)
+    wrong += unread
     try:
         # As JSON, because strict JSON takes arrays for tuples and still refuses "1" for 1.
         found = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
@@ -62,4 +64,5 @@ def from_source(source: Source) -> Scene:
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
     if found.device and found.device.sensing != found.sensing:
         found = replace(found, device=replace(found.device, sensing=found.sensing))
+    found = read_parts.put(found, parts)
     return WrittenScene(**vars(found), origin=origin, written=found)

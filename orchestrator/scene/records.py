@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from hapticlink.components.blocks import BLOCKS
+from hapticlink.components.registry import Registry
 from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Seconds
+
+SCHEMES: Registry[Any] = Registry("scheme", {})
+"""Coupling schemes. `plan.schemes` puts them here: what they order is of rooms above this one."""
+HoldName = Annotated[str, HOLDS.names()]
 
 OWN = "the variable's own"
 """The unit of what belongs to an FMU that is not the project's."""
@@ -24,12 +31,16 @@ Value = (
 
 @dataclass(frozen=True, kw_only=True)
 class ForeignFmu:
-    """An FMU of FMI 2.0 or 3.0 co-simulation."""
+    """An FMU of FMI 2.0 or 3.0 co-simulation, or a block that is built into one."""
 
     name: str
     """By which connections and results speak of it: letters, digits and _."""
-    path: str
+    path: str | None = None
     """Its file, from the folder of the scene's."""
+    block: Annotated[str, BLOCKS.names()] | None = None
+    """In place of a file, the block that is built ([extending](extending.md#a-block))."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Those of the block, by name."""
     rate: Literal["haptics", "graphics"] | AnyRate = "haptics"
     """Its communication rate: that of the scene, or one of its own, as graphics.rate."""
     timing: Literal["sampled", "continuous"] | None = None
@@ -52,7 +63,7 @@ class Wire:
     """The output, `fmu.variable`."""
     to: str
     """The input, `fmu.variable`."""
-    hold: str | None = None
+    hold: HoldName | None = None
     """Its hold between rates; the scene's where left out."""
     factor: Annotated[float, Quantity("1")] = 1.0
     """The input gets factor y + offset, after the conversion of units; not 0."""
@@ -60,10 +71,6 @@ class Wire:
     """See `factor`."""
     convert: bool = True
     """Converts between the units of the two ends."""
-
-
-INTERPOLATING = ("zoh", "foh", "second-order", "hermite")
-"""Holds that interpolate once they have the sample at the end of the step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +83,7 @@ class Iteration:
     """Outputs y agree where they differ by at most tolerance (1 + |y|)."""
     most: Annotated[int, Quantity("1", ge=1, le=10000)] = 50
     """Most repetitions of a step; those that make Newton's Jacobian are not counted."""
-    interpolation: Literal["zoh", "foh", "second-order", "hermite"] = "foh"
+    interpolation: Annotated[str, HOLDS.names(lambda hold: hold.interpolates)] = "foh"
     """Hold on connections between plants of a rate: zoh, their value at the end of the step; foh,
     linear from its start; second-order; hermite, which needs derivatives (foh without)."""
     unconverged: Literal["stop", "accept"] = "stop"

@@ -60,6 +60,7 @@ def _forces(scene: Scene) -> Iterator[Need]:
         or any(j.stiffness is not None or j.damping is not None for j in joints),
         "friction": any(j.friction is not None for j in joints),
         "drives": any(j.drive is not None for j in joints),
+        "forces of your own": bool(scene.linkage.force),
     }
     for part, needed in given.items():
         yield Need(part, needed, "in [linkage]" if needed else "not mentioned: no term")

@@ -26,9 +26,12 @@ from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkag
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.faults import Finding
 from hapticlink.orchestrator.fmi.fault_policy import Faults
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
 from hapticlink.orchestrator.scene.records import (
+    SCHEMES,
     ForeignFmu,
+    HoldName,
     Iteration,
     Latency,
     PowerPort,
@@ -91,11 +94,11 @@ class Scene:
     """What `hapticlink info` tells."""
     duration: Duration
     """Simulated time."""
-    hold: str = "zoh"
+    hold: HoldName = "zoh"
     """Hold on connections from a slow rate to a fast one: [holds](holds.md)."""
-    downsampling: str = "latest"
+    downsampling: Annotated[str, HOLDS.names(lambda hold: hold.downsamples)] = "latest"
     """From a fast rate to a slow one: the latest sample, or the mean over the slow step."""
-    holds: Mapping[str, str] = field(default_factory=dict)
+    holds: Mapping[str, HoldName] = field(default_factory=dict)
     """Another hold for a connection, by source, target or "source -> target"."""
     delays: Mapping[str, Elapsed | Latency] = field(default_factory=dict)
     """Latency of a connection, or a table of latency and loss, by the same names."""
@@ -112,7 +115,7 @@ class Scene:
     get_after_set: tuple[str, ...] = ()
     """Plants whose feed-through may be read after new inputs are set, which FMI forbids between two
     steps."""
-    coupling: Literal["gauss-seidel", "jacobi", "gauss-seidel-plants", "iterated"] = "gauss-seidel"
+    coupling: Annotated[str, SCHEMES.names()] = "gauss-seidel"
     """Order of calls: [coupling](coupling.md)."""
     iteration: Iteration = field(default_factory=Iteration)
     """Of coupling = "iterated"."""

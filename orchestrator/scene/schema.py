@@ -9,14 +9,16 @@ from functools import cache
 from types import UnionType
 from typing import Any
 
+from hapticlink.components.registry import Names
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Quantity
+from hapticlink.orchestrator.scene import part_tables
 from hapticlink.orchestrator.scene.extends import SceneFile
 from hapticlink.orchestrator.scene.families import FamilyLinkage
 from hapticlink.orchestrator.scene.frame_trace import Trace
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml_keys import Path
+from hapticlink.orchestrator.scene.toml_keys import Path, value
 
 _WRITTEN: dict[Any, Any] = {Scene: SceneFile, Linkage: FamilyLinkage}
 """Records that a file writes with keys that are resolved before they are read."""
@@ -48,6 +50,8 @@ def said_of(path: Path, data: Any = None) -> list[Any]:
     its tables name by their `type`."""
     if not path:
         return [Scene]
+    if record := part_tables.record_of(path, data):
+        return [record]
     above, part = chosen(at(path[:-1], data), value(data, path[:-1])), path[-1]
     if isinstance(part, int):
         tuples = [typing.get_args(k) for k in above if typing.get_origin(k) is tuple]
@@ -57,26 +61,19 @@ def said_of(path: Path, data: Any = None) -> list[Any]:
     return named + [hint for kind in _records(above) if (hint := hints(kind).get(part))]
 
 
-def value(data: Any, path: Path) -> Any:
-    """What stands at `path`, None where nothing does."""
-    for part in path:
-        try:
-            data = data[part]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return data
-
-
 def branches(kind: Any) -> list[Any]:
     """The members of a union, annotations taken off."""
     return [branch for branch, _ in measured(kind)]
 
 
 def measured(kind: Any, quantity: Quantity | None = None) -> Iterator[tuple[Any, Quantity | None]]:
-    """The members of a union, each with the quantity that it is."""
+    """The members of a union, each with the quantity that it is; names as the literals that they
+    are."""
     origin = typing.get_origin(kind)
     if origin is typing.Annotated:
         inner, *beside = typing.get_args(kind)
+        if names := next((b for b in beside if isinstance(b, Names)), None):
+            inner = typing.Literal[tuple(names)]
         yield from measured(inner, next((b for b in beside if isinstance(b, Quantity)), quantity))
     elif origin in (typing.Union, UnionType):
         for member in typing.get_args(kind):

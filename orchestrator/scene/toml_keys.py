@@ -130,3 +130,13 @@ def whole(names: tuple[Any, ...]) -> tuple[Any, ...]:
         return names
     end = len(names) - (names[0] == "delays" and names[-1] in LATENCY)
     return (names[0], ".".join(names[1:end]), *names[end:])
+
+
+def value(data: Any, path: Path) -> Any:
+    """What stands at `path`, None where nothing does."""
+    for part in path:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return data

@@ -13,7 +13,7 @@ from pydantic_core import to_json
 from hapticlink.orchestrator.base.faults import near, unknown
 from hapticlink.orchestrator.scene import checks, key_descriptions, schema
 from hapticlink.orchestrator.scene.scene import adapter
-from hapticlink.orchestrator.scene.toml_keys import Path
+from hapticlink.orchestrator.scene.toml_keys import Path, value
 
 
 def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
@@ -70,11 +70,11 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
     untyped = [path for path, _ in known if path[-1:] == ("type",) and _is_kind(path[:-1])]
     wrong = [path[:-1] if path in untyped else path for path, _ in known if path]
     for path in wrong:
-        node = schema.value(whole, path[:-1])
+        node = value(whole, path[:-1])
         if isinstance(node, dict):
             node.pop(path[-1], None)
     for path in wrong:
-        node, filled = schema.value(whole, path[:-1]), _stand_in(path)
+        node, filled = value(whole, path[:-1]), _stand_in(path)
         if isinstance(node, list):
             place = typing.cast("int", path[-1])
             node += [filled] * (place + 1 - len(node))  # too short a vector
@@ -111,23 +111,25 @@ def _stand_in(path: Path) -> Any:
 
 
 def _message(error: Any, path: Path, data: Any) -> str:
-    kind, value = error["type"], _shown(error["input"])
+    kind, shown = error["type"], _shown(error["input"])
     if kind == "missing":
         return "is missing"
     if kind == "unexpected_keyword_argument":
         return _unknown_key(path, error["loc"], data)
+    if kind == "value_error":  # a name that is none
+        return str(error["ctx"]["error"])
     if kind == "union_tag_invalid":
         known = [t for k in schema.at(path[:-1]) for t in schema.types(k)]
         return unknown("type", error["ctx"]["tag"], known)
     if kind in _RANGE:
-        finite = "" if value.lstrip("-") not in ("inf", "nan") else "finite "
-        return f"{value} is out of range: give a {finite}{key_descriptions.number(path, data)}"
+        finite = "" if shown.lstrip("-") not in ("inf", "nan") else "finite "
+        return f"{shown} is out of range: give a {finite}{key_descriptions.number(path, data)}"
     if kind == "no_number":
-        return f"{value} should be {key_descriptions.expected(path, data)}"
+        return f"{shown} should be {key_descriptions.expected(path, data)}"
     if kind in ("tuple_type", "too_long") and (wanted := key_descriptions.vector(path, data)):
-        return f"{value} should be {wanted}"
+        return f"{shown} should be {wanted}"
     message = error["msg"].removeprefix("Input should be ").replace("an object", "a table")
-    return f"{value} should be {message}" if message != error["msg"] else f"{value}: {message}"
+    return f"{shown} should be {message}" if message != error["msg"] else f"{shown}: {message}"
 
 
 def _shown(value: Any) -> str:
@@ -137,7 +139,7 @@ def _shown(value: Any) -> str:
 
 def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     """That a table has no such key, or that only one of another type has."""
-    kinds, table, key = schema.at(path[:-1]), schema.value(data, path[:-1]), str(path[-1])
+    kinds, table, key = schema.at(path[:-1], data), value(data, path[:-1]), str(path[-1])
     types = {name: k for k in kinds for name in schema.types(k)}
     branch = loc[-2] if len(loc) > 1 else None  # where the table has no type: the default's
     this = table.get("type", branch) if isinstance(table, dict) else branch

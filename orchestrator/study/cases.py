@@ -77,9 +77,8 @@ def _direct() -> Iterator[Job]:
 
 def _holds(without: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
     """The holds of the registry from slow to fast, but for those that need what is not there."""
-    names = [n for n, kind in HOLDS.items() if kind.needs not in without]
+    names = HOLDS.names(lambda kind: kind.needs not in without and not kind.downsamples)
     found: dict[str, tuple[str, ...]] = {n: (f"hold={n}",) for n in names}
-    found = {n: options for n, options in found.items() if n not in ("latest", "mean")}
     means = {f"{n}, mean": (*found[n], "downsampling=mean") for n in MEANS if n in found}
     passive = tuple(f"holds.{wrench}=passive" for wrench in WRENCHES)
     guarded = {f"{n}, passive": (*found[n], *passive) for n in GUARDED if n in found}

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.sweep import cluster, job, pool, table
@@ -33,6 +33,10 @@ class Unfinished(Fault):
 def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row:
     """The row of one job; its results live in `room` (None: the machine's own) until measured."""
     assert each.scene is not None
+    try:
+        plugins.load(each.plugins)
+    except Fault as fault:
+        return failed(DIED, str(fault))
     if job.key(each.scene) != each.key:
         return failed(DIED, "this worker has another version of hapticlink or of what it uses")
     with tempfile.TemporaryDirectory(dir=room) if room else temporary_folders.room() as folder:

@@ -17,6 +17,7 @@ import hapticlink.components
 import hapticlink.fmus
 import hapticlink.orchestrator
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.run_json import PACKAGES
 from hapticlink.orchestrator.scene.scene import Scene
@@ -27,12 +28,14 @@ APART = frozenset({"api", "commands", "report", "study"})
 
 @dataclass(frozen=True)
 class Job:
-    """A point of a sweep. `scene` is the checked one, or None where it is refused for `refusal`."""
+    """A point of a sweep. `scene` is the checked one, or None where it is refused for `refusal`.
+    plugins: the modules whose parts it may name."""
 
     point: Mapping[str, str]
     scene: Scene | None
     key: str = ""
     refusal: str = ""
+    plugins: tuple[str, ...] = ()
 
 
 def jobs(
@@ -52,17 +55,20 @@ def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, s
     """The job of `scene` with `options`, told in the table as `point`."""
     try:
         found = open_scene.load(scene, options)
-        return Job(point, found, key(found))
+        return Job(point, found, key(found), plugins=tuple(plugins.loaded()))
     except Fault as fault:
         return Job(point, None, refusal=str(fault))
 
 
 def key(scene: Scene) -> str:
-    """sha256 of the resolved scene, the FMU files that it names, the versions and the sources:
-    where one of them changes, a run is made again. Raises InputFault for an FMU not to be read."""
-    whole: dict[str, Any] = {"scene": scene.tables(), "made_with": _made_with()}
+    """sha256 of the resolved scene, the FMU files that it names, the versions and the sources,
+    those of plugins too: where one of them changes, a run is made again. Raises InputFault for an
+    FMU not to be read."""
+    made_with = [*_made_with(), plugins.loaded()]
+    whole: dict[str, Any] = {"scene": scene.tables(), "made_with": made_with}
     try:
-        files = [sha256(Path(f.path).read_bytes()).hexdigest() for f in scene.fmu]
+        paths = [Path(f.path) for f in scene.fmu if f.path]
+        files = [sha256(path.read_bytes()).hexdigest() for path in paths]
     except OSError as error:
         raise InputFault(f"{error.filename}: cannot be read: {error.strerror}") from error
     return sha256(to_json(whole | {"fmus": files}, inf_nan_mode="constants")).hexdigest()

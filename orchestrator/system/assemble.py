@@ -9,7 +9,7 @@ from pathlib import Path
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.blocks import loop_blocks
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
@@ -26,10 +26,10 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     and connections that do not fit, and for names in holds and stop_when that it does not have."""
     problems: list[Problem] = []
     of = timeline.of
-    ours = tuple(Fmu(b.name, describe(files[b.name]), of[b.name]) for b in blocks(scene))
+    ours = tuple(Fmu(b.name, describe(files[b.name]), of[b.name]) for b in loop_blocks(scene))
     foreign = (
         Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
-        for fmu, description, starts in fmu_tables.fmus(scene, problems)
+        for fmu, description, starts in fmu_tables.fmus(scene, files, problems)
     )
     fmus = tuple(replace(u, isolate=u.isolate or scene.isolate) for u in (*ours, *foreign))
     connections = _connections(scene, ours, fmus, problems)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.records import INTERPOLATING, Latency, PowerPort, SetSpring
+from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import declared, springs
 from hapticlink.orchestrator.system.ports import carries_power, derivative, kind, names
@@ -121,8 +121,9 @@ def _misfit(
 ) -> str | None:
     """Why a hold cannot stand on a connection."""
     needs = HOLDS[hold].needs
-    if iterated and hold not in INTERPOLATING:
-        return f"coupling = 'iterated' interpolates here; take one of {', '.join(INTERPOLATING)}"
+    if iterated and not HOLDS[hold].interpolates:
+        able = ", ".join(HOLDS.names(lambda kind: kind.interpolates))
+        return f"coupling = 'iterated' interpolates here; take one of {able}"
     if c.kind == "table" and not HOLDS[hold].gives_samples:
         return f"rows of {c.source_port} name things: between two samples there is none"
     if needs == "derivative" and derivative(c, fmus) is None:

@@ -40,7 +40,7 @@ def costs(scene: Scene, timeline: Timeline, *, skip: bool = True) -> tuple[Block
     found = []
     for block in blocks(scene, skip=skip):
         # A rate that nothing runs at has no clock; what is left out would run at it.
-        clock = timeline.of.get(block.name, block.rate)
+        clock = timeline.of.get(block.name, str(block.rate))
         period = timeline.clock(clock).longest if clock in clocks else tick
         try:
             made = cost(block.made_by, settled(scene, block, timeline), timeline.seconds(period))

@@ -3,7 +3,7 @@ a name."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from operator import attrgetter
 from pathlib import Path as FilePath
@@ -17,11 +17,14 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
 
 
-def fmus(scene: Scene, problems: list[Problem]) -> Iterator[tuple[ForeignFmu, Description, Starts]]:
-    """Each FMU that can be used, with its start values; what is wrong goes to `problems`."""
+def fmus(
+    scene: Scene, files: Mapping[str, FilePath], problems: list[Problem]
+) -> Iterator[tuple[ForeignFmu, Description, Starts]]:
+    """Each FMU that can be used, with its start values; `files` are those of blocks that were
+    built. What is wrong goes to `problems`."""
     for i, fmu in enumerate(scene.fmu):
         try:
-            found = describe(FilePath(fmu.path))
+            found = describe(files.get(fmu.name) or FilePath(fmu.path or ""))
         except InputFault as fault:
             problems.append((("fmu", i, "path"), str(fault)))
             continue

@@ -54,7 +54,7 @@ class Link:
             yield arrival, stamp, item
 
 
-class Late:
+class Late(Hold):
     """A hold at the far end of a link."""
 
     def __init__(self, hold: Hold, link: Link) -> None:

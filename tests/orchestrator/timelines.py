@@ -19,6 +19,9 @@ from hapticlink.orchestrator.scene.rates import AnyRate, VariableRate
 from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Haptics, Scene
 
+CAUSAL = ("gauss-seidel", "jacobi")
+"""Schemes in which nobody reads a value stamped later than the start of its step."""
+
 
 def fixed(haptics: Fraction, graphics: Fraction, steps: int, align: str = "exact") -> Timeline:
     fast, slow = 1 / haptics, 1 / graphics

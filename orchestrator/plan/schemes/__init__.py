@@ -6,16 +6,33 @@ All keep to FMI 2.0.5 section 4.2.4: no get after a set without a doStep between
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
+from hapticlink.components.registry import Registry
 from hapticlink.orchestrator.plan.operations import Event, Operation
 from hapticlink.orchestrator.plan.schemes import gauss_seidel, gauss_seidel_plants, iterated, jacobi
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.scene import records
+from hapticlink.orchestrator.system.system import Fmu, System
 
-SCHEMES: dict[str, Callable[[System, Event], tuple[Operation, ...]]] = {
-    "gauss-seidel": gauss_seidel.block,
-    "jacobi": jacobi.block,
-    "gauss-seidel-plants": gauss_seidel_plants.block,
-    "iterated": iterated.block,
+
+def _none(system: System) -> list[list[Fmu]]:
+    return []
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """block: the operations of an event, in order. ordered: the groups of FMUs that it puts in an
+    order by their dependencies, so that loops among them are told; none by default. Whether it
+    reads the future nobody has to say: that is read off its blocks (`sample_ages`)."""
+
+    block: Callable[[System, Event], tuple[Operation, ...]]
+    ordered: Callable[[System], list[list[Fmu]]] = _none
+
+
+SCHEMES: Registry[Scheme] = records.SCHEMES
+SCHEMES |= {
+    "gauss-seidel": Scheme(gauss_seidel.block, gauss_seidel.ordered),
+    "jacobi": Scheme(jacobi.block),
+    "gauss-seidel-plants": Scheme(gauss_seidel_plants.block, gauss_seidel_plants.ordered),
+    "iterated": Scheme(iterated.block, iterated.ordered),
 }
-CAUSAL = frozenset({"gauss-seidel", "jacobi"})
-"""Schemes in which nobody reads a value stamped later than the start of its step."""

@@ -30,6 +30,11 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     return tuple(operations)
 
 
+def ordered(system: System) -> list[list[Fmu]]:
+    """The sampled blocks."""
+    return [[u for u in system.fmus if u.sampled]]
+
+
 def in_order(system: System, fmus: list[Fmu]) -> list[Fmu]:
     """`fmus` so that each comes after those that feed it."""
     ordered: list[Fmu] = []

@@ -12,7 +12,7 @@ from __future__ import annotations
 from hapticlink.orchestrator.plan import building_blocks, dependency_order
 from hapticlink.orchestrator.plan.operations import Event, Operation
 from hapticlink.orchestrator.plan.schemes import gauss_seidel
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
@@ -24,3 +24,8 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
         operations += building_blocks.step(system, event, unit)
         operations += building_blocks.publish(system, unit, building_blocks.dticks(event, unit))
     return tuple(operations)
+
+
+def ordered(system: System) -> list[list[Fmu]]:
+    """The sampled blocks, and the plants."""
+    return [*gauss_seidel.ordered(system), [u for u in system.fmus if not u.sampled]]

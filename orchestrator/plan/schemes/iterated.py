@@ -52,6 +52,14 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     return tuple(operations)
 
 
+def ordered(system: System) -> list[list[Fmu]]:
+    """The sampled blocks, and the plants of each rate."""
+    plants = [u for u in system.fmus if not u.sampled]
+    clocks = dict.fromkeys(u.clock for u in plants)
+    of_a_rate = ([u for u in plants if u.clock == clock] for clock in clocks)
+    return [*gauss_seidel.ordered(system), *of_a_rate]
+
+
 def groups(system: System, event: Event) -> list[list[Fmu]]:
     """The plants that start a step, in order; those of a loop together."""
     starting = building_blocks.starting(event, building_blocks.firing(system, event)[1])

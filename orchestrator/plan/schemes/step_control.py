@@ -9,8 +9,16 @@ from dataclasses import replace
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
 from hapticlink.orchestrator.plan import building_blocks, rollback
-from hapticlink.orchestrator.plan.operations import Advance, Event, Firing, Operation, Part, Record
-from hapticlink.orchestrator.plan.schemes import CAUSAL
+from hapticlink.orchestrator.plan.operations import (
+    Advance,
+    Event,
+    Firing,
+    Get,
+    Operation,
+    Part,
+    Record,
+    flat,
+)
 from hapticlink.orchestrator.system.ports import carries_power
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -32,6 +40,7 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
     clocks = [f.clock for f in event.firings if between.get(f.clock) and not f.final]
     operations = [*scheme(system, building_blocks.without_steps(event, clocks))]
     for clock in clocks:
+        dticks = next(f.dticks for f in event.firings if f.clock == clock)
         plants = [u for u in system.fmus if u.clock == clock and not u.sampled]
         fixed = [u.name for u in plants if not varies_step(u.description)]
         if fixed:
@@ -43,8 +52,7 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
             what = "[step_control] method = 'doubling'"
             rollback.require(system, [u.name for u in plants], what)
         else:
-            _require_energy(system, clock, between[clock])
-        dticks = next(f.dticks for f in event.firings if f.clock == clock)
+            _require_energy(system, between[clock], Part(clock, dticks), scheme)
         operations.append(Advance(clock, dticks))
     return tuple(operations)
 
@@ -55,13 +63,13 @@ def _between(system: System, clock: str) -> list[Connection]:
     return [c for name in plants for c in system.into(name) if c.source in plants]
 
 
-def _require_energy(system: System, clock: str, between: list[Connection]) -> None:
+def _require_energy(system: System, between: list[Connection], kind: Part, scheme: Scheme) -> None:
     """Raises InputFault where there is no energy to look at, or nothing to measure it against."""
     assert system.step_control is not None
     if not any(carries_power(c, system.power) for c in between):
         raise InputFault(
             "[step_control] method = 'ecco' looks at the energy between plants, and no connection "
-            f"between plants of {clock} carries power: name efforts and displacements in "
+            f"between plants of {kind.clock} carries power: name efforts and displacements in "
             "[[power]], or take method = 'doubling'"
         )
     if system.step_control.energy is None:
@@ -69,7 +77,7 @@ def _require_energy(system: System, clock: str, between: list[Connection]) -> No
             "[step_control] method = 'ecco' measures against the energy that matters in the "
             "scene: give energy (J)"
         )
-    if system.coupling not in CAUSAL:
+    if any(isinstance(op, Get) and op.ahead for op in flat(part(system, kind, scheme))):
         raise InputFault(
             "[step_control] method = 'ecco' estimates what extrapolation errs, and coupling = "
             f"{system.coupling!r} interpolates: take 'jacobi', 'gauss-seidel', or 'doubling'"

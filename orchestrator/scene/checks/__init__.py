@@ -25,7 +25,7 @@ def check(scene: Scene) -> list[Problem]:
     found = [
         *_condition(scene),
         *rates.check(scene),
-        *coupling.holds(scene),
+        *coupling.delays(scene),
         *blocks.missing(scene),
     ]
     found += fmus.check(scene)

@@ -8,15 +8,15 @@ from collections.abc import Iterator
 from pathlib import Path as FilePath
 
 from hapticlink.orchestrator.base.faults import unknown
-from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.blocks import loop_blocks
+from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
 def check(scene: Scene) -> Iterator[Problem]:
     """Every fault found, in the order of the file."""
-    taken = [b.name for b in blocks(scene)]
+    taken = [b.name for b in loop_blocks(scene)]
     for i, fmu in enumerate(scene.fmu):
         path: Path = ("fmu", i)
         if not re.fullmatch(r"\w+", fmu.name):
@@ -24,8 +24,7 @@ def check(scene: Scene) -> Iterator[Problem]:
         elif fmu.name in taken:
             yield (*path, "name"), f"{fmu.name!r} is taken: give every FMU and block its own name"
         taken.append(fmu.name)
-        if not FilePath(fmu.path).is_file():
-            yield (*path, "path"), f"there is no file {fmu.path}"
+        yield from _source(path, fmu)
     for i, wire in enumerate(scene.connection):
         for key, end in (("from", wire.from_), ("to", wire.to)):
             fmu_name, dot, variable = end.partition(".")
@@ -33,7 +32,16 @@ def check(scene: Scene) -> Iterator[Problem]:
                 yield ("connection", i, key), f"{end!r}: write fmu.variable"
             elif fmu_name not in taken:
                 yield ("connection", i, key), unknown("FMU", fmu_name, taken)
-        if wire.hold is not None and wire.hold not in HOLDS:
-            yield ("connection", i, "hold"), unknown("hold", wire.hold, HOLDS)
         if wire.factor == 0:
             yield ("connection", i, "factor"), "0.0 passes nothing on: take the connection out"
+
+
+def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
+    """A file, or a block that is built."""
+    if fmu.path is None and fmu.block is None:
+        yield (*path, "block"), "is missing, and so is path: give a block to build or an FMU's file"
+    if fmu.path is not None and not FilePath(fmu.path).is_file():
+        yield (*path, "path"), f"there is no file {fmu.path}"
+    for key in ("block", "settings"):
+        if fmu.path is not None and getattr(fmu, key):
+            yield (*path, key), "is not for an FMU that is a file: take it out, or take path out"

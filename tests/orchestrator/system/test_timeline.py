@@ -21,7 +21,6 @@ from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import uses
-from hapticlink.orchestrator.plan.schemes import CAUSAL
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
@@ -30,7 +29,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks, timeline
 from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
-from tests.orchestrator.timelines import LOOP, scene_of, scenes
+from tests.orchestrator.timelines import CAUSAL, LOOP, scene_of, scenes
 
 Make = Callable[[Timeline, str], System]
 
@@ -71,7 +70,7 @@ def test_fmus_share_a_clock_where_they_step_together(scene: Scene) -> None:
     assert all(re.fullmatch(r"[\w.+-]+", clock.name) for clock in time.clocks)
 
 
-@pytest.mark.parametrize("coupling", sorted(CAUSAL))
+@pytest.mark.parametrize("coupling", CAUSAL)
 def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(
     stamped: Make, tmp_path: Path, coupling: str
 ) -> None:

@@ -1,0 +1,35 @@
+"""What a force is that a scene names in [[linkage.force]]."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from hapticlink.components.component import Variable
+
+if TYPE_CHECKING:
+    from hapticlink.components.linkage.model import LinkageModel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Force(ABC):
+    """One entry of [[linkage.force]]: its fields are the keys of that table, its methods the
+    equations. `type` is its name in `FORCES`; `name` comes first in those of its parameters."""
+
+    type: str
+    name: str
+
+    def parameters(self) -> list[Variable]:
+        """Those that the FMU has for it, such as `<name>.stiffness`; none by default."""
+        return []
+
+    @abstractmethod
+    def efforts(self, model: LinkageModel) -> ca.SX:
+        """Generalised forces, n x 1, in q, qd, t and the parameters `model.p`."""
+
+    def energy(self, model: LinkageModel) -> ca.SX:
+        """Potential energy (J), 0 by default: a force that stores none."""
+        return ca.SX(0)

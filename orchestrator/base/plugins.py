@@ -1,0 +1,79 @@
+"""Modules that register parts of a user's own: integrators, forces, blocks, holds, schemes, ...
+
+A module is named by `--plugin`, or by an installed distribution under [project.entry-points]
+"hapticlink.plugins"; importing it registers its parts.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+from hapticlink.components import registry
+from hapticlink.orchestrator.base.faults import InputFault
+
+GROUP = "hapticlink.plugins"
+PACKAGE = str(Path(registry.__file__).parent.parent)
+"""A fault of a module is told at a line of its own."""
+
+
+def load(modules: Iterable[str]) -> None:
+    """Import modules, installed ones or files of the current folder. Raises InputFault for one that
+    is not there, fails, or registers nothing."""
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())  # last, so that no file here hides an installed module
+    for module in modules:
+        _load(module, f"--plugin {module}")
+
+
+@cache
+def load_installed() -> None:
+    """Import the modules that installed distributions name. Raises InputFault as `load`."""
+    from importlib.metadata import entry_points  # slow to load
+
+    for point in entry_points(group=GROUP):
+        _load(point.module, f"plugin {point.name} of {point.dist.name if point.dist else GROUP}")
+
+
+def loaded() -> dict[str, dict[str, str | None]]:
+    """By module that has registered a part: its version, None where it has none, and the sha256 of
+    its sources."""
+    from hapticlink.fmus.cache import source  # which takes all of `fmus` with it
+
+    return {
+        name: {"version": _version(name), "sha256": source(name)} for name in registry.origins()
+    }
+
+
+def _load(module: str, what: str) -> None:
+    try:
+        importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if not f"{module}.".startswith(f"{error.name}."):
+            raise InputFault(f"{what}: it imports {error.name!r}, which is not there") from error
+        hint = "give its name, without .py" if module.endswith(".py") else "is it installed?"
+        raise InputFault(f"{what}: no such module, nor a file in {os.getcwd()}; {hint}") from error
+    except Exception as error:  # whatever a user's module can do
+        frames = traceback.extract_tb(error.__traceback__)
+        at = [f for f in frames if not f.filename.startswith((PACKAGE, "<"))][-1]
+        place = f"{at.filename}, line {at.lineno}"
+        raise InputFault(f"{what}: {place}: {type(error).__name__}: {error}") from error
+    package = module.partition(".")[0]
+    if package not in {name.partition(".")[0] for name in registry.origins()}:
+        file = getattr(sys.modules[module], "__file__", None)
+        raise InputFault(f"{what}: {file} registers no part (docs/extending.md)")
+
+
+def _version(module: str) -> str | None:
+    from importlib.metadata import PackageNotFoundError, version
+
+    package = module.partition(".")[0]
+    try:
+        return str(getattr(sys.modules[package], "__version__", None) or version(package))
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,58 @@
+"""Tables whose keys a part of a registry says: `settings` of an [[fmu]] with a block, and the
+entries of [[linkage.force]]."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import field, make_dataclass
+from functools import cache
+from typing import Any
+
+from hapticlink.components.blocks import BLOCKS
+from hapticlink.orchestrator.scene.toml_keys import Path, value
+
+
+def tables(data: Any) -> Iterator[tuple[Path, Any]]:
+    """Every such table of a scene's `data`; settings that a block does without are made empty."""
+    for i, fmu in enumerate(_list(data, "fmu")):
+        if isinstance(fmu, dict) and "block" in fmu:
+            yield ("fmu", i, "settings"), fmu.setdefault("settings", {})
+    for i, force in enumerate(_list(data, "linkage", "force")):
+        yield ("linkage", "force", i), force
+
+
+def _list(data: Any, *path: str) -> list[Any]:
+    found = value(data, path)
+    return found if isinstance(found, list) else []
+
+
+def record_of(path: Path, data: Any) -> Any:
+    """The record of the table at `path` of a scene's `data`; None where no part has its name, and
+    for any other table."""
+    match path:
+        case ("fmu", int(), "settings"):
+            name = value(data, (*path[:2], "block"))
+            return _arguments(BLOCKS[name]) if name in tuple(BLOCKS) else None
+        case ("linkage", "force", int()) if (name := value(data, (*path, "type"))) is not None:
+            from hapticlink.components.forces import FORCES  # and with it all equations
+
+            return FORCES[name] if name in tuple(FORCES) else None
+    return None
+
+
+@cache
+def _arguments(block: Callable[..., Any]) -> Any:
+    """A record of the arguments of a block after the first, the communication step."""
+    _, *arguments = inspect.signature(block).parameters.values()
+    return make_dataclass(
+        "Settings",
+        [(a.name, a.annotation, field(**_default(a))) for a in arguments],
+        namespace={"__module__": block.__module__},  # where annotations as text are resolved
+        kw_only=True,
+    )
+
+
+def _default(argument: inspect.Parameter) -> dict[str, Any]:
+    given = argument.default
+    return {} if given is argument.empty else {"default_factory": lambda: given}

@@ -1,0 +1,75 @@
+"""Reads the tables whose keys a part of a registry says, by the rules of the scene's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, make_dataclass, replace
+from functools import cache
+from typing import Any
+
+import pydantic
+from pydantic_core import to_json
+
+from hapticlink.orchestrator.scene.part_tables import record_of, tables
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+from hapticlink.orchestrator.scene.validation_errors import problems
+
+
+def read(data: Any) -> tuple[dict[Path, Any], list[Problem]]:
+    """The records of such tables of a scene's `data`, by path, and what is wrong with them."""
+    found: dict[Path, Any] = {}
+    errors: list[Any] = []
+    names: set[Any] = set()
+    wrong: list[Problem] = []
+    for path, table in tables(data):
+        if path[0] == "linkage":
+            wrong += _of_a_force(path, table, names)
+        record = record_of(path, data)
+        if record is None:
+            continue
+        try:
+            text = to_json({"table": table}, inf_nan_mode="constants")
+            found[path] = _reader(record).validate_json(text).table
+        except pydantic.ValidationError as error:
+            each = error.errors(include_url=False)
+            errors += [{**e, "loc": (*path, *e["loc"][1:])} for e in each]
+    return found, wrong + problems(errors, data)
+
+
+def _of_a_force(path: Path, table: Any, names: set[Any]) -> Iterator[Problem]:
+    """What is wrong with the names in an entry of [[linkage.force]]."""
+    from hapticlink.components.forces import FORCES
+
+    if not isinstance(table, dict):
+        yield path, f"{table!r}: write a table, [[linkage.force]]"
+        return
+    if "type" not in table:
+        yield (*path, "type"), "is missing: which force is it?"
+    elif table["type"] not in tuple(FORCES):
+        yield (*path, "type"), FORCES.unknown(str(table["type"]))
+    if (name := table.get("name")) in tuple(names):
+        yield (*path, "name"), f"{name!r} is taken: name each force once"
+    names.add(str(name))
+
+
+@cache
+def _reader(record: Any) -> pydantic.TypeAdapter[Any]:
+    """Reads a record by the rules of a scene: no unknown keys, no text for a number."""
+    rules = {"__pydantic_config__": Scene.__pydantic_config__}
+    return pydantic.TypeAdapter(make_dataclass("Holder", [("table", record)], namespace=rules))
+
+
+def put(scene: Scene, found: Mapping[Path, Any]) -> Scene:
+    """The scene with the records that `read` has found in place of its tables."""
+
+    def settings(i: int) -> dict[str, Any]:
+        record = found["fmu", i, "settings"]
+        return {f.name: getattr(record, f.name) for f in fields(record)}
+
+    fmus = (replace(f, settings=settings(i)) if f.block else f for i, f in enumerate(scene.fmu))
+    scene = replace(scene, fmu=tuple(fmus))
+    if scene.linkage and scene.linkage.force:
+        forces = (found["linkage", "force", i] for i in range(len(scene.linkage.force)))
+        scene = replace(scene, linkage=replace(scene.linkage, force=tuple(forces)))
+    return scene
