@@ -58,6 +58,8 @@ class Names(Generic[Part]):
     fits: Callable[[Part], bool]
 
     def __iter__(self) -> Iterator[str]:
+        if not self.registry:
+            raise RuntimeError(f"no {self.registry.kind} is registered yet: import its room first")
         return (name for name, part in self.registry.items() if self.fits(part))
 
     def checked(self, name: str) -> str:

@@ -54,7 +54,7 @@ def _path(error: Any, data: Any) -> Path | None:
         elif error["type"] == "missing" and i == len(error["loc"]) - 1:
             path = (*path, part)
         else:
-            kinds = schema.at(path)
+            kinds = schema.at(path, data)
             names = {k.__name__ for k in schema.chosen(kinds, node)}
             if part in {k.__name__ for k in kinds} - names:
                 return None

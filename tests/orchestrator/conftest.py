@@ -12,6 +12,7 @@ from pythonfmu.builder import FmuBuilder
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
+from hapticlink.orchestrator import open_scene as open_scene  # by whose import schemes have names
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.fmi.description import describe
