@@ -21,8 +21,8 @@ from typing import Any
 
 import hapticlink.components
 import hapticlink.fmus
-from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.components import registry
+from hapticlink.fmus.atomic_file import atomic_file
 
 LONGEST = 3600.0
 """Seconds that no build takes."""

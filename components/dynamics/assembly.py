@@ -34,8 +34,8 @@ class AssemblyError(ValueError):
 
 
 def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
-    """(q, qd) that satisfy h = 0 and W qd = 0, as expressions: q closest to the model's own; qd with
-    the rates that `start_velocity` gives, or closest to them where they cannot be together."""
+    """(q, qd) that satisfy h = 0 and W qd = 0, as expressions: q closest to the model's own; qd
+    with the rates that `start_velocity` gives, or closest where they cannot be together."""
     q, qd = model.q, model.qd
     if not model.linkage.loop:
         return q, qd

@@ -43,8 +43,6 @@ class Finding:
         return ": ".join(part for part in (place, self.key, self.message) if part)
 
 
-
-
 class SceneFault(InputFault):
     """A scene that is refused, with all its findings."""
 

@@ -35,8 +35,8 @@ def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row
     assert each.scene is not None
     try:
         plugins.load(each.plugins)
-    except Fault as fault:
-        return failed(DIED, str(fault))
+    except Fault as missing:
+        return failed(DIED, str(missing))
     if job.key(each.scene) != each.key:
         return failed(DIED, "this worker has another version of hapticlink or of what it uses")
     with tempfile.TemporaryDirectory(dir=room) if room else temporary_folders.room() as folder:
