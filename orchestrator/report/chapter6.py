@@ -155,7 +155,7 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
         f"sample late. Then B_pc,theta is stable below about 1/(2 T lambda_max(Lambda^-1)), and "
         f"the printed 0.375 is not with Table 6.1: the drift torque jumps by up to "
         f"{swing[1]:.2g} N.m a tick ({swing[0]:.1e} under Gauss-Seidel, {swing[2]:.1e} with "
-        f"0.2). Only the motors' torque limit of 0.5 N.m bounds it: with 500 N.m the run leaves "
-        f"the workspace at {unlimited['time']:.2f} s",
+        f"0.2). Only the motors' torque limit of 0.5 N.m bounds it: with 500 N.m the run "
+        f"diverges at {unlimited['time']:.2f} s",
         command("closed-loop", jacobi),
     )

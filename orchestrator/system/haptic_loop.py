@@ -16,8 +16,9 @@ from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 
 Row = tuple[str, str]
-MECHANISM, WORKSPACE = "virtual_mechanism", ("haptic_device", "workspace_margin")
-"""The block whose `energy` is judged; the output that is negative out of the device's workspace."""
+MECHANISM, CONTROLLER = "virtual_mechanism", "controller"
+WORKSPACE = ("haptic_device", "workspace_margin")
+"""The output that is negative where the device is out of its workspace."""
 
 _LOOP: tuple[Row, ...] = (
     ("virtual_mechanism.x", "haptic_device.x_start"),

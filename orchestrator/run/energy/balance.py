@@ -3,8 +3,8 @@
 The mechanism: E(t) - E(0) <= W, the work of the wrenches that it got (as held). What the method of
 integration errs stays far below what is there to err about; beyond that size it makes energy up.
 
-The loop: sum of made <= sum of what ideal sources put in. Sampling and holding that make more than
-was ever put in have made the loop unstable.
+The loop: sum of made <= sum of what hands put in, as ideal sources. Sampling and holding that make
+more than was ever put in have made the loop unstable.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from hapticlink.orchestrator.base.faults import Diverged
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.haptic_loop import MECHANISM
+from hapticlink.orchestrator.system.haptic_loop import CONTROLLER, MECHANISM
 from hapticlink.orchestrator.system.system import System
 
 LEAST = 1e-6
@@ -53,7 +53,8 @@ class Balance:
 def unstable(booked: Mapping[str, Energy]) -> str:
     """That sampling and holding have made more energy than was put in; "" where they have not."""
     made = sum(e.made for e in booked.values())
-    put_in = sum(max(e.ideal, 0.0) for e in booked.values())
+    sources = (e for name, e in booked.items() if not name.startswith(f"{CONTROLLER}."))
+    put_in = sum(max(e.ideal, 0.0) for e in sources)
     if made <= put_in + LEAST:
         return ""
     return f"sampling and holding made {made:.3g} J, where {put_in:.3g} J were put in"
