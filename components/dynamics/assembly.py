@@ -23,7 +23,7 @@ from hapticlink.components.linkage.parameters import COORDINATES, coordinates, l
 from hapticlink.components.specs.linkage import Linkage
 
 STEPS = 12
-RATE_STEPS = 4  # each leaves a share of about MU
+RATE_STEPS = 3  # each leaves a share of about MU
 MU = 1e-9  # as in closed_loop_solver.py
 TOLERANCE = 1e-9  # of the start pose's gap, m, and of a given rate, as a share of the largest
 
@@ -34,8 +34,8 @@ class AssemblyError(ValueError):
 
 
 def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
-    """(q, qd) that satisfy h = 0 and W qd = 0, as expressions: q closest to the model's own; qd
-    with the rates that `start_velocity` gives, or closest where they cannot be together."""
+    """(q, qd) that satisfy h = 0 and W qd = 0, as expressions: q closest to the model's own, qd
+    with the rates that `start_velocity` gives, or closest to these where they do not agree."""
     q, qd = model.q, model.qd
     if not model.linkage.loop:
         return q, qd
@@ -55,12 +55,14 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
 
     for _ in range(STEPS):
         q = newton(q, parameters)
+    solvers = [least]
     if model.linkage.start_velocity:
-        Z = ca.diag(ca.SX(~_given(model.linkage)))
-        others = projected(ClosedLoopSolver(UnitInertia(n), ca.sparsify(at.W @ Z), MU))
+        Z = ca.diag(ca.SX(1.0 - _given(model.linkage)))
+        solvers = [ClosedLoopSolver(UnitInertia(n), ca.sparsify(at.W @ Z), MU), least]
+    for project in map(projected, solvers):
         for _ in range(RATE_STEPS):
-            qd = others(q, qd, parameters)
-    return q, projected(least)(q, qd, parameters)
+            qd = project(q, qd, parameters)
+    return q, qd
 
 
 def _given(linkage: Linkage) -> NDArray[np.bool_]:

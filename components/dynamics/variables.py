@@ -40,7 +40,7 @@ def start_parameters(linkage: Linkage) -> list[Variable]:
     n = (len(units),)
     return [
         Variable("q_start", n, units, q, "joint coordinates before assembly", "fixed"),
-        Variable("qd_start", n, rates, qd, "joint rates before projection", "fixed"),
+        Variable("qd_start", n, rates, qd, "joint rates, those of the scene kept", "fixed"),
     ]
 
 

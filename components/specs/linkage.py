@@ -204,7 +204,8 @@ class Linkage:
     """Joint coordinates at t = 0 by the joint's name, 0 where left out; three for a free joint.
     Assembly moves them onto the loop closures."""
     start_velocity: Mapping[str, Velocity | Twist] = field(default_factory=dict)
-    """Joint velocities at t = 0 by the joint's name, 0 where left out; three for a free joint."""
+    """Joint velocities at t = 0 by the joint's name; three for a free joint. They are kept; those
+    left out are the least that the loops allow."""
 
 
 @dataclass(frozen=True, kw_only=True)

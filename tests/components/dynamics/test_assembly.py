@@ -24,7 +24,7 @@ def moving(name: str, **rates: float) -> tuple[Linkage, Running]:
 
 
 def test_a_given_crank_moves_a_four_bar_as_its_velocity_loop_says() -> None:
-    """i w_a a + i w_b b = i w_c c, links as complex numbers; joint rates are differences."""
+    """w_a a + w_b b = w_c c with the links as complex numbers; joint rates are differences."""
     _, block = moving("four-bar", crank=2.0)
     crank, wrist, rocker = block.y["q"]
     a, b, c = (
