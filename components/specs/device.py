@@ -13,7 +13,6 @@ from hapticlink.components.specs.quantities import (
     MomentOfInertia,
     Position,
     Quantity,
-    Substeps,
 )
 
 
@@ -81,8 +80,8 @@ class Device:
     """Stiffness of the stops."""
     stop_damping: LinearDamping = 20.0
     """Damping of the stops."""
-    substeps: Substeps = 1
-    """Integration steps within a communication step."""
+    substeps: Annotated[int, Quantity("1", ge=1, le=100)] = 1
+    """Integration steps within a communication step; the FMU's equations grow with them."""
     sensing: Literal["ideal", "encoders"] = "ideal"
     """Not to be written here: the scene's own `sensing` sets it."""
     observer: Observer = field(default_factory=Observer)

@@ -97,7 +97,8 @@ class Scene:
     hold: HoldName = "zoh"
     """Hold on connections from a slow rate to a fast one: [holds](holds.md)."""
     downsampling: Annotated[str, HOLDS.names(lambda hold: hold.downsamples)] = "latest"
-    """From a fast rate to a slow one: the latest sample, or the mean over the slow step."""
+    """Hold on connections from a fast rate to a slow one: the latest sample, or the mean over the
+    slow step."""
     holds: Mapping[str, HoldName] = field(default_factory=dict)
     """Another hold for a connection, by source, target or "source -> target"."""
     delays: Mapping[str, Elapsed | Latency] = field(default_factory=dict)
@@ -116,7 +117,7 @@ class Scene:
     """Plants whose feed-through may be read after new inputs are set, which FMI forbids between two
     steps."""
     coupling: Annotated[str, SCHEMES.names()] = "gauss-seidel"
-    """Order of calls: [coupling](coupling.md)."""
+    """Order of calls: jacobi is get all, set all, step all; [coupling](coupling.md)."""
     iteration: Iteration = field(default_factory=Iteration)
     """Of coupling = "iterated"."""
     step_control: StepControl | None = None
@@ -127,7 +128,9 @@ class Scene:
     mechanism_at: Literal["haptics", "graphics"] = "haptics"
     """Rate of the virtual mechanism."""
     directions_from: Literal["graphics", "mechanism"] = "graphics"
-    """Who computes Lambda^-1 and P_c: the graphics copy, or the mechanism itself."""
+    """Who computes Lambda^-1, the mobility at the operational point, and P_c, the projector on the
+    resisted directions ([theory](theory.md#what-the-hand-feels)): the graphics copy, or the
+    mechanism itself."""
     local_model: bool = False
     """Holds the mechanism's D, W, w and J_h of (B.15) from the graphics rate:
     [local model](local-model.md)."""
@@ -145,7 +148,7 @@ class Scene:
     mechanism: Mechanism = field(default_factory=Mechanism)
     """Time integration of the mechanism."""
     directions: Directions = field(default_factory=Directions)
-    """The test for resisted directions."""
+    """The test for resisted directions, those in which the closures let nothing move."""
     device: Device | None = None
     """The twin pantograph, the block `haptic_device`: [device](device.md)."""
     controller: Controller | None = None
