@@ -65,7 +65,7 @@ class _Definitions:
             found = self._any_of(hint, entry)
             if isinstance(default, str | bool | int | float | tuple) and default != ():
                 found["default"] = default
-            if key in NAMED or (record, key) == (ForeignFmu, "start"):
+            if key in NAMED or (record is ForeignFmu and key in ("start", "derivatives")):
                 # A name with dots may be written as tables in tables.
                 values = {"anyOf": [found["additionalProperties"], {"type": "object"}]}
                 found["additionalProperties"] = values
