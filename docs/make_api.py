@@ -45,7 +45,7 @@ def page() -> str:
         elif name not in functions and name not in raised:
             lines += [f"### {name}", _doc(thing), *_members(thing)]
     lines.append("## Exceptions")
-    lines += [f"- `{n}({t.__base__.__name__})`: {_doc(t)}" for n, t in raised.items()]
+    lines += [_item(f"{n}({t.__base__.__name__})", t) for n, t in raised.items()]
     return "\n\n".join(lines) + "\n"
 
 
@@ -54,13 +54,17 @@ def _members(thing: type) -> Iterator[str]:
     found = {n: m for base in reversed(thing.__mro__) for n, m in vars(base).items()}
     for name, member in found.items():
         if isinstance(member, property) and member.__doc__:
-            yield f"- `.{name}`: {_doc(member)}"
+            yield _item(f".{name}", member)
         elif not inspect.isfunction(member) or not member.__module__.startswith("hapticlink"):
             continue
         elif member.__doc__ and name == "__getitem__":
-            yield f"- `[name]`: {_doc(member)}"
+            yield _item("[name]", member)
         elif member.__doc__ and not name.startswith("_"):
-            yield f"- `.{name}{_signature(member)}`: {_doc(member)}"
+            yield _item(f".{name}{_signature(member)}", member)
+
+
+def _item(name: str, thing: object) -> str:
+    return f"- `{name}`: {_doc(thing)}".replace("\n", "\n  ").replace("\n  \n", "\n\n")
 
 
 def _doc(thing: object) -> str:
