@@ -1,5 +1,8 @@
 """A CasADi function as straight-line Python text that needs nothing but `math`.
 
+An importer's Python need not have casadi (277 MB), or has one that cannot read this one's files: a
+Python FMU runs there all the same, only slower.
+
 Each instruction of CasADi's virtual machine becomes one assignment, in its order, so both
 ways of evaluating do the same operations on the same numbers. A generated function reads
 its arguments and writes its results in place:

@@ -1,7 +1,13 @@
 """What holds for every test."""
 
+import os
+
 from hypothesis import settings
 
 # The same draws every time: a test that fails here fails everywhere.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
+
+# Matrices here have at most some dozen rows: threads of BLAS would only wait for each other, in
+# this process and in those that tests start. Read when NumPy is imported, which comes after.
+os.environ.setdefault("OMP_NUM_THREADS", "1")

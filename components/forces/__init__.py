@@ -26,10 +26,18 @@ KINDS = (gravity, springs, joints, drives)
 FORCES: Registry[type[Force]] = Registry("force", {})
 
 
+def named(linkage: Linkage) -> tuple[Force, ...]:
+    """Those of [[linkage.force]]. Raises ValueError for what is no record of `FORCES`."""
+    for force in linkage.force:
+        if not isinstance(force, Force):
+            raise ValueError(f"`linkage.force`: {force!r} is no record of a force")
+    return linkage.force
+
+
 def parameters(linkage: Linkage) -> list[Variable]:
     """Those of the forces alone."""
     own = [v for kind in KINDS for v in kind.parameters(linkage)]
-    return own + [v for force in linkage.force for v in force.parameters()]
+    return own + [v for force in named(linkage) for v in force.parameters()]
 
 
 def efforts(model: LinkageModel) -> ca.SX:
@@ -38,7 +46,7 @@ def efforts(model: LinkageModel) -> ca.SX:
     linkage has not."""
     found = [Q for kind in KINDS if (Q := kind.efforts(model)) is not None]
     n = model.q.numel()
-    for force in model.linkage.force:
+    for force in named(model.linkage):
         try:
             Q = ca.SX(force.efforts(model))
         except KeyError as error:  # of frames, joints or parameters
@@ -52,4 +60,4 @@ def efforts(model: LinkageModel) -> ca.SX:
 def energy(model: LinkageModel) -> ca.SX:
     """Sum of all potential energies, J."""
     found = [V for kind in KINDS if (V := kind.energy(model)) is not None]
-    return sum([*found, *(f.energy(model) for f in model.linkage.force)], start=ca.SX(0))
+    return sum([*found, *(f.energy(model) for f in named(model.linkage))], start=ca.SX(0))

@@ -6,6 +6,9 @@ Each loop's dyad in closed form (dyads.py) gives q(z). With G = dq/dz, by substi
 
 and W' lambda drops out, since W G = 0. The branch is that of the pose before the step; z from
 which no pose closes gives NaN.
+
+No shipped scene asks for it: it is the family of section B.2 that was found too slow for haptics,
+and `hapticlink bench mechanism` sets it beside the other two.
 """
 
 from __future__ import annotations

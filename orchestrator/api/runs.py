@@ -48,8 +48,8 @@ def run(
             made = Run(None, found.run, found.tables)
         else:
             made = _in_folder(scene, Path(out), options, progress)
-    if made.run["end"]["reason"] == "interrupted":
-        raise RunInterrupted(made)
+        if interrupt.came() or made.run["end"]["reason"] == "interrupted":
+            raise RunInterrupted(made)
     return made
 
 

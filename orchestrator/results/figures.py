@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import DEVICE, MECHANISM, table_of, tracking
 
@@ -48,8 +49,9 @@ def figures(results: Results) -> dict[str, Figure]:
 
 
 def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
-    """Write each as a PNG, and give the file names."""
+    """Write each as a PNG, and give the file names. Raises Interrupted."""
     for name, figure in figures.items():
+        interrupt.check()
         figure.savefig(folder / f"{name}.png", dpi=150)
     return [f"{name}.png" for name in figures]
 

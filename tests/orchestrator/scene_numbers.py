@@ -81,7 +81,7 @@ def tables(name: str) -> dict[str, Any]:
 
 @cache
 def of_scene(name: str) -> list[Number]:
-    return list(numbers(Scene, open_scene.load(name), ()))
+    return list(numbers(Scene, open_scene.load(name).plain(), ()))
 
 
 def beyond(number: Number) -> st.SearchStrategy[Any]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import hapticlink as hl
 from hapticlink.orchestrator.results import figures
@@ -176,13 +177,19 @@ def test_ctrl_c_raises_with_the_results_so_far(out: str | None, tmp_path: Path) 
     assert (found.folder is None) == (out is None)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_ctrl_c_while_figures_are_drawn_says_so(
     bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
+    made = figures.figures
 
-    monkeypatch.setattr(figures, "save", interrupted)
+    def interrupted(found: hl.Run) -> dict[str, Figure]:
+        os.kill(os.getpid(), signal.SIGINT)
+        return made(found)
+
+    monkeypatch.setattr(figures, "figures", interrupted)
     assert status("run", bar, "--out", tmp_path) == 1
     assert "has the results of the run, not all of its figures" in capsys.readouterr().err
     assert hl.load(tmp_path).run["end"]["reason"] == "duration"
+    with pytest.raises(hl.Fault, match="not all of its figures"):
+        hl.run(bar, out=tmp_path)

@@ -67,8 +67,8 @@ def test_what_wrenches_and_drives_put_in_is_no_divergence(tmp_path: Path) -> Non
 
 
 def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path: Path) -> None:
-    """The report's gains are those of a mechanism at 512 Hz, not at 10; a hand that pushes the handle
-    out does so in good order."""
+    """The report's gains are those of a mechanism at 512 Hz, not at 10; a hand that pushes the
+    handle out does so in good order."""
     options = [
         "hold=foh-derivative", "graphics.rate=10",
         "controller.teleoperation.stiffness=[100.0, 100.0, 0.5]",

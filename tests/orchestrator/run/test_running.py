@@ -1,11 +1,8 @@
 """What a run leaves in its folder, what it tells of itself, and how it takes a signal."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -124,59 +121,3 @@ def test_a_reader_that_has_enough_is_no_fault() -> None:
         told.stdout.close()
         assert told.stderr.read() == b""
     assert told.returncode == 0
-
-
-def workers(pid: int) -> list[bytes]:
-    """Command lines of the worker processes that a process has."""
-    found = []
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            found.append(Path(f"/proc/{child}/cmdline").read_bytes())
-    return [line for line in found if b"orchestrator.fmi.worker" in line]
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="finds the processes of a process in /proc")
-def test_ctrl_c_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path: Path) -> None:
-    """As in a terminal, the signal goes to the whole group, and the worker is at its imports."""
-    python_fmu(tmp_path, "Slow", "__import__('time').sleep(0.01)")
-    path = scene(tmp_path, "isolate = true\n" + ONE.format("Slow.fmu"), duration=100)
-    out = tmp_path / "out"
-    with subprocess.Popen(
-        [*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE, start_new_session=True
-    ) as running:
-        until = time.monotonic() + 60
-        while not workers(running.pid) and time.monotonic() < until:
-            time.sleep(0.01)
-        time.sleep(0.1)  # the caller waits for it by now
-        os.killpg(running.pid, signal.SIGINT)
-        _, said = running.communicate(timeout=60)
-    assert running.returncode == 1
-    assert said.startswith(b"hapticlink: interrupted at t = 0")
-    assert said.count(b"\n") == 1
-    assert tables.load(out).run["end"]["reason"] == "interrupted"
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-@pytest.mark.parametrize(
-    ("body", "when"),
-    [
-        ("interrupt()", "before the run"),
-        ("with suppress(KeyboardInterrupt): interrupt()", "at t = 0 s"),
-    ],
-    ids=["told", "swallowed by what was imported"],
-)
-def test_ctrl_c_before_the_run_says_so(bar: Path, tmp_path: Path, body: str, when: str) -> None:
-    code = (
-        "import hapticlink.orchestrator.open_scene as s, os, signal\n"
-        "from contextlib import suppress\n"
-        "interrupt, load = lambda: os.kill(os.getpid(), signal.SIGINT), s.load\n"
-        "def interrupted(*a):\n"
-        f"    {body}\n"
-        "    return load(*a)\n"
-        "s.load = interrupted\n"
-        "from hapticlink.orchestrator.commands import main\n"
-        f"main(['run', {str(bar)!r}, '--out', {str(tmp_path / 'out')!r}])"
-    )
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
-    assert ended.returncode == 1
-    assert ended.stderr.strip() == f"hapticlink: interrupted {when}".encode()

@@ -1,0 +1,129 @@
+"""Results of an earlier run in the same folder go when the first rows of the next one are there."""
+
+import json
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import tables
+from tests.orchestrator.conftest import status
+from tests.orchestrator.foreign_fmus import SLAVE, c_fmu, python_fmu_of, run, scene
+
+ONE = '[[fmu]]\nname = "one"\npath = "faults.fmu"\n'
+
+
+def flipped(folder: Path) -> None:
+    """A byte in the middle of the binary, which no directory of the archive knows."""
+    path = c_fmu(folder)
+    content = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as archive:
+        entry = max(archive.infolist(), key=lambda e: e.file_size)
+    content[entry.header_offset + entry.file_size // 2] ^= 1
+    path.write_bytes(content)
+
+
+def nan_at_the_start(folder: Path) -> None:
+    text = SLAVE.format(name="Never", body="pass")
+    python_fmu_of(folder, text.replace("0.0, 0.0, 1.0", "0.0, float('nan'), 1.0"), "never")
+    (folder / "Never.fmu").replace(folder / "faults.fmu")
+
+
+def elsewhere(folder: Path) -> None:
+    path = c_fmu(folder)
+    with zipfile.ZipFile(path) as archive:
+        entries = {e.filename: archive.read(e) for e in archive.infolist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name.replace("binaries/", "binaries/other-"), content)
+
+
+@pytest.mark.parametrize(
+    ("make", "exit_status", "said"),
+    [
+        (flipped, 2, "has another checksum"),
+        (elsewhere, 2, "no binary for this platform"),
+        (lambda folder: c_fmu(folder, guid="{another}"), 1, "its guid may not be that"),
+        (nan_at_the_start, 1, "output y is nan at t = 0 s"),
+    ],
+    ids=["damaged entry", "other platform", "other guid", "fault before the first row"],
+)
+def test_what_fails_before_its_first_row_takes_nothing(
+    tmp_path: Path,
+    make: Callable[[Path], object],
+    exit_status: int,
+    said: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    c_fmu(tmp_path)
+    path, out = scene(tmp_path, ONE), tmp_path / "out"
+    assert status("run", path, "--out", out) == 0
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    make(tmp_path)
+    assert status("run", path, "--out", out) == exit_status
+    assert said in capsys.readouterr().err
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
+
+
+def test_without_an_earlier_row_the_fault_stands_in_run_json(tmp_path: Path) -> None:
+    nan_at_the_start(tmp_path)
+    for _ in range(2):  # the second finds the first, which has no row
+        experiment, _ = run(tmp_path, ONE)
+        assert experiment.outcome.published
+        found = tables.load(tmp_path / "out")
+        assert found.run["fault"]["message"] == "one: output y is nan at t = 0 s"
+        assert found.haptics["one.y"].tolist() == []
+
+
+def test_results_of_a_run_without_rows_are_not_those_of_another(tmp_path: Path) -> None:
+    c_fmu(tmp_path)
+    run(tmp_path, ONE)
+    nan_at_the_start(tmp_path)
+    experiment, found = run(tmp_path, ONE)
+    assert not experiment.outcome.published
+    assert found.run["end"] == {"reason": "fault", "time": 0.0}
+    assert found.haptics["one.y"].tolist() == []
+    assert tables.load(tmp_path / "out").run["end"]["reason"] == "duration"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+def test_a_disk_without_room_for_a_row_keeps_the_earlier_ones(tmp_path: Path) -> None:
+    """No file may grow beyond 16 kB: the FMU is unpacked, the first row is written, and run.json,
+    which keeps room for its end, does not fit."""
+    c_fmu(tmp_path)
+    path, out = scene(tmp_path, ONE), tmp_path / "out"
+    simulate(str(path), out)
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2**14, 2**14))\n"
+        "from hapticlink.orchestrator.experiment import simulate\n"
+        f"print(simulate({str(path)!r}, {str(out)!r}).outcome.fault)"
+    )
+    command = [sys.executable, "-c", code]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.stdout == f"{out}: File too large\n"
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
+
+
+def test_a_linked_table_is_replaced_not_followed(tmp_path: Path) -> None:
+    c_fmu(tmp_path)
+    out, other = tmp_path / "out", tmp_path / "other"
+    out.mkdir()
+    other.write_text("mine")
+    (out / "haptics.csv").symlink_to(other)
+    run(tmp_path, ONE)
+    assert other.read_text() == "mine"
+    assert not (out / "haptics.csv").is_symlink()
+    assert json.loads((out / "run.json").read_text())["end"]["reason"] == "duration"
+
+
+def test_a_damaged_fmu_is_bad_input(tmp_path: Path) -> None:
+    flipped(tmp_path)
+    with pytest.raises(InputFault, match=r"faults\.fmu: damaged: entry .* has another checksum"):
+        run(tmp_path, ONE)
+    assert not (tmp_path / "out").exists()

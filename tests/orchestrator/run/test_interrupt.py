@@ -1,0 +1,192 @@
+"""Ctrl-C and SIGTERM: held while FMUs load and run; a second one ends at once, whatever hangs."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import Interrupted
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import tables
+from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+
+COMMAND = [sys.executable, "-m", "hapticlink.orchestrator"]
+ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
+ISOLATED = "isolate = true\n"
+
+
+def waited_for(come: Callable[[], object]) -> None:
+    until = time.monotonic() + 60
+    while not come() and time.monotonic() < until:
+        time.sleep(0.01)
+    assert come()
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left_behind(own_temporary_folder: Path) -> Iterator[None]:
+    handlers = [signal.getsignal(s) for s in interrupt.SIGNALS]
+    yield
+    assert not [*Path(tempfile.gettempdir()).glob("hapticlink-*")]
+    assert [signal.getsignal(s) for s in interrupt.SIGNALS] == handlers
+
+
+def test_a_signal_before_the_run_says_so(bar: Path, tmp_path: Path) -> None:
+    """While the scene is read; it is held, so that no import loses it."""
+    code = (
+        "import hapticlink.orchestrator.open_scene as s, os, signal\n"
+        "load = s.load\n"
+        "def interrupted(*a):\n"
+        "    s.load = load\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    return load(*a)\n"
+        "s.load = interrupted\n"
+        "from hapticlink.orchestrator.__main__ import main\n"
+        "import sys\n"
+        f"sys.argv = ['hapticlink', 'run', {str(bar)!r}, '--out', {str(tmp_path / 'out')!r}]\n"
+        "main()"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    assert (ended.returncode, ended.stderr) == (1, b"hapticlink: interrupted before the run\n")
+    assert not (tmp_path / "out").exists()
+
+
+def workers(pid: int) -> list[bytes]:
+    """Command lines of the worker processes that a process has."""
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        for child in (task / "children").read_text().split():
+            found.append(Path(f"/proc/{child}/cmdline").read_bytes())
+    return [line for line in found if b"orchestrator.fmi.worker" in line]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="finds the processes of a process in /proc")
+def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path: Path) -> None:
+    """As in a terminal, the signal goes to the whole group, and the worker is at its imports."""
+    python_fmu(tmp_path, "Slow", "__import__('time').sleep(0.01)")
+    path = scene(tmp_path, ISOLATED + ONE.format("Slow.fmu"), duration=100)
+    with subprocess.Popen(
+        [*COMMAND, "run", path, "--out", tmp_path / "out"],
+        stderr=subprocess.PIPE, start_new_session=True,
+    ) as running:  # fmt: skip
+        waited_for(lambda: workers(running.pid))
+        time.sleep(0.1)  # the caller waits for it by now
+        os.killpg(running.pid, signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+    assert (running.returncode, said.count(b"\n")) == (1, 1)
+    assert said.startswith(b"hapticlink: interrupted ")
+    assert tables.load(tmp_path / "out").run["end"]["reason"] == "interrupted"
+
+
+HANGS = {
+    "isolated": ("while True: pass", ISOLATED),
+    "Python": ("while True: pass", ""),
+    "native": ("", ""),
+}
+
+
+@pytest.mark.parametrize("number", interrupt.SIGNALS)
+@pytest.mark.parametrize("kind", HANGS)
+def test_a_second_signal_ends_an_fmu_that_hangs(
+    tmp_path: Path, kind: str, number: signal.Signals
+) -> None:
+    body, isolate = HANGS[kind]
+    if kind == "native":
+        c_fmu(tmp_path)
+        text = ONE.format("faults.fmu") + "start.mode = 6\n"
+    else:
+        python_fmu(tmp_path, "Hangs", f"if self.steps == 4:\n            {body}")
+        text = ONE.format("Hangs.fmu") + isolate
+    out = tmp_path / "out"
+    path = scene(tmp_path, text + "[faults]\ntimeout = 1000.0\n", duration=100)
+    with subprocess.Popen([*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE) as running:
+        table = out / "haptics.csv"
+        waited_for(lambda: table.exists() and table.read_bytes().count(b"\n") == 5)
+        for _ in range(2):
+            time.sleep(0.2)  # the first is taken, the FMU hangs
+            assert running.poll() is None
+            running.send_signal(number)
+        _, said = running.communicate(timeout=60)
+    assert (running.returncode, said) == (1, b"hapticlink: interrupted twice: ended at once\n")
+    found = tables.load(out)
+    assert found.run["end"] == {"reason": "interrupted", "time": 3 / 64}
+    assert found.run["fault"]["message"] == "interrupted at t = 0.046875 s"
+    assert found.haptics["time"][-1] == 3 / 64
+    assert {p.name for p in out.iterdir()} == {"run.json", "haptics.csv"}
+
+
+def test_python_gets_the_second_signal_when_processes_have_ended(tmp_path: Path) -> None:
+    """What a run in Python makes of Ctrl-C is its own; the FMU that hangs does not keep it."""
+    python_fmu(tmp_path, "Hangs", "if self.steps == 4: __import__('time').sleep(1000)")
+    path = scene(tmp_path, ONE.format("Hangs.fmu") + ISOLATED + "[faults]\ntimeout = 1000.0\n")
+    table = tmp_path / "out" / "haptics.csv"
+
+    def signals() -> None:
+        waited_for(lambda: table.exists() and table.read_bytes().count(b"\n") == 5)
+        for _ in range(2):
+            time.sleep(0.2)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=signals)
+    thread.start()
+    outcome = simulate(str(path), tmp_path / "out").outcome
+    thread.join()
+    assert isinstance(outcome.fault, Interrupted)
+    assert (outcome.reason, outcome.end_time) == ("interrupted", 3 / 64)
+
+
+def test_signals_are_held_once_and_given_back(tmp_path: Path) -> None:
+    done: list[str] = []
+    interrupt.add(lambda: done.append("kept"))
+    gone = lambda: done.append("removed")  # noqa: E731
+    interrupt.add(gone)
+    interrupt.remove(gone)
+    with interrupt.held(), interrupt.held():
+        assert not interrupt.came()
+        signal.raise_signal(signal.SIGTERM)
+        assert interrupt.came()
+        with pytest.raises(Interrupted, match=r"interrupted at t = 0.5 s"):
+            interrupt.check(0.5)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert done == ["kept"]
+    assert not interrupt.came()
+    interrupt._actions.clear()
+
+
+CHILD = """
+        if self.steps == 2:
+            import subprocess
+            with open({pid!r}, "w") as file:
+                print(subprocess.Popen(["sleep", "1000"]).pid, file=file)
+        if self.steps == 4: {then}"""
+
+
+@pytest.mark.parametrize(
+    "then", ["pass", "__import__('os')._exit(3)", "__import__('time').sleep(1000)"]
+)
+def test_processes_that_an_isolated_fmu_has_started_end_with_it(tmp_path: Path, then: str) -> None:
+    file = tmp_path / "pid"
+    python_fmu(tmp_path, "Starts", CHILD.format(pid=str(file), then=then))
+    path = scene(tmp_path, ONE.format("Starts.fmu") + ISOLATED + "[faults]\ntimeout = 2.0\n")
+    outcome = simulate(str(path), tmp_path / "out").outcome
+    assert (outcome.fault is None) == (then == "pass")
+    pid = int(file.read_text())
+    waited_for(lambda: not alive(pid))
+
+
+def alive(pid: int) -> bool:
+    """Not gone, and not a zombie that nobody has waited for."""
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[:1]
+    except OSError:
+        return False
