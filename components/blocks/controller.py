@@ -53,7 +53,7 @@ def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variabl
         Variable(
             "Lambda_inv", (3, 3), MOBILITY, IDENTITY, "inverse inertia of the mechanism"
         ): spec.impedance,
-        Variable("P_c", (3, 3), description="projector on the resisted directions"): bool(law),
+        Variable("P_c", (3, 3), description="projector on the constrained directions"): bool(law),
         Variable(
             "a_bias", (3,), ACCELERATION, description="mechanism's acceleration without wrench"
         ): spec.bias == "full",

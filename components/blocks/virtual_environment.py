@@ -93,7 +93,7 @@ def virtual_environment(
         output |= held_matrices.values(model)
     component = block.component(
         "virtual_environment",
-        "Graphics-rate copy of the linkage, its mobility and resisted directions",
+        "Graphics-rate copy of the linkage, its mobility and constrained directions",
         "continuous",
         initial=initial,
         step=step,

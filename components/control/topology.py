@@ -1,7 +1,7 @@
-"""Topology (joint-constraint) controller: a stiff PD along the resisted directions alone.
+"""Topology (joint-constraint) controller: a stiff PD along the constrained directions alone.
 
 Report, section 4.2.4 and (B.14). With S = diag(1, 1, L) lengths and angles compare; P_c
-projects on null(S Lambda^-1 S), the resisted directions.
+projects on null(S Lambda^-1 S), the constrained directions.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ def constraint_wrench(pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX) ->
     """F_T = S (P_c M_s^-1 P_c)^+ S pull, with M_s = S^-1 M_d S^-1 (N, N, N.m).
 
     pull = k_j e + b_j edot (m/s2, m/s2, rad/s2) is the acceleration that the device gets
-    along the resisted directions: k_j and b_j are per kilogram of the device's inertia
+    along the constrained directions: k_j and b_j are per kilogram of the device's inertia
     constrained to them. The map is symmetric and positive semidefinite, does no work on
     free motion and does not depend on L. For a projector P,
 

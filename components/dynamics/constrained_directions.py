@@ -77,7 +77,7 @@ def count(
     hysteresis: ca.SX,
     least: ca.SX | float = TINY,
 ) -> ca.SX:
-    """Number of resisted directions: below `least`, or with a share of the largest below
+    """Number of constrained directions: below `least`, or with a share of the largest below
     `tolerance`, times `hysteresis` for the `before` smallest, which were resisted before."""
     most, number = largest(eigenvalues), ca.SX(0)
     for i, rank in enumerate(_ranks(eigenvalues)):

@@ -51,7 +51,7 @@ def length_parameter(linkage: Linkage, length: float | None) -> Variable:
 
 
 def direction_parameters(directions: Directions) -> list[Variable]:
-    """Tolerance and hysteresis of the test for resisted directions."""
+    """Tolerance and hysteresis of the test for constrained directions."""
     return [
         Variable("rank_tolerance", (), "1", directions.rank_tolerance, "share that counts as none"),
         Variable("hysteresis", (), "1", directions.hysteresis, "factor to leave a direction free"),
@@ -102,8 +102,8 @@ def mobility_output() -> Variable:
 
 
 def direction_outputs() -> list[Variable]:
-    text = "projector on the resisted directions, scaled"
+    text = "projector on the constrained directions, scaled"
     return [
         Variable("P_c", (3, 3), "1", description=text, kind="projector"),
-        Variable("n_constraints", (), "1", description="number of resisted directions"),
+        Variable("n_constraints", (), "1", description="number of constrained directions"),
     ]

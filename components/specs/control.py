@@ -10,10 +10,10 @@ from hapticlink.components.specs.quantities import Damping, Quantity, Stiffness
 
 @dataclass(frozen=True, kw_only=True)
 class Topology:
-    """Topology (joint-constraint) controller: it pulls along the resisted directions alone."""
+    """Topology (joint-constraint) controller: it pulls along the constrained directions alone."""
 
     stiffness: Annotated[float, Quantity("N/(m.kg)", ge=0)] = 200.0
-    """k_j, per kilogram of the device's inertia along the resisted directions."""
+    """k_j, per kilogram of the device's inertia along the constrained directions."""
     damping: Annotated[float, Quantity("N.s/(m.kg)", ge=0)] = 50.0
     """b_j, per kilogram of the same."""
     form: Literal["constrained", "plain"] = "constrained"

@@ -210,7 +210,7 @@ class Linkage:
 
 @dataclass(frozen=True, kw_only=True)
 class Directions:
-    """How resisted directions are told from free ones, by the eigenvalues of S Lambda^-1 S with
+    """How constrained directions are told from free ones, by the eigenvalues of S Lambda^-1 S with
     S = diag(1, 1, length_scale)."""
 
     length_scale: Length | None = None

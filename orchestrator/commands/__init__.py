@@ -16,6 +16,7 @@ from hapticlink.orchestrator.base.faults import Fault
 app = App(
     name="hapticlink",
     help="Haptic rendering of linkages: FMUs, co-simulated at separate rates.",
+    help_format="plaintext",
     version_flags=["--version"],
 )
 COMMANDS: Registry[str | Callable[..., Any]] = Registry(
@@ -71,7 +72,9 @@ def _commands(arguments: Sequence[str]) -> None:
         if name in app:
             continue
         if isinstance(command, str):
-            app.command(f"{__name__}.{name}:{name}", name=name, help=command)
+            # The list needs a line without an import; a command's own help is its docstring.
+            line = None if words[:1] == [name] else command
+            app.command(f"{__name__}.{name}:{name}", name=name, help=line)
         else:
             app.command(command, name=name)
 

@@ -1,4 +1,4 @@
-"""The energy that a held effort makes, kept while it is held; `passive` and `nepce` act on it.
+"""The energy that a held effort generates, kept while it is held; `passive` and `nepce` act on it.
 
 By axis, each held force paired with the displacement that follows it:
 

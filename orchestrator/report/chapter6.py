@@ -60,7 +60,7 @@ def _trajectories(on: Results, off: Results, folder: Path) -> Entry:
         f"common interval, out of the workspace at {ended[-1]:.2f} s. Device acceleration at "
         f"t = 0 is Lambda^-1 F_h to {measures.acceleration_error(on):.0e}; F_T leaves "
         f"{measures.free_work(on, LENGTH_SCALE):.0e} of itself on free motion. The mechanism's "
-        f"own count of resisted directions is 2 in {len(count.episodes)} episodes "
+        f"own count of constrained directions is 2 in {len(count.episodes)} episodes "
         f"({', '.join(f'{a:.3f}-{b:.3f}' for a, b in count.episodes)} s), links 3 and 4 then "
         f"within {count.fold:.2f} rad of a line; of {count.frames} frames {count.wrong} disagree "
         f"with it, and {count.unseen} episodes fall between frames",
@@ -104,7 +104,7 @@ def _velocity_terms(runs: Runs, folder: Path) -> Entry:
         drift = results.haptics["controller.F_drift"]
         axes[1].plot(time, np.hypot(drift[:, 0], drift[:, 1]), color=colour)
     axes[1].axhline(sizes["none"].hand_force, color=draw.GREY, ls="--", label="|F_h|")
-    title = f"Velocity terms sent: {worst['none']:.2g} mm become {worst['full']:.2g} mm"
+    title = f"Coriolis compensation on: {worst['none']:.2g} mm become {worst['full']:.2g} mm"
     axes[0].set(xlabel="time (s)", ylabel="distance |x_S - x_D| (mm)", title=title)
     largest = sizes["none"].largest_drift / sizes["none"].hand_force
     title = f"F_drift reaches {largest:.2g} F_h without them"

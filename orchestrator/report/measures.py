@@ -52,7 +52,7 @@ def neglected(results: Results) -> Neglected:
 
 
 def episodes(time: Vector, count: Vector) -> list[tuple[float, float]]:
-    """(begin, end) in s of each stretch with two resisted directions."""
+    """(begin, end) in s of each stretch with two constrained directions."""
     two = np.r_[False, count >= 2, False]
     edges = np.flatnonzero(np.diff(two.astype(int)))
     last = len(time) - 1
@@ -61,7 +61,7 @@ def episodes(time: Vector, count: Vector) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Count:
-    """How the frames' number of resisted directions agrees with the mechanism's own."""
+    """How the frames' number of constrained directions agrees with the mechanism's own."""
 
     frames: int
     wrong: int

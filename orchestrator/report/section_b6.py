@@ -56,7 +56,7 @@ def _draw(results: Results, folder: Path, name: str) -> str:
     seen = graphics["virtual_environment.n_constraints"]
     axes[0].step(haptics["time"], own, where="post", color=draw.GREY, label="mechanism, 512 Hz")
     axes[0].step(graphics["time"], seen, where="post", color=draw.BLUE, label="frames, 30 Hz")
-    axes[0].set(xlabel="time (s)", ylabel="resisted directions", yticks=[0, 1, 2, 3])
+    axes[0].set(xlabel="time (s)", ylabel="constrained directions", yticks=[0, 1, 2, 3])
     axes[0].set_title(f"(a) two in {100 * np.mean(own >= 2):.1f} % of the time")
     axes[0].legend(fontsize="small")
     point, handle = 1e3 * haptics["virtual_mechanism.x"], 1e3 * haptics["haptic_device.x_true"]

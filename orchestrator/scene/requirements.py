@@ -37,7 +37,7 @@ def needs(scene: Scene) -> Iterator[Need]:
         f"from {scene.directions_from}" if impedance(scene) else "no impedance controller",
     )
     yield Need(
-        "resisted directions",
+        "constrained directions",
         topology(scene) or scene.mechanism.directions,
         f"from {scene.directions_from}" if topology(scene) else "no topology controller",
     )

@@ -129,7 +129,7 @@ class Scene:
     """Rate of the virtual mechanism."""
     directions_from: Literal["graphics", "mechanism"] = "graphics"
     """Who computes Lambda^-1, the mobility at the operational point, and P_c, the projector on the
-    resisted directions ([theory](theory.md#what-the-hand-feels)): the graphics copy, or the
+    constrained directions ([theory](theory.md#what-the-hand-feels)): the graphics copy, or the
     mechanism itself."""
     local_model: bool = False
     """Holds the mechanism's D, W, w and J_h of (B.15) from the graphics rate:
@@ -148,7 +148,7 @@ class Scene:
     mechanism: Mechanism = field(default_factory=Mechanism)
     """Time integration of the mechanism."""
     directions: Directions = field(default_factory=Directions)
-    """The test for resisted directions, those in which the closures let nothing move."""
+    """The test for constrained directions, those in which the closures let nothing move."""
     device: Device | None = None
     """The twin pantograph, the block `haptic_device`: [device](device.md)."""
     controller: Controller | None = None

@@ -50,13 +50,13 @@ def _lasts(row: Row) -> bool:
 
 
 def best(found: Grid, rate: str) -> str | None:
-    """The hold of the least metric at a rate, None where none lasts."""
+    """The hold of the least metric at a rate, None where none stays stable."""
     lasting = {h: v for h, by in found.items() if (v := by[rate].value) is not None}
     return min(lasting, key=lasting.__getitem__, default=None)
 
 
 def lasting(found: Grid, hold: str) -> list[str]:
-    """The rates at which a hold lasts."""
+    """The rates at which the run with a hold stays stable."""
     return [rate for rate in COLUMNS if found[hold][rate].value is not None]
 
 

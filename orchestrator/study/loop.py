@@ -78,7 +78,7 @@ def at_haptic_rate(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
         f"Lambda^-1 held: the best hold of a rate takes {gain:.0f} % off the zero-order hold's "
         "coupling error",
         [(f"copy follows {follows}", g) for follows, g in own.items()],
-        "coupling error at 1 s (mm), velocity terms sent",
+        "coupling error at 1 s (mm), Coriolis and centrifugal compensation on",
     )
     yield f"![Coupling error with Lambda^-1 held]({made})"
 

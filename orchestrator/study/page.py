@@ -27,8 +27,8 @@ def _head() -> str:
     text = (
         "Made by `hapticlink study`; every number is in [table.csv](table.csv). The five-bar of "
         "Table 6.1, a constant wrench of the hand, 3 s, haptics at 512 Hz, graphics at 10 to 60 "
-        "Hz; `10..60` draws each period between the two (three seeds, the worst is shown). A hold "
-        "lasts where the run comes to its end with handle and operational point less than a link "
+        "Hz; `10..60` draws each period between the two (three seeds, the worst is shown). A run "
+        "stays stable where it comes to its end with handle and operational point less than a link "
         f"({APART[0]:g} mm) and {APART[1]:g} rad apart. Otherwise its cell is grey and tells when "
         "the run ended: the device left its workspace or the mechanism broke down (at 3.0 s: they "
         "came apart)."

@@ -84,7 +84,7 @@ def _folded(results: Results) -> Row:
 
 
 def _switches(results: Results) -> Row:
-    """How often the number of resisted directions changes, as the controller sees it."""
+    """How often the number of constrained directions changes, as the controller sees it."""
     for fmu in ("virtual_environment", "virtual_mechanism"):
         signal = f"{fmu}.n_constraints"
         count = next((t[signal] for t in results.tables.values() if signal in t), None)

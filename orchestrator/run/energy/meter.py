@@ -1,4 +1,4 @@
-"""The energy that a held effort makes: what it did, minus what its ideal source did.
+"""The energy that a held effort generates: what it did, minus what its ideal source did.
 
 held  = sum F_held,j . (x_{j+1} - x_j)               over the target's steps
 ideal = sum (F_n + F_{n+1})/2 . (x(t_{n+1}) - x(t_n))   over the source's samples

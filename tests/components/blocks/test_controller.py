@@ -216,7 +216,7 @@ def test_constraint_wrench_at_both_ends(pull):
 
 
 def test_constraint_wrench_accelerates_the_device_by_the_pull_where_resisted():
-    """P S M_d^-1 F_T = P S pull: the resisted directions get k_j e + b_j edot."""
+    """P S M_d^-1 F_T = P S pull: the constrained directions get k_j e + b_j edot."""
     P, S, pull = projector([(1, 0.3, -0.5), (0, 1, 1)]), np.diag([1, 1, L]), [0.4, -1.0, 20.0]
     F_T = constraint_map(P) @ pull
     np.testing.assert_allclose(P @ S @ np.linalg.solve(M, F_T), P @ S @ pull, rtol=1e-10)

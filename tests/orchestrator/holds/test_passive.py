@@ -142,7 +142,7 @@ def wall(stiffness: float, every: int, limit: float) -> tuple[float, float, floa
         energy += held * moved
         if k % every == 0:
             base = min(max(stiffness * (measured - 0.030), 0.0), 2.0)
-        # The wall's force opposes x: what it absorbs is -(energy made).
+        # The wall's force opposes x: what it absorbs is -(energy generated).
         excess, largest = np.array([max(-energy, 0.0)]), np.array([limit * abs(moved) / period])
         control = -float(repayment(excess, np.array([moved]), largest)[0])
         held = min(max(base + control, -2.0), 2.0)

@@ -144,7 +144,7 @@ def test_it_reads_the_future_and_says_so(fmus: Fmus) -> None:
 
 
 def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus: Fmus, tmp_path: Path) -> None:
-    """Linear interpolation holds the mean of the source's samples, so it makes no energy: the
+    """Linear interpolation holds the mean of the source's samples, so it generates no energy: the
     work of both books is the same."""
     made = system(
         fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh", power=POWER,
