@@ -22,13 +22,14 @@ class Bounds:
         self._inverse, self._shares = np.zeros(len(outputs)), np.zeros(len(outputs))
 
     def start(self) -> None:
-        """The outputs stand at their start. Whole numbers have the bounds of their types."""
+        """The outputs stand at their start. Whole numbers have the bounds of their types; a Real
+        without a unit is no physical quantity that is known, and may be of any size."""
         nominal = np.array([s.nominal for s in self._scalars])
         bounds = GROWTH * np.maximum(np.abs(self._outputs), nominal)
         for i, scalar in enumerate(self._scalars):
             if scalar.bound is not None:
                 bounds[i] = scalar.bound
-            elif scalar.type not in ("Real", "Float64", "Float32"):
+            elif scalar.unit is None or scalar.type not in ("Real", "Float64", "Float32"):
                 bounds[i] = np.inf
         self._inverse[:] = 1.0 / bounds
 

@@ -112,6 +112,6 @@ def _listed(folder: Path) -> set[str]:
     """The files that the run.json of an earlier run in `folder` lists, but for those elsewhere."""
     try:
         names = json.loads((folder / RUN).read_text(encoding="utf-8")).get("files", ())
-        return {n for n in names if isinstance(n, str) and Path(n).name == n}
+        return {n for n in names if isinstance(n, str) and n != ".." and Path(n).name == n}
     except (OSError, ValueError, AttributeError, TypeError):
         return set()

@@ -95,9 +95,12 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
     except BaseException:
+        workers = set(multiprocessing.active_children()) - before
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in set(multiprocessing.active_children()) - before:
+        for process in workers:
             process.terminate()
+        for process in workers:  # they remove their folders; a second shutdown waits for nobody
+            process.join(5.0)
         raise
     finally:
         pool.shutdown()

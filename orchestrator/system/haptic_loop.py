@@ -90,10 +90,10 @@ def _rows(scene: Scene) -> tuple[Row, ...]:
 
 def energy_in_play(scene: Scene) -> float | None:
     """J that gravity can turn over in the linkage; None where more than wrenches at its points put
-    energy into it: drives, matrices or contacts that are held."""
+    energy into it: drives, forces of plugins, matrices or contacts that are held."""
     linkage = scene.linkage
     held = scene.local_model or (scene.contacts and scene.contacts.detection == "graphics")
-    if linkage is None or held or any(j.drive for j in linkage.joint):
+    if linkage is None or held or linkage.force or any(j.drive for j in linkage.joint):
         return None
     spans = [p for j in linkage.joint for p in (j.at_parent, j.at_child) if p]
     spans += [b.center for b in linkage.body if b.center]

@@ -123,8 +123,11 @@ def test_a_family_has_the_members_asked_for_and_takes_changes():
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        ("linkage.n=0", "--set linkage.n=0: linkage.n: 0: how many members"),
-        ("linkage.n=2.5", "whole number of at least 1"),
+        (
+            "linkage.n=0",
+            "--set linkage.n=0: linkage.n: 0 is out of range: give a whole number >= 1",
+        ),
+        ("linkage.n=2.5", "2.5 is out of range: give a whole number >= 1"),
         ("linkage.family=n-four-bars", "did you mean 'n-four-bar'"),
     ],
 )

@@ -144,5 +144,5 @@ def test_a_loop_that_cannot_close_is_named_with_its_gap():
 
 
 def test_unknown_method_names_the_known():
-    with pytest.raises(ValueError, match=r"'euler' is unknown; take one of .*rk4"):
+    with pytest.raises(ValueError, match=r"no integrator .euler.; there are .*rk4"):
         mechanism(integrator="euler")

@@ -82,7 +82,8 @@ def test_passive_makes_nothing_at_any_sample_where_the_way_is_foreseen(
     now, speed = np.zeros(1), np.zeros(1)
     hold = HOLDS["passive"](HoldContext(1, displacement=lambda: now, velocity=lambda: speed))
     start = 2 * step * every
-    swing = 5.0 if every >= step else 10.0  # of a mean that leaves what is held, within +-5
+    # Of a mean that leaves what is held, within +-5; a sample that comes within a step leaves more.
+    swing = 5.0 if every % step == 0 else 10.0
     if known:
         hold.push(0, np.array([-swing]), 0)
         hold.value(0, step / 2)

@@ -219,7 +219,7 @@ def test_a_spring_of_another_fmu_is_kept_in_check(tmp_path: Path) -> None:
     [
         ("nothing", "100.0", "there is no input or output near.nothing"),
         ("y", "100.0, 1.0", "2 gains for the 1 of near.u"),
-        ("y", "-1.0", "a gain below 0"),
+        ("y", "-1.0", "out of range: give a number >= 0"),
     ],
 )
 def test_a_spring_that_is_not_there_is_told(

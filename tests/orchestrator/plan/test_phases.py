@@ -82,9 +82,8 @@ def test_clocks_that_a_phase_parts_hold_the_newest_sample_unless_named(tmp_path:
         "virtual_mechanism.v -> controller.v_S": "zoh",
         "controller.F_drift -> virtual_mechanism.F_drift": "lead",
         "hand.F -> virtual_mechanism.F_hand": "zoh",
-        "virtual_mechanism.x -> virtual_environment.x_ref": "mean",
-        "virtual_mechanism.v -> virtual_environment.v_ref": "mean",
         "virtual_mechanism.q -> virtual_environment.q_ref": "mean",
+        "virtual_mechanism.qd -> virtual_environment.qd_ref": "mean",
         "virtual_environment.Lambda_inv -> controller.Lambda_inv": "foh",
         "virtual_environment.P_c -> controller.P_c": "foh",
     }

@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,12 +15,18 @@ from hapticlink.orchestrator.results.files import Recorder, write_json, write_ov
 from hapticlink.orchestrator.results.tables import load, read_table
 
 
+def recorder_of(path: Path, columns: list[str], view: Any) -> Recorder:
+    """One whose file is in its place from the first row on."""
+    made = Recorder(path, columns, view, lambda: made.publish())
+    return made
+
+
 @given(st.lists(st.floats(allow_nan=False), min_size=3, max_size=3))
 def test_every_float_reads_back_to_the_bit(
     tmp_path_factory: pytest.TempPathFactory, values: list[float]
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "floats.csv"
-    with Recorder(path, ["a.x", "a.P[1,1]", "a.P[1,2]"], np.array(values)) as recorder:
+    with recorder_of(path, ["a.x", "a.P[1,1]", "a.P[1,2]"], np.array(values)) as recorder:
         recorder.row(1 / 3)
     table = read_table(path)
     assert table["time"].tolist() == [1 / 3]
@@ -32,7 +39,7 @@ def test_rows_are_on_disk_before_the_end_and_after_an_exception(tmp_path: Path) 
     path, view = tmp_path / "rows.csv", np.zeros(1)
 
     def record_and_break() -> None:
-        with Recorder(path, ["y"], view) as recorder:
+        with recorder_of(path, ["y"], view) as recorder:
             for k in range(5):
                 view[0] = k
                 recorder.row(k / 512)
@@ -47,7 +54,7 @@ def test_rows_are_on_disk_before_the_end_and_after_an_exception(tmp_path: Path) 
 def test_vectors_and_matrices_stack(tmp_path: Path) -> None:
     path = tmp_path / "m.csv"
     columns = [f"e.L[{i},{j}]" for i in (1, 2) for j in (1, 2, 3)]
-    with Recorder(path, columns, np.arange(6.0)) as recorder:
+    with recorder_of(path, columns, np.arange(6.0)) as recorder:
         recorder.row(0.0)
     assert read_table(path)["e.L"].tolist() == [[[0, 1, 2], [3, 4, 5]]]
     with pytest.raises(KeyError, match=r"no signal 'e.K'"):
@@ -55,7 +62,7 @@ def test_vectors_and_matrices_stack(tmp_path: Path) -> None:
 
 
 def test_nan_is_written_as_such(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "n.csv", ["y"], np.array([math.nan])) as recorder:
+    with recorder_of(tmp_path / "n.csv", ["y"], np.array([math.nan])) as recorder:
         recorder.row(0.0)
     assert math.isnan(read_table(tmp_path / "n.csv")["y"][0])
 

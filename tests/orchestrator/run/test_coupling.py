@@ -18,6 +18,8 @@ from hapticlink.orchestrator.base.faults import FmuFault, InputFault, SceneFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays, uses
+from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged
 from hapticlink.orchestrator.scene.load import read
 from hapticlink.orchestrator.scene.records import Iteration
@@ -229,7 +231,8 @@ def test_start_values_go_through_a_feed_through_loop_of_any_gain(
 def test_a_loop_without_start_values_is_an_error_that_names_it(tmp_path: Path) -> None:
     parts = described([gain("a", 2.0, 1.0), gain("b", 0.5, -3.0)], tmp_path)
     rows = [("a.y", "b.u"), ("b.y", "a.u")]
-    outcome, _ = simulate(system(parts, rows, "jacobi", Fraction(1), Fraction(1)), tmp_path)
+    made = system(parts, rows, "jacobi", Fraction(1), Fraction(1))
+    outcome = run(Plan(made), RunFolder(tmp_path))
     assert isinstance(outcome.fault, FmuFault)
     assert "output y does not settle in initialisation, nor by Newton" in str(outcome.fault)
 

@@ -168,12 +168,12 @@ def test_alternating_frames_grow_where_each_alone_is_stable(
     fmus: dict[str, Description], tmp_path: Path, frames: tuple[int, int], growth: float | None
 ) -> None:
     """K = 1050 and a spring of 20 to ground: spectral radii at most .986 alone."""
-    starts = np.cumsum([0, *frames * 40]).tolist()
+    starts = np.cumsum([0, *frames * 18]).tolist()  # short of what ends a run as diverged
     clocks = (Clock("haptics", range(starts[-1] + 2)), Clock("graphics", starts))
     timeline = Timeline(Fraction(1, 512), starts[-5], clocks)
     force = forces(fmus, tmp_path, "sprung", timeline, 1050.0, ground=20.0)
     peaks = [force[a:b].max() for a, b in pairwise(starts[:-4])]
-    a_frame = (max(peaks[-10:]) / max(peaks[-50:-40])) ** (1 / 40)
+    a_frame = (max(peaks[-10:]) / max(peaks[-30:-20])) ** (1 / 20)
     if growth is None:
         assert a_frame < 0.99
     else:

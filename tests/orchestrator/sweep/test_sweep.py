@@ -213,7 +213,7 @@ def test_a_failed_run_is_a_row(bar: Path, tmp_path: Path) -> None:
     assert status("sweep", bar, "--runs", tmp_path / "runs.csv", "--out", out, "--jobs", 1) == 0
     rows = read(out)
     assert [r["end"] for r in rows] == ["duration", "refused", "refused", "fault"]
-    assert "'jacoby' should be" in rows[1]["message"]
+    assert "did you mean 'jacobi'?" in rows[1]["message"]
     assert "there is no such output" in rows[2]["message"]
     assert rows[3]["message"].startswith("virtual_mechanism: ")
 
