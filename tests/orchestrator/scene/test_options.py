@@ -1,5 +1,6 @@
 """Options as Python values, of scenes by name and of Scene objects alike."""
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -77,8 +78,10 @@ def test_faults_of_a_scene_object_name_option_and_line(tmp_path: Path) -> None:
     with pytest.raises(SceneFault) as refused:
         open_scene.load(read, {"linkage.body.bar.mass": "heavy"})
     assert "--set linkage.body.bar.mass=heavy: linkage.body[0] (bar).mass" in str(refused.value)
-    found = open_scene.load(read, {"duration": 1.0}).place(("hold",), "wrong")
-    assert (found.line, found.key) == (3, "hold")
+    longer = open_scene.load(read, {"duration": 1.0})
+    for one in (longer, pickle.loads(pickle.dumps(longer))):  # in another process too
+        assert str(one.place(("hold",), "wrong")) == "line 3: hold: wrong"
+        assert str(one.place(("duration",), "long")) == "--set duration=1.0: duration: long"
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
