@@ -27,7 +27,7 @@ class Bounds:
         nominal = np.array([s.nominal for s in self._scalars])
         bounds = GROWTH * np.maximum(np.abs(self._outputs), nominal)
         for i, scalar in enumerate(self._scalars):
-            if scalar.bound is not None:
+            if scalar.bound:
                 bounds[i] = scalar.bound
             elif scalar.unit is None or scalar.type not in ("Real", "Float64", "Float32"):
                 bounds[i] = np.inf

@@ -106,7 +106,6 @@ class Process:
         """The exit status of a process that has nothing more to do; killed where it lingers, and
         so is what it leaves behind."""
         self._ended.set()
-        interrupt.remove(self._kill)
         for stream in (self._requests, self._answers):
             with suppress(OSError):  # bytes that a dead process has not taken
                 stream.close()
@@ -117,3 +116,4 @@ class Process:
             return self._popen.wait()
         finally:
             self._kill()
+            interrupt.remove(self._kill)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from pathlib import Path
 
@@ -81,6 +82,30 @@ def test_a_failed_build_leaves_nothing(place):
     with pytest.raises(RuntimeError, match="no"):
         cached(MATERIAL, fail)
     assert files(place) == []
+
+
+def test_what_a_killed_build_has_left_goes_with_the_next(place):
+    """Not what another machine may still be at."""
+    room = place / cache.key(MATERIAL)
+    (room / ".dead").mkdir(parents=True)
+    (room / ".dead" / "half.fmu").write_bytes(b"half")
+    (room / ".half.fmu").write_bytes(b"half")
+    for old in (room / ".dead", room / ".half.fmu"):
+        os.utime(old, (0, 0))
+    (room / ".fresh").mkdir()
+    path = cached(MATERIAL, Builder())
+    assert {p.name for p in room.iterdir()} == {path.name, ".fresh"}
+
+
+def test_it_is_built_in_the_room_given(place, tmp_path):
+    rooms = []
+
+    def builder(folder: Path) -> Path:
+        rooms.append(folder.parent)
+        return build(sample_components.stateless(), folder)
+
+    assert cached(MATERIAL, builder, tmp_path / "room").parent == place / cache.key(MATERIAL)
+    assert rooms == [tmp_path / "room"]
 
 
 def test_races_end_with_one_whole_file(place):

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.orchestrator.base.ticks import (
+    Clock,
     Timeline,
     aligned,
     common_base,
@@ -84,6 +85,35 @@ def test_listed_times_go_to_ticks_and_two_on_one_are_refused() -> None:
     assert listed([Fraction(0), Fraction(1, 30), Fraction(1, 10)], base) == (0, 18, 52)
     with pytest.raises(ValueError, match="falls on tick 18"):
         listed([Fraction(1, 30), Fraction(171, 5130) + Fraction(1, 9999)], base)
+
+
+@given(
+    rates,
+    st.fractions(Fraction(1, 50), 1, max_denominator=97),
+    st.fractions(0, 1, max_denominator=9),
+    st.integers(1, 300),
+)
+def test_steps_that_are_made_when_asked_for_tell_their_bounds(
+    fast: Fraction, ratio: Fraction, phase: Fraction, end: int
+) -> None:
+    """Longest and shortest come from one round of the frames, not from all of them."""
+    base, period = 1 / fast, 1 / (fast * ratio)
+    first = max(phase * period, base)
+    fine = common_base([period, first])
+    for frames in (aligned(period, base, end, first), periodic(period, fine, end, first)):
+        steps = [b - a for a, b in pairwise(tuple(frames))]
+        clock = Clock("graphics", frames)
+        assert len(frames) == len(steps) + 1
+        assert clock.first == steps[0]
+        assert clock.longest >= max(steps)
+        assert clock.shortest <= min(steps[1:], default=clock.longest)
+        if len(steps) > getattr(frames, "round", 1):
+            assert (clock.longest, clock.shortest) == (max(steps), min(steps[1:]))
+
+
+def test_more_periods_than_are_drawn_are_refused() -> None:
+    with pytest.raises(ValueError, match="at most 1000000 are: take a shorter duration"):
+        variable(Fraction(10), Fraction(60), 0, Fraction(1, 512), 512 * 10**9)
 
 
 def test_a_period_off_the_base_is_refused() -> None:

@@ -12,7 +12,7 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Get, Record, Set, Step
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import delays, uses
+from hapticlink.orchestrator.plan.sample_ages import Delay, comes_round, delays, uses
 from hapticlink.orchestrator.plan.schemes import SCHEMES
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline as timeline_of
@@ -97,6 +97,36 @@ def test_nothing_reads_the_future_and_holds_give_the_newest(
         until = max(tick - 1, 0) if coupling == "jacobi" and source.sampled else tick
         starts = timeline.clock(source.clock).starts
         assert stamp == starts[bisect_right(starts, until) - 1]
+
+
+@shared
+@given(timelines, couplings)
+def test_ages_are_those_of_every_use_until_the_plan_comes_round(
+    stamped: Make, timeline: Timeline, coupling: str
+) -> None:
+    plan = Plan(stamped(timeline, coupling))
+    ages: dict[str, list[int]] = {}
+    for tick, connection, stamp in uses(plan, comes_round(plan.system)):
+        if tick:
+            ages.setdefault(connection, []).append(tick - stamp)
+    seconds = timeline.seconds
+    assert delays(plan) == {
+        name: Delay(seconds(min(a)), seconds(max(a)), seconds(sum(a)) / len(a))
+        for name, a in ages.items()
+    }
+
+
+@shared
+@given(timelines, st.sampled_from(CAUSAL))
+def test_what_comes_round_is_no_older_later(
+    stamped: Make, timeline: Timeline, coupling: str
+) -> None:
+    plan = Plan(stamped(timeline, coupling))
+    found, seconds = delays(plan), timeline.seconds
+    for tick, connection, stamp in uses(plan):
+        if tick:
+            age = found[connection]
+            assert age.least <= seconds(tick - stamp) <= age.most
 
 
 def test_gauss_seidel_delays_nothing_and_jacobi_the_sampled_by_one_period(stamped: Make) -> None:

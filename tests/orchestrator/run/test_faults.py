@@ -226,6 +226,41 @@ def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
     assert log.read_text().splitlines() == ["terminate", "free", "unloaded after its interpreter"]
 
 
+TERMINATE = """
+    def terminate(self):
+        {}
+"""
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize("body", ["raise RuntimeError('stuck brake')", "raise SystemExit(3)"])
+def test_an_exception_in_terminate_is_told_after_the_last_row(
+    tmp_path: Path, body: str, isolate: str
+) -> None:
+    """Two of them: after a fatal error an FMU is not even freed, and the next is terminated. From
+    outside, as the process once ended by SIGSEGV, with nothing on stderr."""
+    slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format(body)
+    python_fmu_of(tmp_path, slave, tmp_path.name)
+    one = ONE.format("Bad.fmu") + isolate
+    path, out = scene(tmp_path, one + one.replace("one", "two")), tmp_path / "out"
+    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
+    assert ended.returncode == 1
+    assert b"hapticlink: two: fmi2Terminate returned fatal at t = 0.5 s" in ended.stderr
+    assert body[6:18].encode() in ended.stderr
+    found = tables.load(out)
+    assert (found.run["end"]["reason"], found.haptics["time"][-1]) == ("fault", 0.5)
+
+
+def test_a_process_that_dies_in_terminate_is_told(tmp_path: Path) -> None:
+    slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format("__import__('os')._exit(3)")
+    python_fmu_of(tmp_path, slave, tmp_path.name)
+    experiment, found = run(tmp_path, ONE.format("Bad.fmu") + ISOLATED)
+    said = "one: its process ended with exit status 3 at t = 0.5 s"
+    assert str(experiment.outcome.fault) == said
+    assert found.haptics["time"][-1] == 0.5
+
+
 @pytest.mark.parametrize("crash", ["__import__('os')._exit(139)", "__import__('os').abort()"])
 def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
     tmp_path: Path, crash: str

@@ -294,6 +294,47 @@ def test_a_crashed_process_takes_one_run(foreign: Path, tmp_path: Path) -> None:
     assert len(list((out / "rows").iterdir())) == 2  # the next sweep tries the dead one again
 
 
+def test_what_fails_for_the_machine_is_made_again_and_what_the_scene_gives_is_not(
+    tmp_path: Path,
+) -> None:
+    """An FMU that does not answer, one that raises, one whose process is killed, while a file is
+    there; and one that always diverges."""
+    ill, log = tmp_path / "ill", tmp_path / "log"
+    body = f"""
+        with open({str(log)!r}, "a") as file:
+            print(self.die, file=file)
+        if self.die == 4.0:
+            self.y = float("nan")
+            return True
+        if os.path.exists({str(ill)!r}):
+            if self.die == 1.0:
+                time.sleep(1000)
+            if self.die == 2.0:
+                raise OSError("no space left on device")
+            if self.die == 3.0:
+                os.kill(os.getpid(), 9)"""
+    (tmp_path / "unit.py").write_text(SLAVE.replace("\n        if self.die == 1.0:\n            os._exit(3)", body))
+    FmuBuilder.build_FMU(tmp_path / "unit.py", dest=tmp_path)
+    path = tmp_path / "foreign.toml"
+    path.write_text(
+        'title = "One unit"\nduration = 0.02\nhaptics.rate = 100\nisolate = true\n'
+        'faults.timeout = 2.0\n[[fmu]]\nname = "unit"\npath = "Unit.fmu"\n'
+        "start = { die = 0.0, nap = 0.0 }\n"
+    )
+    line = ("sweep", path, "--vary", "fmu.unit.start.die=0.0,1.0,2.0,3.0,4.0", "--jobs", 1)
+    ill.touch()
+    assert status(*line, "--out", tmp_path / "out") == 0
+    ends = [r["end"] for r in read(tmp_path / "out")]
+    assert ends == ["duration", "died", "died", "died", "fault"]
+    ill.unlink()
+    before = log.read_text()
+    assert status(*line, "--out", tmp_path / "out") == 0
+    ends = [r["end"] for r in read(tmp_path / "out")]
+    assert ends == ["duration"] * 4 + ["fault"]
+    again = log.read_text().removeprefix(before).split()
+    assert set(again) == {"1.0", "2.0", "3.0"}
+
+
 def _gone(group: int) -> bool:
     try:
         os.killpg(group, 0)
