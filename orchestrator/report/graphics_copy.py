@@ -30,7 +30,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
         off = graphics["time"][graphics["virtual_environment.branch_ok"] == 0]
         axis.plot(off, np.full(len(off), 2e-4), "|", color=draw.GREY, label="pulled copy folded")
         count, of, _ = found[bias, "pulled (report)"]
-        title = f"bias = {bias}: the pulled copy folds in {count} of {of} frames"
+        title = f"bias = {bias}: folded in {count} of {of} frames"
         axis.set(xlabel="time (s)", ylabel="distance |x_S - x_D| (mm)", title=title)
     axes[0].legend(fontsize="small")
     told = [

@@ -313,7 +313,9 @@ def test_what_fails_for_the_machine_is_made_again_and_what_the_scene_gives_is_no
                 raise OSError("no space left on device")
             if self.die == 3.0:
                 os.kill(os.getpid(), 9)"""
-    (tmp_path / "unit.py").write_text(SLAVE.replace("\n        if self.die == 1.0:\n            os._exit(3)", body))
+    (tmp_path / "unit.py").write_text(
+        SLAVE.replace("\n        if self.die == 1.0:\n            os._exit(3)", body)
+    )
     FmuBuilder.build_FMU(tmp_path / "unit.py", dest=tmp_path)
     path = tmp_path / "foreign.toml"
     path.write_text(
