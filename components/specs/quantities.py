@@ -57,7 +57,7 @@ class Quantity(GroupedMetadata):
 
 Time = Annotated[float, Quantity("s")]
 Elapsed = Annotated[float, Quantity("s", ge=0, le=100000)]
-Duration = Annotated[float, Quantity("s", gt=0, le=100000)]
+Duration = Annotated[float, Quantity("s", gt=0, le=1000000000)]
 Position = Annotated[float, Quantity("m")]
 Length = Annotated[float, Quantity("m", gt=0)]
 Angle = Annotated[float, Quantity("rad")]
