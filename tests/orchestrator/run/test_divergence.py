@@ -7,7 +7,7 @@ import pytest
 from hapticlink.orchestrator.base.faults import Diverged
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.conftest import status
-from tests.orchestrator.foreign_fmus import SLAVE, python_fmu, python_fmu_of, run
+from tests.orchestrator.foreign_fmus import SLAVE, python_fmu, python_fmu_of, run, with_units
 
 ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
 
@@ -18,7 +18,8 @@ def test_an_output_beyond_1e12_of_its_start(
     tmp_path: Path, start: float, bound: str, rows: int, isolate: str
 ) -> None:
     slave = SLAVE.format(name="Grows", body="self.y = self.y + 1e4 ** self.steps")
-    python_fmu_of(tmp_path, slave.replace("0.0, 0.0, 1.0", f"0.0, {start}, 1.0"), "grows")
+    text = slave.replace("0.0, 0.0, 1.0", f"0.0, {start}, 1.0")
+    with_units(python_fmu_of(tmp_path, text, "grows"), y="m")
     experiment, found = run(tmp_path, ONE.format("Grows.fmu") + isolate)
     assert isinstance(experiment.outcome.fault, Diverged)
     assert experiment.outcome.reason == found.run["end"]["reason"] == "diverged"
@@ -27,7 +28,8 @@ def test_an_output_beyond_1e12_of_its_start(
 
 
 def test_a_held_output_is_bounded_too(tmp_path: Path) -> None:
-    python_fmu(tmp_path, "Grows", "self.y = float('nan') if self.steps < 3 else 1e13")
+    body = "self.y = float('nan') if self.steps < 3 else 1e13"
+    with_units(python_fmu(tmp_path, "Grows", body), y="m")
     experiment, found = run(tmp_path, ONE.format("Grows.fmu"), "faults.nan=hold")
     assert isinstance(experiment.outcome.fault, Diverged)
     assert found.run["held_outputs"] == {"one": 2}
