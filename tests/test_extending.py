@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hapticlink.components.registry import Registry
+from hapticlink.orchestrator.holds import Hold, HoldContext
 from hapticlink.orchestrator.results import tables
 from hapticlink.orchestrator.results.tables import Results
 from tests.plugins import Ended, hapticlink
@@ -39,8 +41,16 @@ def test_every_command_ends_well(ended: dict[str, Ended]) -> None:
     assert {line: e.said for line, e in ended.items() if e.status} == {}
 
 
-def test_hold(run: Run) -> None:
-    """Frames at 30 Hz, of the values at 0 and 1/30 s: half way on from them."""
+def test_hold(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 1 at tick 0 and 4 at tick 15: at tick 20, 4 + beta 3 5/15 with beta = 1/2."""
+    parts: dict[str, type[Hold]] = {}
+    monkeypatch.setattr(Registry, "register", lambda self, name, part: parts.update({name: part}))
+    exec(FILES["fractional_order.py"], {"__name__": "fractional_order"})
+    hold = parts["fractional-order"](HoldContext(1))
+    hold.push(0, np.array([1.0]), 0)
+    assert hold.value(7) == 1.0
+    hold.push(15, np.array([4.0]), 15)
+    assert hold.value(20) == hold.value(15, ahead=5) == pytest.approx(4.5)
     found = run("closed-loop")
     name = "virtual_environment.Lambda_inv -> controller.Lambda_inv"
     assert found.run["holds"][name] == "fractional-order"

@@ -18,7 +18,7 @@ from hapticlink.components import registry
 from hapticlink.orchestrator.base.faults import InputFault
 
 GROUP = "hapticlink.plugins"
-PACKAGE = str(Path(registry.__file__).parent.parent)
+PACKAGE = f"{Path(registry.__file__).parent.parent}{os.sep}"
 """A fault of a module is told at a line of its own."""
 
 
@@ -58,6 +58,9 @@ def _load(module: str, what: str) -> None:
             raise InputFault(f"{what}: it imports {error.name!r}, which is not there") from error
         hint = "give its name, without .py" if module.endswith(".py") else "is it installed?"
         raise InputFault(f"{what}: no such module, nor a file in {os.getcwd()}; {hint}") from error
+    except SyntaxError as error:
+        place = f"{error.filename}, line {error.lineno}"
+        raise InputFault(f"{what}: {place}: SyntaxError: {error.msg}") from error
     except Exception as error:  # whatever a user's module can do
         frames = traceback.extract_tb(error.__traceback__)
         at = [f for f in frames if not f.filename.startswith((PACKAGE, "<"))][-1]

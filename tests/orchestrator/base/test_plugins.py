@@ -55,12 +55,13 @@ def write(folder: Path, **files: str) -> None:
 
 def test_modules_that_are_no_plugins(tmp_path: Path) -> None:
     write(tmp_path, mine=HOLD.format(name="mine"), lacks="import not_there", empty="x = 1")
-    write(tmp_path, broken="\n\n1 / 0\n", taken=HOLD.format(name="foh"))
+    write(tmp_path, broken="\n\n1 / 0\n", taken=HOLD.format(name="foh"), misspelt="x = 1\nx = = 2")
     messages = {
         "nowhere": "--plugin nowhere: no such module, nor a file in",
         "mine.py": "give its name, without .py",
         "lacks": "--plugin lacks: it imports 'not_there', which is not there",
         "broken": "broken.py, line 3: ZeroDivisionError: division by zero",
+        "misspelt": "misspelt.py, line 2: SyntaxError: invalid syntax",
         "empty": "empty.py registers no part (docs/extending.md)",
         "taken": "taken.py, line 5: ValueError: hold 'foh' is one of hapticlink: take another",
     }
