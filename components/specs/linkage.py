@@ -216,9 +216,9 @@ class Directions:
     length_scale: Length | None = None
     """Makes rotations comparable with translations; the mean link length where left out."""
     rank_tolerance: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.1
-    """A direction is resisted where its share of the largest eigenvalue falls below this."""
+    """A direction is constrained where its share of the largest eigenvalue falls below this."""
     hysteresis: Annotated[float, Quantity("1", ge=1)] = 1.5
-    """A direction stays resisted until its share exceeds this times `rank_tolerance`."""
+    """A direction stays constrained until its share exceeds this times `rank_tolerance`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,9 +237,9 @@ class Mechanism:
     diagnostics: bool = False
     """Puts out rank and condition of the closures."""
     alpha: Annotated[float, Quantity("1/s", ge=0)] | None = None
-    """Baumgarte's frequency of (3.3); the integrator's own where left out."""
+    """Baumgarte's frequency of (3.3); where left out, what suits the integrator."""
     beta: Annotated[float, Quantity("1", ge=0)] | None = None
-    """Baumgarte's damping ratio of (3.3); the integrator's own where left out."""
+    """Baumgarte's damping ratio of (3.3); where left out, what suits the integrator."""
     substeps: Substeps = 1
     """Integration steps within a communication step."""
 
