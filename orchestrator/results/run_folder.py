@@ -26,8 +26,8 @@ RUN = "run.json"
 class RunFolder:
     """`story` is what run.json says from the first row on; without it there is no run.json.
 
-    A context manager: within, a second signal, which ends the process at once, is told too.
-    `published`: the results there are this run's.
+    A context manager, out of which no run goes untold: not by a second signal, which ends the
+    process at once, and by no error. `published`: the results there are this run's.
     """
 
     def __init__(self, folder: Path, story: dict[str, Any] | None = None) -> None:
@@ -39,8 +39,11 @@ class RunFolder:
         interrupt.add(self._interrupted)
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         interrupt.remove(self._interrupted)
+        if error is not None:
+            with suppress(OSError):
+                self._broken_off("fault", error)
 
     def recorder(self, clock: str, columns: Sequence[str], view: Vector) -> Recorder:
         """The rows of a clock. All are made before the first row of one."""
@@ -87,15 +90,17 @@ class RunFolder:
                 write_over(self.folder / RUN, self._story | ending, self._story | least)
 
     def _interrupted(self) -> None:
-        fault = Interrupted(self.last)
-        told = {"kind": type(fault).__name__, "time": self.last, "message": str(fault)}
         for left in self.folder.glob(".run.*.json"):  # what was being written
             left.unlink()
-        ending = {"end": {"reason": "interrupted", "time": self.last}, "fault": told}
-        if self.published and self._story is not None:
-            write_json(self.folder / RUN, self._story | ending)
+        self._broken_off("interrupted", Interrupted(self.last))
         for recorder in self._recorders:
             recorder.__exit__()
+
+    def _broken_off(self, reason: str, error: BaseException) -> None:
+        told = {"kind": type(error).__name__, "time": self.last, "message": str(error)}
+        ending = {"end": {"reason": reason, "time": self.last}, "fault": told}
+        if self.published and self._story is not None:
+            write_json(self.folder / RUN, self._story | ending)
 
 
 def _has_rows(folder: Path) -> bool:
