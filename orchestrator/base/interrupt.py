@@ -28,6 +28,11 @@ _count = 0
 _holding = False
 
 
+def came() -> bool:
+    """Whether a signal has come since they are held."""
+    return _count > 0
+
+
 def check(time: float | None = None) -> None:
     """Raises Interrupted, at the simulated `time` (s), where a signal has come."""
     if _count:

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import overload
+
+from hapticlink.orchestrator.base.frames import Frames
 
 
 def exact(number: int | float | str) -> Fraction:
@@ -26,30 +27,6 @@ def exact(number: int | float | str) -> Fraction:
     if len(text) > 50 or re.search(r"[eE][+-]?\d{4}", text):
         raise ValueError(f"{text[:50]!r}: too long a number")
     return Fraction(text)
-
-
-class Frames(Sequence[int]):
-    """`at(0)` to `at(count - 1)`, made when they are asked for: a run may be of any length. The
-    spacing comes round after `round` of them."""
-
-    def __init__(self, at: Callable[[int], int], count: int, round: int) -> None:
-        self._at, self._count, self.round = at, count, round
-
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, i: int) -> int: ...
-    @overload
-    def __getitem__(self, i: slice) -> tuple[int, ...]: ...
-    def __getitem__(self, i: int | slice) -> int | tuple[int, ...]:
-        if isinstance(i, slice):
-            return tuple(map(self._at, range(self._count)[i]))
-        return self._at(range(self._count)[i])
-
-    def times(self, factor: int) -> Frames:
-        at = self._at
-        return Frames(lambda i: at(i) * factor, self._count, self.round)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from itertools import groupby
 from hapticlink.orchestrator.base.ticks import Clock
 from hapticlink.orchestrator.plan.operations import Event, Operation, Repeat
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import comes_round, uses
+from hapticlink.orchestrator.plan.sample_ages import comes_round
+from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.system.system import System
 
 LEGEND = """\

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import (
     Clock,
-    Frames,
     Timeline,
     aligned,
     common_base,

@@ -12,8 +12,9 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Get, Record, Set, Step
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import Delay, comes_round, delays, uses
+from hapticlink.orchestrator.plan.sample_ages import Delay, comes_round, delays
 from hapticlink.orchestrator.plan.schemes import SCHEMES
+from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline as timeline_of
 from tests.orchestrator.systems import connected

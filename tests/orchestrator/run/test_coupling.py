@@ -17,7 +17,8 @@ from hapticlink.orchestrator import experiment
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault, SceneFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import delays, uses
+from hapticlink.orchestrator.plan.sample_ages import delays
+from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged

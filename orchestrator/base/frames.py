@@ -1,0 +1,30 @@
+"""Instants of a rate, by their number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import overload
+
+
+class Frames(Sequence[int]):
+    """`at(0)` to `at(count - 1)`, made when they are asked for: a run may be of any length. The
+    spacing comes round after `round` of them."""
+
+    def __init__(self, at: Callable[[int], int], count: int, round: int) -> None:
+        self._at, self._count, self.round = at, count, round
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, i: int) -> int: ...
+    @overload
+    def __getitem__(self, i: slice) -> tuple[int, ...]: ...
+    def __getitem__(self, i: int | slice) -> int | tuple[int, ...]:
+        if isinstance(i, slice):
+            return tuple(map(self._at, range(self._count)[i]))
+        return self._at(range(self._count)[i])
+
+    def times(self, factor: int) -> Frames:
+        at = self._at
+        return Frames(lambda i: at(i) * factor, self._count, self.round)
