@@ -39,7 +39,7 @@ def test_explain_tells_blocks_and_the_samples_behind_inputs(
 def test_a_run_keeps_what_explain_prints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["--set", "duration=0.05", "--set", "graphics.rate={min=20, max=60, seed=2}"]
+    options = ["--set", "duration=0.2", "--set", "graphics.rate={min=20, max=60, seed=2}"]
     told = []
     for how in (["--explain"], ["--out", str(tmp_path)]):
         with pytest.raises(SystemExit, match="0"):

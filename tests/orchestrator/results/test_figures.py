@@ -48,13 +48,13 @@ def test_obstacles_and_the_force_of_contacts_are_drawn(tmp_path: Path) -> None:
     F = found.haptics["virtual_mechanism.F_env"]
     assert force == pytest.approx((F[:, 0] ** 2 + F[:, 1] ** 2) ** 0.5)
     assert force.max() > 0
-    enclosed = drawn(run("enclosure", tmp_path, "duration=0.05"))
+    enclosed = drawn(run("enclosure", tmp_path, "duration=0.2"))
     (walls,) = enclosed["trajectories"].patches
     assert walls.get_xy()[:4].min(axis=0) == pytest.approx((-30, -45))
 
 
 def test_every_hand_s_point_is_drawn(tmp_path: Path) -> None:
-    found = run("two-hands", tmp_path, "duration=0.1")
+    found = run("two-hands", tmp_path, "duration=0.5")
     left = drawn(found)["trajectories"].lines[1]
     assert left.get_label() == "point left"
     expected = found.haptics["virtual_mechanism.left.x"][:, 0] * 1e3

@@ -8,6 +8,10 @@ import pytest
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results.tables import Table
+
+TOUCHED = "duration=0.6"
+"""By then the hand has moved a link to the wall."""
 
 
 @pytest.mark.parametrize(
@@ -37,12 +41,16 @@ def test_what_is_refused(scene: str, option: str, message: str) -> None:
         open_scene.load(scene, [option])
 
 
-def test_the_hand_feels_the_wall_and_the_link_stays_out_of_it(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def walls(tmp_path_factory: pytest.TempPathFactory) -> Table:
+    """The haptic rows of `enclosure`, whose contacts are detected at the graphics rate."""
+    return simulate("enclosure", tmp_path_factory.mktemp("walls"), [TOUCHED]).results.haptics
+
+
+def test_the_hand_feels_the_wall_and_the_link_stays_out_of_it(tmp_path: Path, walls: Table) -> None:
     """Against a run without walls: the force of the walls turns the motion around."""
-    options = ["duration=0.6"]
-    walls = simulate("enclosure", tmp_path / "walls", options).results.haptics
     alone = ["controller.contact=false", "contacts.enclosure=[[-1,-1],[1,-1],[1,1],[-1,1]]"]
-    free = simulate("enclosure", tmp_path / "free", [*options, *alone]).results.haptics
+    free = simulate("enclosure", tmp_path, [TOUCHED, *alone]).results.haptics
     gap, F = walls["virtual_mechanism.contact_gap"], walls["virtual_mechanism.F_env[1]"]
     assert gap.min() < 0
     assert gap.min() > -0.5e-3  # less than 15000 N/m x 0.5 mm
@@ -51,16 +59,14 @@ def test_the_hand_feels_the_wall_and_the_link_stays_out_of_it(tmp_path: Path) ->
     assert free["virtual_mechanism.x[1]"].max() > walls["virtual_mechanism.x[1]"].max() + 2e-3
 
 
-def test_detection_at_the_graphics_rate_is_near_that_at_the_haptic_rate(tmp_path: Path) -> None:
-    runs = [
-        simulate("enclosure", tmp_path / d, ["duration=0.6", f"contacts.detection={d}"])
-        for d in ("graphics", "haptics")
-    ]
-    x = [
-        np.column_stack([r.results.haptics[f"virtual_mechanism.x[{i}]"] for i in (1, 2)])
-        for r in runs
-    ]
-    assert np.abs(x[0] - x[1]).max() < 1e-4
+def test_detection_at_the_graphics_rate_is_near_that_at_the_haptic_rate(
+    tmp_path: Path, walls: Table
+) -> None:
+    assert open_scene.load("enclosure").contacts.detection == "graphics"
+    options = [TOUCHED, "contacts.detection=haptics"]
+    near = simulate("enclosure", tmp_path, options).results.haptics
+    x, there = (run["virtual_mechanism.x"][:, :2] for run in (walls, near))
+    assert np.abs(x - there).max() < 1e-4
 
 
 def test_a_second_hand_holds_its_point(tmp_path: Path) -> None:

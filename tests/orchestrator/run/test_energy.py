@@ -129,7 +129,7 @@ def test_a_hold_that_cannot_work_is_refused_with_a_reason(
 
 
 def test_a_default_falls_back_where_it_does_not_fit(tmp_path: Path) -> None:
-    options = ["hold=foh-derivative", "duration=0.1"]
+    options = ["hold=foh-derivative", "duration=0.2"]
     run = simulate("closed-loop-direct", tmp_path, options).results.run
     assert run["holds"]["virtual_mechanism.x -> controller.x_S"] == "foh-derivative"
     assert run["holds"]["virtual_mechanism.P_c -> controller.P_c"] == "zoh"

@@ -14,7 +14,7 @@ from tests.orchestrator.foreign_fmus import python_fmu, run, scene
 
 COMMAND = [sys.executable, "-m", "hapticlink.orchestrator"]
 ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
-SHORT = ("--set", "duration=0.05")
+SHORT = ("--set", "duration=0.2")
 ROCKER = "linkage.start.rocker=2.9"
 FAR = 'linkage.operational_point={ body = "link2", at = [0.9, 0.0] }'
 

@@ -109,7 +109,7 @@ def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(
         return library
 
     monkeypatch.setattr("hapticlink.fmus.native.archive.compile_library", compiled)
-    scene = open_scene.load("five-bar", ("packaging=native",))
+    scene = open_scene.load("pendulum", ("packaging=native",))
 
     def built(*platforms: str) -> Path:
         return fmu_files(scene, timeline(scene), tmp_path, platforms)["virtual_mechanism"]

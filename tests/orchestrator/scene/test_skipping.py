@@ -14,7 +14,7 @@ from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system.costs import costs
 from hapticlink.orchestrator.system.timeline import timeline
 
-SHORT = "duration=0.15"
+SHORT = "duration=0.2"
 
 
 def haptics(scene: str, folder: Path, *options: str) -> Table:

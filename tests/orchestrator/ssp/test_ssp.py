@@ -37,7 +37,7 @@ def export(source: str, folder: Path, *options: str) -> Path:
 def test_a_shipped_scene_comes_back_to_the_bit(
     tmp_path: Path, name: str, options: tuple[str, ...]
 ) -> None:
-    options = ("duration=0.25", *options)
+    options = ("duration=0.2", *options)
     flags = [text for option in options for text in ("--set", option)]
     path = export(name, tmp_path, *flags)
     simulate(name, tmp_path / "a", options)
