@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hapticlink.orchestrator.commands.options import Out, Scene, Set
+from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.results.summary import MECHANISM
-from hapticlink.orchestrator.run.open_fmus import KINDS
 from hapticlink.orchestrator.system.system import System
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def at_start(system: System) -> dict[str, float]:
     if fmu is None:
         return {}
     outputs = np.zeros(len(fmu.description.outputs))
-    made = KINDS[fmu.description.fmi](MECHANISM, fmu.description, outputs, fmu.starts)
+    made = IN_PROCESS[fmu.description.fmi](MECHANISM, fmu.description, outputs, fmu.starts)
     with made as instance:
         instance.enter_initialization(1.0)
         instance.read()

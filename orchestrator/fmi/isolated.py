@@ -7,6 +7,7 @@ answered when somebody asks, so that several FMUs step at the same time (`rounds
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -37,6 +38,7 @@ class Isolated(Instance):
 
     def _load(self) -> None:
         self._pending: list[tuple[int, bytes]] = []
+        self._saved_time: dict[int, float] = {}
         self._process = Process("hapticlink.orchestrator.fmi.worker")
         what = (self.name, self.description, len(self.outputs), self.starts, self.policy)
         # The answer waits for `enter_initialization`: all FMUs of a run load at the same time.
@@ -82,7 +84,7 @@ class Isolated(Instance):
         self._process = None
         return FmuFault(self.name, f"its process {how}", self.time)
 
-    # --- the calls of Instance ------------------------------------------------------------
+    # --- the calls of a run ---------------------------------------------------------------
 
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
         return self._remote(self._ask("connect", list(scalars)), places)
@@ -132,7 +134,6 @@ class Isolated(Instance):
         self._send("step", time, end, size)
 
     def finish(self) -> None:
-        """Wait for the step. Raises its FmuFault."""
         outputs, fault, self.ended, self.step_time, self._smaller = self._answer()
         self._fresh = outputs if fault is None else FmuFault(self.name, *fault)
         self.time = self._until
@@ -147,7 +148,7 @@ class Isolated(Instance):
         self.time, self.ended = self._saved_time[slot], False
 
     def dismiss(self) -> None:
-        """Have the FMU closed; `close` waits for that, so that all of a run close together."""
+        """`close` waits for the FMU, so that all of a run close together."""
         process = self._process
         if process is None or self._dismissed:
             return
@@ -171,5 +172,5 @@ class Isolated(Instance):
             self._process = None
             if process is not None:
                 process.end()
-            super().close()
+            shutil.rmtree(self._folder, ignore_errors=True)
         return self._lost

@@ -16,7 +16,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.fmi.instance3 import Instance3
+from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
@@ -36,7 +36,7 @@ class Worker:
     def load(
         self, name: str, description: Any, outputs: int, starts: Any, policy: Any, folder: str
     ) -> None:
-        kind = {"2": Instance, "3": Instance3}[description.fmi]
+        kind = IN_PROCESS[description.fmi]
         self._instance = kind(name, description, np.zeros(outputs), starts, policy, folder)
         self.instance.__enter__()
 

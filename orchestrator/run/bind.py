@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 
-from hapticlink.orchestrator.fmi.isolated import Isolated
 from hapticlink.orchestrator.plan.operations import (
     Advance,
     Blend,
@@ -41,7 +40,7 @@ class Binder:
 
     def __init__(self, simulation: Simulation, calls: Callable[[Part], Sequence[Call]]) -> None:
         self._simulation, self._calls = simulation, calls
-        self._isolated = {n: i for n, i in simulation.instances.items() if isinstance(i, Isolated)}
+        self._isolated = {name: simulation.instances[name] for name in simulation.isolated}
         self.loops: dict[Repeat, FixedPoint] = {}
         self.advancers: dict[str, Advancer] = {}
 

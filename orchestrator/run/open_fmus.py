@@ -6,12 +6,10 @@ from collections.abc import Iterable
 
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
-from hapticlink.orchestrator.fmi.instance3 import Instance3
 from hapticlink.orchestrator.fmi.isolated import Isolated
+from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.run.python_modules import clashes
 from hapticlink.orchestrator.system.system import Fmu
-
-KINDS = {"2": Instance, "3": Instance3}
 
 
 def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
@@ -22,5 +20,5 @@ def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
 
 def instance(fmu: Fmu, outputs: Vector, policy: Faults, alone: bool) -> Instance:
     """The instance of `fmu`, not loaded yet, that fills `outputs`."""
-    made = Isolated if alone else KINDS[fmu.description.fmi]
+    made = Isolated if alone else IN_PROCESS[fmu.description.fmi]
     return made(fmu.name, fmu.description, outputs, fmu.starts, policy)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from hapticlink.orchestrator.fmi.isolated import Isolated
+from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Operation, Set, Step
 
 Call = Callable[[int], object]
@@ -17,7 +17,7 @@ Call = Callable[[int], object]
 def bound(
     operations: Iterable[Operation],
     bind: Callable[[Operation], Call],
-    isolated: Mapping[str, Isolated],
+    isolated: Mapping[str, Instance],
 ) -> list[Call]:
     """The calls of a block's operations, with a barrier after each group of concurrent steps."""
     calls: list[Call] = []
@@ -43,7 +43,7 @@ def bound(
     return calls
 
 
-def _finish(instances: list[Isolated]) -> Call:
+def _finish(instances: list[Instance]) -> Call:
     def finish(tick: int) -> None:
         for instance in instances:
             instance.finish()

@@ -7,7 +7,6 @@ from contextlib import ExitStack
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.fmi.isolated import Isolated
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.run_folder import RunFolder
@@ -52,8 +51,7 @@ class Simulation:
 
     def _dismiss(self) -> None:
         for made in self.instances.values():
-            if isinstance(made, Isolated):
-                made.dismiss()
+            made.dismiss()
 
     def start(self) -> None:
         """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and open

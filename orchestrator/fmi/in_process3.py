@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 from fmpy import fmi3
 
-from hapticlink.orchestrator.fmi.instance import WARNING, Instance, Vector, keep
+from hapticlink.orchestrator.fmi.in_process import WARNING, InProcess
+from hapticlink.orchestrator.fmi.instance import Vector
+from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.python_exit import release_at_exit
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 
-class Instance3(Instance):
+class InProcess3(InProcess):
     """An FMI 3.0 FMU."""
 
     def _instantiate(self) -> Any:

@@ -1,0 +1,264 @@
+"""An FMU in this process, whose values stand in shared arrays: FMI 2.0 here, what FMI 3.0 calls
+otherwise in `in_process3`.
+
+FMPy loads the library and instantiates; the calls of the loop go straight to the C functions,
+on pointers made once. Every status is checked, every output must be finite, and whatever the
+FMU logged goes into the error.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import sys
+import time as clock
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from fmpy import extract, fmi2
+
+from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
+from hapticlink.orchestrator.fmi import messages
+from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
+from hapticlink.orchestrator.fmi.input_derivatives import Varying
+from hapticlink.orchestrator.fmi.instance import Instance, Vector
+from hapticlink.orchestrator.fmi.python_exit import release_at_exit
+from hapticlink.orchestrator.fmi.retry import Retry, Saved
+from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
+from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
+from hapticlink.orchestrator.fmi.units import SAME
+from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
+
+STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
+
+
+class InProcess(Instance):
+    """An FMU of FMI 2.0 whose library is loaded into this process."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._retry: Retry | None = None
+        self._saved: dict[int, Saved] = {}
+        self._saved_time: dict[int, float] = {}
+        self._initialized = False
+        self._status = 0
+        self._slave: Any = None
+        self._key = messages.opened()
+
+    def _load(self) -> None:
+        before = os.getcwd()
+        try:
+            extract(str(self.description.path), self._folder)
+            self._slave = self._instantiate()
+        except Exception as error:  # FMPy raises bare Exception
+            said = str(error)
+            if said.startswith("Failed to instantiate"):
+                said = "its instantiation failed; its guid may not be that of its binary"
+            raise self._fault(f"could not be loaded: {said}", 0.0) from error
+        finally:
+            os.chdir(before)  # FMPy leaves it changed where a library cannot be loaded
+        self._gets = self._transfers("Get", self.description.outputs, self.outputs)
+        self._advance = self._stepper()
+        if self.policy.discard == "retry" and Retry.possible(self.description):
+            self._retry = Retry(self._slave, self.description.fmi, self._advance)
+            self._advance = self._retry.step
+
+    def _instantiate(self) -> Any:
+        slave = fmi2.FMU2Slave(
+            guid=self.description.guid,
+            modelIdentifier=self.description.identifier,
+            unzipDirectory=self._folder,
+            instanceName=self.name,
+        )
+        release_at_exit(slave.dll)
+        slave.instantiate(callbacks=messages.callbacks(self._key), loggingOn=True)
+        return slave
+
+    def _stepper(self) -> Callable[[float, float], int]:
+        """(time, size) -> status of a doStep."""
+        do_step, component = self._slave.dll["fmi2DoStep"], self._slave.component
+        do_step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+        # noSetFMUStatePriorToCurrentPoint: whoever can go back may be asked to.
+        forward = int("canGetAndSetFMUstate" not in self.description.flags)
+        ended = ended_in_discard(self._slave)
+
+        def advance(time: float, size: float) -> int:
+            status: int = do_step(component, time, size, forward)
+            if status == DISCARD and (end := ended(time)) is not None:
+                self._end(end)
+                return 0
+            return status
+
+        return advance
+
+    def _end(self, end: float) -> None:
+        """The FMU asks to end the simulation at `end` (s). Raises AsksToEnd where its step would
+        have gone on."""
+        time, size = self._stepping
+        if end < time + (1 - SHARE) * size:
+            what = f"asks to end the simulation at {end:.6g} s, within its step"
+            raise AsksToEnd(self.name, what, time, passing=True)
+        self.ended = True
+
+    def _transfers(self, verb: str, scalars: Sequence[Scalar], values: Vector) -> list[Transfer]:
+        return transfers(self._slave, self.description.fmi, verb, scalars, values)
+
+    # --- initialisation -------------------------------------------------------------------
+
+    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
+        order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
+        where = np.array([places[i] for i in order], dtype=np.intp)
+        conversions = [scalars[i].conversion for i in order]
+        plain = all(c == SAME for c in conversions)
+        factors = np.array([c.factor for c in conversions])
+        offsets = np.array([c.offset for c in conversions])
+        values, setting = self._setting([scalars[i] for i in order])
+
+        def set_from(board: Vector) -> None:
+            if self.ended:
+                return
+            board.take(where, out=values, mode="clip")  # "raise" would copy through a buffer
+            if not plain:
+                values.__imul__(factors).__iadd__(offsets)
+            try:
+                for call, name in setting:
+                    if (status := call()) > WARNING:
+                        raise self._failed(name, status)
+            except Unfit as why:
+                raise self._fault(str(why), self.time, repeatable=True) from None
+
+        return set_from
+
+    def connect_derivatives(
+        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
+    ) -> Callable[[Vector], None]:
+        varying = Varying(self._slave, scalars, orders, places)
+        if self._retry:
+            self._retry.renew = varying.renew
+
+        def set_from(board: Vector) -> None:
+            if not self.ended and (status := varying.set(board)) > WARNING:
+                raise self._failed(varying.name, status)
+
+        return set_from
+
+    def _setting(
+        self, scalars: Sequence[Scalar]
+    ) -> tuple[Vector, list[tuple[Callable[[], int], str]]]:
+        """(values of `scalars`, the named calls that set them)."""
+        values = np.zeros(len(scalars))
+        return values, [(t.call, t.name) for t in self._transfers("Set", scalars, values)]
+
+    def _set_starts(self) -> None:
+        numbers = [(s, v) for s, v in self.starts if not isinstance(v, str)]
+        if numbers:
+            set_from = self.connect([s for s, _ in numbers], range(len(numbers)))
+            set_from(np.array([float(v) for _, v in numbers]))
+        for scalar, text in self.starts:
+            if isinstance(text, str):
+                self._set_text(scalar.reference, text)
+
+    def _set_text(self, reference: int, text: str) -> None:
+        one = (ctypes.c_uint * 1)(reference), 1, (ctypes.c_char_p * 1)(text.encode())
+        self._call("fmi2SetString", *one)
+
+    def enter_initialization(self, stop_time: float) -> None:
+        self._call("fmi2SetupExperiment", False, 0.0, 0.0, True, stop_time)
+        self._set_starts()
+        self._call("fmi2EnterInitializationMode")
+
+    def exit_initialization(self) -> None:
+        self._call(f"fmi{self.description.fmi}ExitInitializationMode")
+        self._initialized = True
+        self._start_loop()
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        try:
+            getattr(self._slave, name)(self._slave.component, *arguments)
+        except Exception as error:
+            raise self._failed(name, getattr(error, "status", ERROR)) from error
+
+    # --- the loop -------------------------------------------------------------------------
+
+    def read(self) -> None:
+        for transfer in self._gets:
+            if (status := transfer.call()) > WARNING:
+                raise self._failed(transfer.name, status)
+
+    @property
+    def smaller_steps(self) -> int:
+        return self._retry.smaller if self._retry else 0
+
+    def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
+        return derivatives(self._slave, self.description, outputs, inputs)
+
+    def step(self, time: float, end: float, size: float) -> None:
+        self.time, self._stepping = time, (time, size)
+        if self.ended:
+            raise AsksToEnd(self.name, "has asked to end the simulation", time)
+        begin = clock.perf_counter()
+        status = self._advance(time, size)
+        self.step_time += clock.perf_counter() - begin
+        if status > WARNING:
+            do_step = f"fmi{self.description.fmi}DoStep"
+            raise self._failed(do_step, status, passing=status in (DISCARD, ERROR))
+        self.time = end
+
+    def finish(self) -> None:
+        """A step is over when `step` returns."""
+
+    def save(self, slot: int = 0) -> None:
+        if slot not in self._saved:
+            self._saved[slot] = Saved(self._slave, self.description.fmi)
+        if (status := self._saved[slot].save()) > WARNING:
+            raise self._failed(f"fmi{self.description.fmi}GetFMUstate", status)
+        self._saved_time[slot] = self.time
+
+    def rollback(self, slot: int = 0) -> None:
+        if (status := self._saved[slot].restore()) > WARNING:
+            raise self._failed(f"fmi{self.description.fmi}SetFMUstate", status)
+        self.time = self._saved_time[slot]
+        self._status, self.ended = 0, False
+
+    # --- ends -----------------------------------------------------------------------------
+
+    def _failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
+        self._status = max(self._status, status)
+        named = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
+        if status == DISCARD and self.policy.discard == "retry":
+            why = "in steps of 1/1024 too" if self._retry else Retry.why_not(self.description)
+            named += f" ({why})"
+        what = f"{call} returned {named}"
+        return self._fault(what, self.time, passing, repeatable=status == DISCARD)
+
+    def dismiss(self) -> None:
+        """Closing takes no time."""
+
+    def _said(self) -> list[str]:
+        return messages.newest(self._key)
+
+    def close(self) -> FmuFault | None:
+        """After a fatal fault the FMU is not called again."""
+        slave, self._slave = self._slave, None
+        fault = None
+        try:
+            if slave is not None and self._status < FATAL:
+                if self._retry is not None:
+                    self._retry.free()
+                for saved in self._saved.values():
+                    saved.free()
+                if self._status < ERROR and self._initialized:
+                    terminate = f"fmi{self.description.fmi}Terminate"
+                    status = slave.dll[terminate](ctypes.c_void_p(slave.component))
+                    fault = self._failed(terminate, status) if status > WARNING else None
+                if self._status < FATAL:
+                    slave.freeInstance()
+            return fault
+        finally:
+            messages.closed(self._key)
+            # pythonfmu puts resources/ on sys.path for good.
+            sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]
+            shutil.rmtree(self._folder, ignore_errors=True)

@@ -1,0 +1,49 @@
+"""What FMUs log, kept by the key of their instance."""
+
+from __future__ import annotations
+
+from itertools import count
+
+from fmpy import fmi2
+
+_messages: dict[int, list[str]] = {}
+_keys = count(1)
+
+
+def opened() -> int:
+    """The key of a new instance, whose messages are kept from now on."""
+    key = next(_keys)
+    _messages[key] = []
+    return key
+
+
+def keep(key: int, status: int, message: bytes) -> None:
+    """Keep what the FMU of instance `key` says; it is shown when a call fails."""
+    said = _messages.get(key)
+    if said is not None and status > 0:
+        said.append((message or b"").decode("utf-8", "replace").strip())
+
+
+def newest(key: int) -> list[str]:
+    return _messages.get(key, [])[-5:]
+
+
+def closed(key: int) -> None:
+    _messages.pop(key, None)
+
+
+def callbacks(key: int) -> fmi2.fmi2CallbackFunctions:
+    """What an FMI 2.0 FMU calls."""
+    made = fmi2.fmi2CallbackFunctions.from_buffer_copy(_CALLBACKS)
+    made.componentEnvironment = key
+    return made
+
+
+def _log(key: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:
+    keep(key or 0, status, message)
+
+
+_CALLBACKS = fmi2.fmi2CallbackFunctions()
+_CALLBACKS.logger = fmi2.fmi2CallbackLoggerTYPE(_log)
+_CALLBACKS.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+_CALLBACKS.freeMemory = fmi2.defaultCallbacks.freeMemory

@@ -1,0 +1,6 @@
+"""What opens an FMU in this process, by its FMI version."""
+
+from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.in_process3 import InProcess3
+
+IN_PROCESS = {"2": InProcess, "3": InProcess3}
