@@ -12,7 +12,7 @@ def declared() -> dict[str, str]:
     for record in (Device, Observer):
         for name, hint in typing.get_type_hints(record, include_extras=True).items():
             beside = getattr(hint, "__metadata__", ())
-            found |= {name: each.unit for each in beside if isinstance(each, Quantity)}
+            found.update((name, each.unit) for each in beside if isinstance(each, Quantity))
     return found
 
 
