@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from hapticlink.components.blocks import BLOCKS
@@ -15,15 +16,22 @@ if TYPE_CHECKING:
     from hapticlink.components.component import Component
 
 Settings = Mapping[str, Any]
+Starts = Mapping[str, tuple[float, ...]]
+"""By parameter, one value an entry."""
 Packaging = Literal["python", "native"]
 
 
-def component(name: str, settings: Settings, step_size: float) -> Component:
-    """The block `name` of `settings`. Raises FmuError where they give no component."""
+def component(
+    name: str, settings: Settings, step_size: float, starts: Starts = MappingProxyType({})
+) -> Component:
+    """The block `name` of `settings`; `starts` go before the start values of its parameters.
+    Raises FmuError where they give no component."""
     try:
-        return BLOCKS[name](step_size, **settings)
+        made = BLOCKS[name](step_size, **settings)
     except (ValueError, ArithmeticError) as error:
         raise FmuError(f"{name}: {error}") from error
+    parameters = tuple(replace(p, start=starts.get(p.name, p.start)) for p in made.parameters)
+    return replace(made, parameters=parameters)
 
 
 def build_block(
@@ -35,18 +43,19 @@ def build_block(
     step_size: float,
     packaging: Packaging = "python",
     platforms: Sequence[str] = (),
+    starts: Starts = MappingProxyType({}),
 ) -> Path:
     """The path of the block's FMU: in the cache, or made in `room` where the cache is off.
 
-    settings are the block's own, by name; step_size (s) is its communication step. platforms are
-    those of a native FMU, this machine's where none is named.
+    settings are the block's own, by name, and `starts` of its parameters; step_size (s) is its
+    communication step. platforms are those of a native FMU, this machine's where none is named.
     """
     experiment = {"stop_time": stop_time, "step_size": step_size}
 
     def make(folder: Path) -> Path:
         from hapticlink.fmus.build import build, build_native
 
-        made = component(name, settings, step_size)
+        made = component(name, settings, step_size, starts)
         if packaging == "python":
             return build(made, folder, **experiment)
         return build_native(made, folder, platforms=platforms, **experiment)
@@ -58,6 +67,8 @@ def build_block(
         "settings": {k: asdict(v) if is_dataclass(v) else v for k, v in settings.items()},  # type: ignore[arg-type]
         **experiment,
     }
+    if starts:
+        material["starts"] = dict(starts)
     if packaging == "native":
         from hapticlink.fmus.native.compiler import compiler_version, host_platform
 

@@ -10,6 +10,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.run import start_parameters
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -27,6 +28,9 @@ def build(
 ) -> dict[str, Path]:
     """Build the FMUs of a scene into the folder `out`: the file `<block>.fmu` of each block.
 
+    Each starts where the scene does: a parameter that a connection of the scene sets once (the
+    device's `x_start`) has the value that it carries as its start.
+
     `all_platforms` compiles native FMUs for Linux, Windows and macOS, not for this machine alone.
     Raises InputFault where there is nothing to build, or `out` cannot be written to.
     """
@@ -36,21 +40,28 @@ def build(
     if not blocks(read):
         raise InputFault(f"{read.title}: nothing to build: its FMUs are given as files")
     folder = folders.made(out)
+    starts = _starts(read)
     with temporary_folders.room() as room:
-        files = fmu_files(read, timeline(read), room, PLATFORMS if all_platforms else ())
+        platforms = PLATFORMS if all_platforms else ()
+        files = fmu_files(read, timeline(read), room, platforms, starts)
         return {
             name: Path(shutil.copy(path, folder / f"{name}.fmu")) for name, path in files.items()
         }
 
 
 def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path) -> Path:
-    """Write a scene as the SSP `out`: FMUs and connections for other tools; rates and holds, which
-    the standard does not know, in an annotation. `run` reads it back.
+    """Write a scene as the SSP `out`: FMUs, connections and start values for other tools; rates and
+    holds, which the standard does not know, in an annotation. `run` reads it back.
 
     Raises InputFault for a scene that cannot be run, or where `out` cannot be written.
     """
     from hapticlink.orchestrator.ssp import write  # its XML parsers take a while to load
 
     read = open_scene.load(scene, options)
-    with built(read) as system:
-        return write.write(read, system, Path(out))
+    with built(read, _starts(read)) as system:
+        return write.write(read, start_parameters.settled(system), Path(out))
+
+
+def _starts(scene: Scene) -> dict[str, dict[str, tuple[float, ...]]]:
+    with built(scene) as system:
+        return start_parameters.by_port(system)

@@ -51,7 +51,10 @@ def tables(path: Path) -> dict[str, Any]:
         wires = Wires(path, system, described, defined)
         starts = Parameters(path, archive, wires).starts()
     rest = _annotation(path, root)
-    found: dict[str, Any] = {"title": root.get("name") or path.stem, **rest}
+    found: dict[str, Any] = {
+        "title": root.get("description") or root.get("name") or path.stem,
+        **rest,
+    }
     about = rest.get("fmu", {})
     found["fmu"] = [
         {"path": str(file), "start": starts[place], "name": names[place]}

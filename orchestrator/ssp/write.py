@@ -7,6 +7,7 @@ the standard does not know, stand in an annotation as JSON with the keys of a sc
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from dataclasses import fields
 from functools import partial
@@ -24,6 +25,7 @@ from hapticlink.orchestrator.scene.blocks import fmu_rates
 from hapticlink.orchestrator.scene.rates import AnyRate
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.ssp import step_sizes
 from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,
     FMU,
@@ -37,6 +39,15 @@ from hapticlink.orchestrator.ssp.names import (
 )
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
+PREFIXES = {
+    "ssd": SSD,
+    "ssc": SSC,
+    "ssv": SSV,
+    "osp": step_sizes.OSP,
+    "oms": step_sizes.OMS,
+    "hapticlink": RUN,
+}
+"""libcosim and Ecos know elements by prefixes, these ones, not by namespaces."""
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
@@ -44,7 +55,7 @@ def write(scene: Scene, system: System, target: Path) -> Path:
     """Write `target`, whole or not at all; the same scene gives the same bytes."""
     folders.made(target.parent)
     with atomic_file(target) as unfinished, zipfile.ZipFile(unfinished, "w") as archive:
-        _add(archive, STRUCTURE, structure(scene, system))
+        _add(archive, STRUCTURE, structure(scene, system, re.sub(r"\W|^(?=\d)", "_", target.stem)))
         for unit in system.fmus:
             _add(archive, f"resources/{unit.name}.fmu", unit.description.path.read_bytes())
     return target
@@ -56,15 +67,16 @@ def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
     archive.writestr(info, content, zipfile.ZIP_DEFLATED)
 
 
-def structure(scene: Scene, system: System) -> bytes:
-    """The text of SystemStructure.ssd."""
-    for prefix, space in (("ssd", SSD), ("ssc", SSC), ("ssv", SSV), ("hapticlink", RUN)):
+def structure(scene: Scene, system: System, name: str) -> bytes:
+    """The text of SystemStructure.ssd, of a system of this name."""
+    for prefix, space in PREFIXES.items():
         register_namespace(prefix, space)
-    root = Element(f"{{{SSD}}}SystemStructureDescription", version="1.0", name=scene.title)
+    about = {"version": "1.0", "name": name, "description": scene.title}
+    root = Element(f"{{{SSD}}}SystemStructureDescription", about)
     top = SubElement(root, f"{{{SSD}}}System", name="system")
     elements = SubElement(top, f"{{{SSD}}}Elements")
     for unit in system.fmus:
-        _component(elements, unit)
+        step_sizes.of_component(_component(elements, unit), system, unit)
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
     lines = [c for c in system.connections if not c.to_parameter]
     if lines:
@@ -80,8 +92,11 @@ def structure(scene: Scene, system: System) -> bytes:
             if wire and (wire.factor, wire.offset) != (1.0, 0.0):
                 linear = {"factor": repr(wire.factor), "offset": repr(wire.offset)}
                 SubElement(line, f"{{{SSC}}}LinearTransformation", linear)
+    step_sizes.of_system(top, system)
     _units(root, system)
-    SubElement(root, f"{{{SSD}}}DefaultExperiment", startTime="0.0", stopTime=repr(scene.duration))
+    times = {"startTime": "0.0", "stopTime": repr(scene.duration)}
+    experiment = SubElement(root, f"{{{SSD}}}DefaultExperiment", times)
+    step_sizes.of_experiment(experiment, system)
     annotations = SubElement(root, f"{{{SSD}}}Annotations")
     annotation = SubElement(annotations, f"{{{SSC}}}Annotation", type=ANNOTATION)
     SubElement(annotation, f"{{{RUN}}}Scene").text = json.dumps(_rest(scene, system), indent=1)
@@ -89,7 +104,7 @@ def structure(scene: Scene, system: System) -> bytes:
     return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
 
-def _component(elements: Element, unit: Fmu) -> None:
+def _component(elements: Element, unit: Fmu) -> Element:
     about = {"name": unit.name, "type": FMU, "source": f"resources/{unit.name}.fmu"}
     component = SubElement(elements, f"{{{SSD}}}Component", about, implementation="CoSimulation")
     shown = [s for s in unit.description.scalars if s.causality in ("input", "output", "parameter")]
@@ -110,6 +125,7 @@ def _component(elements: Element, unit: Fmu) -> None:
         for scalar, value in unit.starts:
             parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=scalar.name)
             SubElement(parameter, f"{{{SSV}}}{type_of(scalar.type)}", value=_text(scalar, value))
+    return component
 
 
 def _text(scalar: Scalar, value: bool | int | float | str) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from types import MappingProxyType
 
+from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.assemble import from_scene
@@ -14,11 +16,12 @@ from hapticlink.orchestrator.system.timeline import timeline
 
 
 @contextmanager
-def built(scene: Scene) -> Iterator[System]:
+def built(scene: Scene, starts: Mapping[str, Starts] = MappingProxyType({})) -> Iterator[System]:
     """The system of `scene`. Its FMU files are there within; those in the cache, later too.
+    `starts` by block go before the start values of its parameters.
 
     Raises InputFault where the settings give no FMU, SceneFault for what does not fit together.
     """
     with temporary_folders.room() as room:
         time = timeline(scene)
-        yield from_scene(scene, time, fmu_files(scene, time, room))
+        yield from_scene(scene, time, fmu_files(scene, time, room, starts=starts))

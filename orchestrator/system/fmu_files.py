@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-from hapticlink.fmus.blocks import build_block
+from hapticlink.fmus.blocks import Starts, build_block
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
@@ -24,11 +25,16 @@ def settled(scene: Scene, block: BlockPlan, timeline: Timeline) -> dict[str, Any
 
 
 def fmu_files(
-    scene: Scene, timeline: Timeline, room: Path, platforms: Sequence[str] = ()
+    scene: Scene,
+    timeline: Timeline,
+    room: Path,
+    platforms: Sequence[str] = (),
+    starts: Mapping[str, Starts] = MappingProxyType({}),
 ) -> dict[str, Path]:
     """Block name -> FMU file, from the cache, or made in `room` where the cache is off.
 
-    platforms are those of native FMUs, this machine's where none is named. Raises InputFault where
+    platforms are those of native FMUs, this machine's where none is named; `starts` by block go
+    before the start values of its parameters. Raises InputFault where
     the settings give no FMU (a loop that does not close).
     """
     files = {}
@@ -43,6 +49,7 @@ def fmu_files(
                 step_size=timeline.seconds(timeline.clock(timeline.of[block.name]).longest),
                 packaging=scene.packaging,
                 platforms=platforms,
+                starts=starts.get(block.name, {}),
             )
         except CompilerError as error:
             interrupt.check()  # Ctrl-C in a terminal ends the compiler too

@@ -1,0 +1,76 @@
+"""Parameters that connections set once, as start values: what other tools need, which know no
+connection to a parameter."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+
+from hapticlink.orchestrator.fmi.start_values import Given, Starts
+from hapticlink.orchestrator.fmi.units import SAME
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.run import open_fmus
+from hapticlink.orchestrator.run.initialize import initialize
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.system.system import System
+
+
+def settled(system: System) -> System:
+    """The system without the connections that act in initialisation only: each target starts with
+    the values that they carry once the FMUs of the system are initialised.
+
+    Raises FmuFault where an FMU fails or the values do not settle.
+    """
+    carried = _carried(system)
+    fmus = []
+    for fmu in system.fmus:
+        new = carried.get(fmu.name, ())
+        names = {scalar.name for scalar, _ in new}
+        kept = tuple(row for row in fmu.starts if row[0].name not in names)
+        fmus.append(replace(fmu, starts=kept + new))
+    connections = tuple(c for c in system.connections if not c.initial)
+    return replace(system, fmus=tuple(fmus), connections=connections)
+
+
+def by_port(system: System) -> dict[str, dict[str, tuple[float, ...]]]:
+    """What those connections carry, by FMU and parameter. Raises FmuFault as `settled` does."""
+    found: dict[str, dict[str, tuple[float, ...]]] = {}
+    for name, starts in _carried(system).items():
+        ports = found.setdefault(name, {})
+        for scalar, value in starts:
+            ports[scalar.port] = (*ports.get(scalar.port, ()), float(value))
+    return found
+
+
+def _carried(system: System) -> dict[str, Starts]:
+    once = [c for c in system.connections if c.initial]
+    if not once:
+        return {}
+    signals = _initialized(system)
+    found: dict[str, Starts] = {}
+    for c in once:
+        rows = zip(c.inputs, signals.values[signals.sources(c)].tolist(), strict=True)
+        taken = tuple((replace(s, conversion=SAME), _start(s, value)) for s, value in rows)
+        found[c.target] = found.get(c.target, ()) + taken
+    return found
+
+
+def _start(scalar: Scalar, value: float) -> Given:
+    value = scalar.conversion.factor * value + scalar.conversion.offset
+    if scalar.type in ("Real", "Float64", "Float32"):
+        return value
+    return bool(value) if scalar.type == "Boolean" else int(value)
+
+
+def _initialized(system: System) -> SignalVector:
+    """The signals of t = 0, of FMUs that are closed again."""
+    signals = SignalVector(system)
+    alone = open_fmus.isolated(system.fmus)
+    with ExitStack() as stack:
+        instances = {}
+        for fmu in system.fmus:
+            view = signals.values[signals.fmu(fmu.name)]
+            made = open_fmus.instance(fmu, view, system.faults, fmu.name in alone)
+            instances[fmu.name] = stack.enter_context(made)
+        initialize(system, instances, signals)
+    return signals

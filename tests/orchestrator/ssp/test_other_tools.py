@@ -1,0 +1,94 @@
+"""An exported SSP in other masters: what starts elsewhere or is read in another order shows."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy import read_model_description
+
+import hapticlink as hl
+
+STEPS = 128
+OPTIONS = {"coupling": "jacobi", "duration": STEPS / 512}
+PLANTS = {"haptic_device": ("x", "v"), "virtual_mechanism": ("q", "qd")}
+
+
+def exported(folder: Path, options: Mapping[str, object]) -> Path:
+    return hl.export("closed-loop", options, out=folder / "closed-loop.ssp")
+
+
+def test_libcosim_runs_two_rates_to_the_bytes_of_our_jacobi(tmp_path: Path) -> None:
+    """libcosim's fixed-step algorithm is Jacobi with inputs that stand between samples: all
+    outputs, of plants after their step, of sampled blocks after that of the next row."""
+    pytest.importorskip("libcosimpy")
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimObserver import CosimObserver
+
+    options = {**OPTIONS, "graphics.rate": 32}
+    with zipfile.ZipFile(exported(tmp_path, options)) as archive:
+        archive.extractall(tmp_path / "ssp")
+    ours = hl.run("closed-loop", options).haptics
+    execution = CosimExecution.from_ssp_file(ssp_path=str(tmp_path / "ssp"))
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    outputs = {}
+    for name in ("haptic_device", "virtual_mechanism", "controller", "hand"):
+        index = execution.slave_index_from_instance_name(name)
+        variables = execution.slave_variables(index)
+        known = {f"{name}.{v.name.decode()}": v.reference for v in variables}
+        outputs[name] = index, {k: r for k, r in known.items() if k in ours.columns}
+    assert sum(len(found) for _, found in outputs.values()) > 60
+    for step in range(STEPS):
+        assert execution.step()
+        for name, (index, found) in outputs.items():
+            row = step if name in ("controller", "hand") else step + 1
+            theirs = observer.last_real_values(index, list(found.values()))
+            assert theirs == [ours[column][row] for column in found], (name, step)
+
+
+@pytest.fixture
+def ecos() -> Iterator[object]:
+    """Its library asks for TBB's, which pip puts where no loader looks."""
+    for library in sorted(Path(sys.prefix, "lib").glob("libtbb.so.12")):
+        ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
+    try:
+        import ecospy
+    except (ImportError, OSError) as error:
+        pytest.skip(f"Ecos is not here: {error}")
+    return ecospy
+
+
+@pytest.mark.parametrize("parameters", [None, "start"])
+def test_ecos_runs_one_rate_to_the_bytes_of_our_jacobi(
+    tmp_path: Path, ecos: object, parameters: str | None
+) -> None:
+    """With and without the set of parameters, which Ecos applies where it is asked to."""
+    options = {**OPTIONS, "graphics.rate": 512}
+    path = exported(tmp_path, options)
+    ours = hl.run("closed-loop", options).haptics
+    columns = [c for c in ours.columns if c.partition("[")[0] in
+               {f"{fmu}.{port}" for fmu, ports in PLANTS.items() for port in ports}]  # fmt: skip
+    assert len(columns) == 14
+    names = [c.replace(".", "::", 1) for c in columns]
+    with ecos.EcosSimulation(step_size=1 / 512, ssp_path=str(path)) as simulation:  # type: ignore[attr-defined]
+        simulation.init(parameter_set=parameters)
+        for row in range(1, STEPS + 1):
+            simulation.step(1)
+            theirs = [simulation.get_real(name) for name in names]
+            assert theirs == [ours[c][row] for c in columns], row
+
+
+def test_built_fmus_start_where_the_scene_does(tmp_path: Path) -> None:
+    """The handle is where the mechanism's operational point is, in a tool that knows no scene."""
+    files = hl.build("closed-loop", {"linkage.start.shoulder1": 0.9}, out=tmp_path)
+    device = read_model_description(str(files["haptic_device"]))
+    starts = [float(v.start) for v in device.modelVariables if v.name.startswith("x_start[")]
+    run = hl.run("closed-loop", {"linkage.start.shoulder1": 0.9, "duration": 0.01})
+    np.testing.assert_array_equal(starts, run.haptics["virtual_mechanism.x"][0])
+    assert np.abs(starts).min() > 0.01
