@@ -16,7 +16,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 
 
 def settled(scene: Scene, block: BlockPlan, timeline: Timeline) -> dict[str, Any]:
-    """The settings of a block, with what the timeline says."""
+    """The settings of a block. A mechanism with a local model also gets the longest step of the
+    graphics copy, `frame_s` (s)."""
     if not scene.local_model or block.name != "virtual_mechanism":
         return block.settings
     frame = timeline.clock(timeline.of["virtual_environment"])
@@ -26,10 +27,11 @@ def settled(scene: Scene, block: BlockPlan, timeline: Timeline) -> dict[str, Any
 def fmu_files(
     scene: Scene, timeline: Timeline, room: Path, platforms: Sequence[str] = ()
 ) -> dict[str, Path]:
-    """Block name -> FMU file, from the cache, or made in `room` where the cache is off.
+    """The FMU file of each block by its name, from the cache, or built in `room` where the cache is
+    off.
 
-    platforms are those of native FMUs, this machine's where none is named. Raises InputFault where
-    the settings give no FMU (a loop that does not close).
+    platforms: those of native FMUs, by default this machine's. Raises InputFault where no FMU can
+    be built from the settings (a loop that does not close), Fault where the compiler fails.
     """
     files = {}
     for block in blocks(scene):
