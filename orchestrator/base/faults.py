@@ -1,26 +1,27 @@
-"""What can go wrong, and the exit status of each: 1 the run failed, 2 bad input."""
+"""Exceptions that are reported to the user, with exit status: 1 the run failed, 2 bad input."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hapticlink.components.registry import near as near  # told here too
+from hapticlink.components.registry import near as near  # re-exported
 from hapticlink.components.registry import unknown as unknown
 
 
 class Fault(Exception):
-    """A failure told to the user in one message, without a traceback.
+    """A failure that is reported in one message, without a traceback.
 
-    repeatable: the scene gives it again, anywhere and at any time; others come from the machine, as
-    a full disk or a process that was killed."""
+    repeatable: whether the same scene always fails with it; other faults come from the machine,
+    such as a full disk or a killed process.
+    """
 
     exit_status = 1
     repeatable = False
 
 
 class InputFault(Fault):
-    """Something the user wrote cannot be used."""
+    """Invalid input: something that the user wrote cannot be used."""
 
     exit_status = 2
     repeatable = True
@@ -28,8 +29,8 @@ class InputFault(Fault):
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault of a scene: where (dotted key), on which line or by which option, what. `file` is
-    that of a scene which this one extends."""
+    """One fault of a scene: dotted key, message, and the line or the option where it was written.
+    `file` is set for a key of a scene that this one extends."""
 
     key: str
     message: str
@@ -44,7 +45,7 @@ class Finding:
 
 
 class SceneFault(InputFault):
-    """A scene that is refused, with all its findings."""
+    """An invalid scene, with all findings."""
 
     def __init__(self, scene: str, findings: Sequence[Finding]) -> None:
         self.findings = tuple(findings)
@@ -53,10 +54,11 @@ class SceneFault(InputFault):
 
 
 class FmuFault(Fault):
-    """An FMU call that failed or a value that cannot be used; names FMU, call and time.
+    """A failed FMU call, or a value that cannot be used; names FMU, call and time.
 
-    passing: a smaller step from the state before may do (a step that failed without harm to the
-    FMU, FMI 2.0.5 section 4.2.2; an output that is not finite)."""
+    passing: whether a smaller step from the previous state may succeed (a step that was discarded,
+    FMI 2.0.5 section 4.2.2; an output that is not finite).
+    """
 
     def __init__(
         self,
@@ -69,16 +71,16 @@ class FmuFault(Fault):
     ) -> None:
         self.fmu, self.what, self.time, self.messages = fmu, what, time, tuple(messages)
         self.passing, self.repeatable = passing, repeatable
-        said = "".join(f"\n  {fmu} says: {m}" for m in messages)
-        super().__init__(f"{fmu}: {what} at t = {time:.6g} s{said}")
+        logged = "".join(f"\n  {fmu} says: {m}" for m in messages)
+        super().__init__(f"{fmu}: {what} at t = {time:.6g} s{logged}")
 
 
 class Diverged(FmuFault):
-    """A run that has left physics, though its numbers are finite."""
+    """A run that has diverged to values without physical meaning, though they are still finite."""
 
 
 class AsksToEnd(FmuFault):
-    """An FMU that asks to end the simulation within a step; nothing is wrong."""
+    """An FMU requests the end of the simulation within a step; this is no error."""
 
 
 class Interrupted(Fault):

@@ -1,4 +1,4 @@
-"""Instants of a rate, by their number."""
+"""The communication points of a rate as a lazy sequence."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import overload
 
 
 class Frames(Sequence[int]):
-    """`at(0)` to `at(count - 1)`, made when they are asked for: a run may be of any length. The
-    spacing comes round after `round` of them."""
+    """The ticks `at(0)` to `at(count - 1)`, computed when they are read, so that a long run needs
+    no memory for them. Their spacing repeats with the period `round`."""
 
     def __init__(self, at: Callable[[int], int], count: int, round: int) -> None:
         self._at, self._count, self.round = at, count, round
@@ -26,5 +26,6 @@ class Frames(Sequence[int]):
         return self._at(range(self._count)[i])
 
     def times(self, factor: int) -> Frames:
+        """The same instants in ticks that are shorter by `factor`."""
         at = self._at
         return Frames(lambda i: at(i) * factor, self._count, self.round)

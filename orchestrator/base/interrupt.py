@@ -1,10 +1,10 @@
-"""Ctrl-C and SIGTERM, held: never an exception in the middle of whatever runs, as that corrupts the
-process in an FMU's own code and is lost in an import.
+"""Deferred handling of Ctrl-C and SIGTERM: no exception is raised in the middle of a call, as it
+would corrupt the process within an FMU's own code, and be lost within an import.
 
-The first signal is counted, and asked for between two calls (`check`). A second one ends at once,
-wherever the process is: processes that were started are ended and what is open is told (`add`);
-then a command's process ends, and a caller from Python gets what it would have got without us,
-KeyboardInterrupt as a rule.
+The first signal is counted, and polled between two calls (`check`). A second one ends the work at
+once, wherever the process is: the actions registered by `add` end child processes and close what is
+open; then the process of a command ends, and a caller from Python gets what its own handler raises,
+usually KeyboardInterrupt.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any
 Action = Callable[[], object]
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE = 1.0
-"""Seconds for the main thread to take a second signal; in an FMU's endless loop it never does."""
+"""Time (s) for the main thread to handle a second signal; never enough in an endless loop."""
 
 _actions: list[Action] = []
 _count = 0
@@ -29,35 +29,36 @@ _holding = False
 
 
 def came() -> bool:
-    """Whether a signal has come since they are held."""
+    """Whether a signal has arrived since signals are deferred."""
     return _count > 0
 
 
 def check(time: float | None = None) -> None:
-    """Raises Interrupted, at the simulated `time` (s), where a signal has come."""
+    """Raises Interrupted, with the simulated `time` (s), if a signal has arrived."""
     if _count:
-        from hapticlink.orchestrator.base.faults import Interrupted  # signals are held before it
+        from hapticlink.orchestrator.base.faults import Interrupted  # loaded within `held`
 
         raise Interrupted(time)
 
 
 def add(action: Action) -> None:
-    """A second signal does `action`, until it is removed."""
+    """Registers an action for a second signal, until it is removed."""
     _actions.append(action)
 
 
 def remove(action: Action) -> None:
+    """Removes an action; does nothing if it is not registered."""
     with suppress(ValueError):
         _actions.remove(action)
 
 
 @contextmanager
 def held(end: Action | None = None, after: Any = None) -> Iterator[None]:
-    """Within, signals are held; where they are held already, and in other threads than the main
-    one, which get none, nothing changes. Those that were ignored before stay so.
+    """Defers signals within the context. Nested contexts and threads other than the main one, which
+    receive no signals, change nothing. Signals that were ignored before stay ignored.
 
-    end: what a second signal does last, in place of what it would have done before. after: the
-    handler of signals that come after, in place of the one before.
+    end: last action of a second signal, in place of the previous handler. after: handler that is
+    installed at the end, in place of the previous one.
     """
     global _count, _holding
     if _holding or threading.current_thread() is not threading.main_thread():
@@ -98,31 +99,31 @@ def _end(last: Action | None) -> None:
 
 @contextmanager
 def _watched(end: Action) -> Iterator[None]:
-    """A thread beside, which ends the process where the main thread never gets to its handler."""
-    told, tell = os.pipe()
-    os.set_blocking(tell, False)
-    before = signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
+    """A watchdog thread that ends the process where the main thread does not get to its handler."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    before = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
 
     def watch() -> None:
         count = 0
-        while number := os.read(told, 1):
+        while number := os.read(reading, 1):
             count += number[0] in SIGNALS
             if count > 1:
                 time.sleep(GRACE)
                 _end(end)
-        os.close(told)
+        os.close(reading)
 
     threading.Thread(target=watch, daemon=True).start()
     try:
         yield
     finally:
         signal.set_wakeup_fd(before)
-        os.close(tell)
+        os.close(writing)
 
 
 def end_process() -> None:
-    """The end of a command at a second signal."""
-    from hapticlink.orchestrator.base import temporary_folders  # signals are held before it
+    """Ends the process of a command at a second signal; removes its temporary folders."""
+    from hapticlink.orchestrator.base import temporary_folders  # loaded within `held`
 
     with suppress(Exception):
         temporary_folders.clear(os.getpid())

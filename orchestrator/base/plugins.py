@@ -1,4 +1,4 @@
-"""Modules that register parts of a user's own: integrators, forces, blocks, holds, schemes, ...
+"""Plugins: modules that register a user's own integrators, forces, blocks, holds, schemes, ...
 
 A module is named by `--plugin`, or by an installed distribution under [project.entry-points]
 "hapticlink.plugins"; importing it registers its parts.
@@ -19,12 +19,12 @@ from hapticlink.orchestrator.base.faults import InputFault
 
 GROUP = "hapticlink.plugins"
 PACKAGE = f"{Path(registry.__file__).parent.parent}{os.sep}"
-"""A fault of a module is told at a line of its own."""
+"""Folder of this package; an error in a plugin is reported at the last line outside of it."""
 
 
 def load(modules: Iterable[str]) -> None:
-    """Import modules, installed ones or files of the current folder. Raises InputFault for one that
-    is not there, fails, or registers nothing."""
+    """Import modules: installed ones or files of the current folder. Raises InputFault for one that
+    does not exist, fails, or registers nothing."""
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())  # last, so that no file here hides an installed module
     for module in modules:
@@ -33,7 +33,7 @@ def load(modules: Iterable[str]) -> None:
 
 @cache
 def load_installed() -> None:
-    """Import the modules that installed distributions name. Raises InputFault as `load`."""
+    """Import the modules that installed distributions declare. Raises InputFault as `load` does."""
     from importlib.metadata import entry_points  # slow to load
 
     for point in entry_points(group=GROUP):
@@ -41,9 +41,9 @@ def load_installed() -> None:
 
 
 def loaded() -> dict[str, dict[str, str | None]]:
-    """By module that has registered a part: its version, None where it has none, and the sha256 of
-    its sources."""
-    from hapticlink.fmus.cache import source  # which takes all of `fmus` with it
+    """Each module that has registered a part, with its version (None where it has none) and the
+    SHA-256 of its sources."""
+    from hapticlink.fmus.cache import source  # loads all of `fmus`
 
     return {
         name: {"version": _version(name), "sha256": source(name)} for name in registry.origins()

@@ -1,5 +1,5 @@
-"""Temporary folders that tell by their name whose they are, so that those of a process that has
-crashed can be removed by another."""
+"""Temporary folders named by machine and owner process, so that those of a crashed process can be
+removed by another one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from pathlib import Path
 
 
 def _prefix() -> str:
-    """hapticlink-<machine>-; on Linux a container is one, as process numbers are its own."""
+    """`hapticlink-<machine>-`; on Linux each container counts as a machine, since it has its own
+    process numbers."""
     machine = platform.node()
     with suppress(OSError):
         machine += os.readlink("/proc/self/ns/pid")
@@ -23,13 +24,14 @@ def _prefix() -> str:
 
 
 def new() -> str:
-    """A new temporary folder, the caller's to remove: hapticlink-<machine>-<process>-<random>."""
+    """Creates a temporary folder `hapticlink-<machine>-<process>-<random>`, which the caller has to
+    remove."""
     return tempfile.mkdtemp(prefix=f"{_prefix()}{os.getpid()}-")
 
 
 @contextmanager
 def room() -> Iterator[Path]:
-    """A temporary folder that is there within."""
+    """A temporary folder that exists within the context."""
     path = new()
     try:
         yield Path(path)
@@ -37,11 +39,11 @@ def room() -> Iterator[Path]:
         shutil.rmtree(path, ignore_errors=True)
 
 
-def clear(gone: int | None = None) -> None:
-    """Remove the folders of `new` whose process is gone: of this machine and this user only.
+def clear(ended: int | None = None) -> None:
+    """Removes temporary folders of processes that have ended, of this machine and user only.
 
-    gone: one that is, though it may not have been waited for. On Windows, which cannot be asked
-    for a process without harm to it, they stay.
+    ended: a process to treat as ended even if its parent has not waited for it yet. On Windows,
+    where asking whether a process exists may end it, nothing is removed.
     """
     if os.name != "posix":
         return
@@ -52,7 +54,7 @@ def clear(gone: int | None = None) -> None:
             if not found or not entry.is_dir(follow_symlinks=False):
                 continue
             owner, own = int(found[1]), entry.stat(follow_symlinks=False).st_uid == os.getuid()
-            if own and (owner == gone or not _lives(owner)):
+            if own and (owner == ended or not _lives(owner)):
                 shutil.rmtree(entry.path, ignore_errors=True)
 
 

@@ -18,10 +18,10 @@ from hapticlink.orchestrator.base.frames import Frames
 
 
 def exact(number: int | float | str) -> Fraction:
-    """The rational that a number is written as: 29.97 is 2997/100, "30000/1001" itself.
+    """The rational number that is written: 2997/100 for 29.97, 30000/1001 for "30000/1001".
 
-    Raises ValueError for what is no number, or one that takes too long to be written out (of more
-    than 50 characters or with an exponent of four digits), and ZeroDivisionError.
+    Raises ValueError for text that is no number, and for one of more than 50 characters or with an
+    exponent of four digits; ZeroDivisionError for a zero denominator.
     """
     text = str(number)
     if len(text) > 50 or re.search(r"[eE][+-]?\d{4}", text):
@@ -31,9 +31,9 @@ def exact(number: int | float | str) -> Fraction:
 
 @dataclass(frozen=True)
 class Clock:
-    """When the steps of a rate start, in ticks; each ends where the next starts.
+    """The communication points of a rate, in ticks: each starts a step and ends the one before.
 
-    The last entry ends a step at or after the end of the run.
+    The last one is at or after the end of the run.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Clock:
 
     @cached_property
     def _steps(self) -> list[int]:
-        """Every step there is (ticks), the first one first."""
+        """The step sizes (ticks) in order, up to where they repeat."""
         starts = self.starts
         if isinstance(starts, range):
             return [starts.step]
@@ -66,14 +66,14 @@ class Clock:
 
     @property
     def period(self) -> int | None:
-        """Of every step but the first, None where they vary."""
+        """Size of every step but the first (ticks); None where it varies."""
         return self.longest if self.longest == self.shortest else None
 
 
 @dataclass(frozen=True)
 class Timeline:
-    """The base (s), the last tick, and the clocks; the first clock is the haptic one. of: the name
-    of each FMU's clock."""
+    """All clocks on one base of time. base: a tick (s). end: the last tick. clocks: the haptic one
+    first. of: the name of each FMU's clock."""
 
     base: Fraction
     end: int
@@ -87,6 +87,7 @@ class Timeline:
         return lambda tick: tick * numerator / denominator
 
     def clock(self, name: str) -> Clock:
+        """The clock of that name."""
         return next(c for c in self.clocks if c.name == name)
 
 
@@ -99,8 +100,11 @@ def common_base(periods: Sequence[Fraction]) -> Fraction:
 def periodic(
     period: Fraction, base: Fraction, end: int, first: Fraction | None = None
 ) -> Sequence[int]:
-    """0, 1, 2, ... periods, to two past the end so that every step at the end has one; or 0,
-    `first` (s), and whole periods after that."""
+    """The ticks 0, 1, 2, ... periods (s), or 0, `first` (s) and then whole periods; they go on to
+    two periods past `end`, so that the last step of the run has an end.
+
+    Raises ValueError where the period or `first` is not a whole number of ticks.
+    """
     ticks = period / base
     if ticks.denominator != 1:
         raise ValueError(f"a period of {period} s is not a whole number of ticks of {base} s")
@@ -114,10 +118,10 @@ def periodic(
 
 
 def aligned(period: Fraction, base: Fraction, end: int, first: Fraction | None = None) -> Frames:
-    """Frame i at the first tick at or after i periods: ceil(i period / base); or at or after
-    `first` (s) and i - 1 periods.
+    """Frame i at the first tick at or after i periods, ceil(i period / base), or with `first` (s),
+    at or after `first` and i - 1 periods.
 
-    Raises ValueError for a period shorter than a tick: two frames would fall on one.
+    Raises ValueError for a period shorter than a tick, where two frames would fall on one tick.
     """
     if period < base:
         raise ValueError(f"{1 / period} Hz on ticks of {base} s: take align = 'exact'")
@@ -131,16 +135,17 @@ def aligned(period: Fraction, base: Fraction, end: int, first: Fraction | None =
 
 
 MOST_DRAWN = 1_000_000
-"""Periods, 100 MB and some seconds; at 60 Hz, 4.6 h."""
+"""Largest number of drawn periods: about 100 MB and some seconds; 4.6 h at 60 Hz."""
 
 
 def variable(
     slowest: Fraction, fastest: Fraction, seed: int, base: Fraction, end: int
 ) -> tuple[int, ...]:
-    """Whole-tick periods drawn uniformly between 1/fastest and 1/slowest (rates, Hz).
+    """Starts of steps (ticks) whose periods are drawn uniformly between 1/fastest and 1/slowest
+    (rates, Hz), in whole ticks, by numpy's PCG64 with `seed`.
 
-    The generator is numpy's PCG64 with `seed`. Raises ValueError where no whole number of
-    ticks lies between the bounds, and for more than MOST_DRAWN periods.
+    Raises ValueError where no whole number of ticks lies between the bounds, and where more than
+    MOST_DRAWN periods may be needed.
     """
     import numpy as np
 
@@ -160,9 +165,9 @@ def variable(
 
 
 def listed(times: Sequence[Fraction], base: Fraction) -> tuple[int, ...]:
-    """Frame times (s), each at the first tick at or after it; a first frame starts at 0.
+    """Starts of steps (ticks): 0, and the first tick at or after each of the times (s).
 
-    Raises ValueError where two fall on one tick or come in the wrong order.
+    Raises ValueError where two times fall on one tick or are not in order.
     """
     starts = [0]
     for time in times:

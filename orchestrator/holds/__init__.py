@@ -1,4 +1,4 @@
-"""What stands on an input between two samples of its source. One hold a file."""
+"""Holds: they give the value of an input between two samples of its source. One hold a file."""
 
 from __future__ import annotations
 

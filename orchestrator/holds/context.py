@@ -1,4 +1,4 @@
-"""Where a hold stands: what it may know besides the samples of its source."""
+"""The connection of a hold: what the hold may know besides the samples of its source."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HoldContext:
-    """size entries; `seconds` turns ticks into s.
+    """What a hold is constructed from.
 
-    displacement reads the target's displacement along the signal, so that
-    signal . d(displacement) is the power into the target (J); its sign is in it. velocity reads
-    its derivative, where the target puts it out. tank is
-    the spring that the signal sets, with 0 for its set position, 1 for its set velocity.
+    size: number of entries of the signal. seconds: converts ticks to s. displacement: reads the
+    displacement conjugate to the signal, with its sign, so that signal . d(displacement) is the
+    work done on the target (J). velocity: reads its time derivative, where the target has it as
+    an output. tank: the energy tank of the spring-damper that the signal sets, and the row of the
+    signal in it (0: set position, 1: set velocity).
     """
 
     size: int

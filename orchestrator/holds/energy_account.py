@@ -1,14 +1,14 @@
-"""The energy that a held effort generates, kept while it is held; `passive` and `nepce` act on it.
+"""Passivity observer: the energy that a held effort generates; base of `passive` and `nepce`.
 
-By axis, each held force paired with the displacement that follows it:
+By axis, each held force F_held paired with the displacement dx of the step that it acts over:
 
-made(t) = sum F_held dx - sum (F_{k-1} + F_k)/2 (x(t_k) - x(t_{k-1})) - F_n (x(t) - x(t_n))
+E(t) = sum F_held dx - sum (F_{k-1} + F_k)/2 (x(t_k) - x(t_{k-1})) - F_n (x(t) - x(t_n))
 
-The ideal source is straight in the displacement between samples, which is exact for a spring;
-what it does after the newest sample, t_n, is not known yet and taken as F_n's work. A sample that
-comes late is booked where the target stood at its stamp, x being straight between the target's
-steps: what `energy` measures, up to t_n. The part of a sample that is lost or overtaken nobody
-knows here.
+The ideal force is taken as linear in the displacement between samples (exact for a spring) and,
+after the newest sample t_n, as F_n, since later samples are not known yet. A delayed sample is
+paired with the target's position at its stamp, interpolated linearly between the target's steps.
+Up to t_n this equals what run/energy/meter.py measures, except for samples that are lost or
+overtaken, which the target never sees.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ Vector = NDArray[np.float64]
 
 
 def repayment(excess: Vector, motion: Vector, largest: Vector) -> Vector:
-    """The effort whose work on `motion` takes `excess` (J) away, each entry within +-largest.
+    """The effort that does the work -excess (J) over the displacement `motion`, by axis, limited to
+    +-largest; 0 where the target does not move.
 
     With v = motion/T it is alpha v, alpha = -excess/(T v^2): the series passivity controller of
     Hannaford & Ryu (IEEE Trans. Robotics and Automation 18, 2002).
@@ -36,12 +37,13 @@ def repayment(excess: Vector, motion: Vector, largest: Vector) -> Vector:
 
 
 class Account(Hold):
-    """The base of both holds: zero order, plus `correction` once for every tick that is asked for.
+    """Base of both holds: a zero-order hold plus `correction`, evaluated once at each tick read.
 
-    motion: the last displacement. straight, ahead: that of the step to come with the target's
-    velocity as it is, and as it has changed over the last step. largest of the last two samples;
-    swing, the most by which the mean of the source over samples that came together ever left one
-    that was the newest known while it acted.
+    By axis: motion, the displacement of the last step; predicted_steady and predicted, that of the
+    coming step at the target's present velocity, and with the acceleration of the last step as
+    well (m, rad); largest, the larger magnitude of the last two samples; swing, the running maximum
+    of the difference between the source's mean over an interval between stamps and a sample held
+    during it (N, N.m).
     """
 
     needs = "power"
@@ -54,47 +56,48 @@ class Account(Hold):
         self._stamp, self._tick = 0, -1
         self.sample = self._held = np.zeros(context.size)
         self._x = self._x_stamp = np.zeros(context.size)
-        self._path: deque[tuple[int, Vector]] = deque()  # from the newest stamp on
-        self._acted: deque[tuple[int, Vector]] = deque()  # until when a sample was the newest
-        self._late = False
+        self._path: deque[tuple[int, Vector]] = deque()  # (tick, x) since the newest stamp
+        self._held_until: deque[tuple[int, Vector]] = deque()  # (tick, sample held until then)
+        self._delayed = False
         self._work, self._ideal = np.zeros(context.size), np.zeros(context.size)
-        self.motion = self.straight = self.ahead = np.zeros(context.size)
+        self.motion = self.predicted_steady = self.predicted = np.zeros(context.size)
         self._v = self._gain = np.zeros(context.size)
         self._steps = 0
         self.largest, self.swing = np.zeros(context.size), np.zeros(context.size)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._new.append((stamp, sample.copy()))
-        self._late = arrival > stamp
+        self._delayed = arrival > stamp
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         if tick > self._tick or self._new:
             fresh = bool(self._new)
-            self._book(tick)
-            self._look(2 * ahead)
+            self._account(tick)
+            self._predict(2 * ahead)
             self._held = self.sample + self.correction(fresh)
         return self._held
 
     @property
-    def made(self) -> Vector:
-        """J by axis, until now."""
+    def generated(self) -> Vector:
+        """E(t), the energy generated until now (J), by axis."""
         return self._work - self._ideal - self.sample * (self._x - self._x_stamp)
 
     @property
     def travelled(self) -> Vector:
-        """Since the newest sample: the displacement, or where samples come late, so that several
-        may be under way, all of the path."""
-        if not self._late:
+        """Distance since the stamp of the newest sample, by axis: |x - x(t_n)|, or, where samples
+        are delayed and several may be in transit, the length of the path."""
+        if not self._delayed:
             return np.abs(self._x - self._x_stamp)
         corners = np.array([self._x_stamp, *(x for tick, x in self._path if tick > self._stamp)])
         return np.abs(np.diff(corners, axis=0)).sum(axis=0)
 
     def correction(self, fresh: bool) -> Vector:
-        """What is added to the newest sample until the next tick; `fresh` with a new one."""
+        """The effort added to the newest sample until the next tick; `fresh` when that sample is
+        new."""
         raise NotImplementedError
 
-    def _book(self, tick: int) -> None:
-        """The motion since the last tick, and of each new sample the ideal up to its stamp."""
+    def _account(self, tick: int) -> None:
+        """Adds the held work since the last tick, and the ideal work up to each new stamp."""
         x = self._displacement().copy()
         if self._tick < 0:
             self._x = self._x_stamp = x
@@ -107,40 +110,42 @@ class Account(Hold):
         if not self._path or tick > self._path[-1][0]:
             self._path.append((tick, x))
         if self._new:
-            self._acted.append((tick, self.sample))
+            self._held_until.append((tick, self.sample))
         for stamp, sample in self._new:
-            there = self._at(stamp)
-            self._ideal = self._ideal + (self.sample + sample) / 2 * (there - self._x_stamp)
+            x_stamp = self._position_at(stamp)
+            self._ideal = self._ideal + (self.sample + sample) / 2 * (x_stamp - self._x_stamp)
             self.largest = np.maximum(np.abs(sample), np.abs(self.sample))
             mean += (self.sample + sample) / 2 * (stamp - self._stamp)
-            self._stamp, self._x_stamp, self.sample = stamp, there, sample
+            self._stamp, self._x_stamp, self.sample = stamp, x_stamp, sample
         if self._stamp > passed:
             mean /= self._stamp - passed
-            for _, known in self._acted:
-                self.swing = np.maximum(self.swing, np.abs(mean - known))
-            while self._acted and (self._acted[0][0] <= self._stamp or not self._late):
-                self._acted.popleft()
+            for _, held in self._held_until:
+                self.swing = np.maximum(self.swing, np.abs(mean - held))
+            while self._held_until and (self._held_until[0][0] <= self._stamp or not self._delayed):
+                self._held_until.popleft()
         self._new.clear()
         self._tick, self._x = tick, x
 
-    def _at(self, stamp: int) -> Vector:
-        """Where the target stood; stamps never fall, so what lies before this one is forgotten."""
+    def _position_at(self, stamp: int) -> Vector:
+        """The target's position at `stamp`, interpolated linearly; drops the path before it, since
+        stamps never decrease."""
         path = self._path
         while len(path) > 1 and path[1][0] <= stamp:
             path.popleft()
-        (tick, x), (later, there) = path[0], path[min(1, len(path) - 1)]
+        (tick, x), (later, x_later) = path[0], path[min(1, len(path) - 1)]
         if stamp <= tick or later == tick:
             return x
-        return x + (there - x) * ((stamp - tick) / (later - tick))
+        return x + (x_later - x) * ((stamp - tick) / (later - tick))
 
-    def _look(self, step: float) -> None:
-        """Into the step to come, of `step` ticks and at least as long as the last."""
+    def _predict(self, step: float) -> None:
+        """Predicts the displacement of the coming step, of `step` ticks or the length of the last
+        one if that is longer. Without a velocity output, the last displacement is repeated."""
         if self._velocity is None:
-            self.straight = self.ahead = self.motion
+            self.predicted_steady = self.predicted = self.motion
             return
         v, step = self._velocity().copy(), max(step, self._steps)
         if self._steps:
             self._gain = (v - self._v) / self._steps
         self._v = v
-        self.straight = v * self._seconds(step)
-        self.ahead = self.straight + self._gain * (step / 2 * self._seconds(step))
+        self.predicted_steady = v * self._seconds(step)
+        self.predicted = self.predicted_steady + self._gain * (step / 2 * self._seconds(step))

@@ -1,4 +1,4 @@
-"""The energy that a spring-damper set by held samples has at hand; the law is in
+"""Energy tank of a spring-damper whose set position is held; the equations are in
 `passive_set_position`."""
 
 from __future__ import annotations
@@ -14,8 +14,12 @@ Vector = NDArray[np.float64]
 
 
 class EnergyTank:
-    """The account of one spring-damper, shared by the holds of its set position (row 0) and set
-    velocity (row 1). stiffness and damping by entry, `position` reads x, `period` is T (s)."""
+    """Available energy of one spring-damper, shared by the holds of its set position (row 0) and
+    set velocity (row 1).
+
+    stiffness, damping: K and B by entry. position: reads x. period: T (s), the longest step.
+    `newest` are the newest samples (2, n), `available` is A_k (J).
+    """
 
     def __init__(
         self,
@@ -28,16 +32,18 @@ class EnergyTank:
         self._stiffness, self._damping = stiffness, damping
         self._position, self._period, self._seconds = position, period, seconds
         self.newest = np.zeros((2, len(stiffness)))
-        self._given = self.newest.copy()
+        self._modulated = self.newest.copy()
         self._x = np.zeros(len(stiffness))
         self._tick, self.available = -1, 0.0
 
     def __deepcopy__(self, memo: dict[int, Any]) -> EnergyTank:
-        """Itself, since holds share it: who takes steps back keeps its `vars` beside theirs."""
+        """Returns the tank itself, as copied holds have to share it; a rollback therefore saves
+        and restores the tank's attributes beside those of the holds."""
         return self
 
-    def given(self, tick: int) -> Vector:
-        """Set position and set velocity that stand from `tick` on, the same all through it."""
+    def modulated(self, tick: int) -> Vector:
+        """Set position and set velocity (2, n) that apply from `tick` on; repeated calls at one
+        tick return the same values."""
         if tick > self._tick:
             x = self._position().copy()
             position, velocity = self.newest
@@ -46,18 +52,19 @@ class EnergyTank:
             if self._tick < 0:
                 self.available = stored
             else:
-                self._take_in(x, self._seconds(tick - self._tick))
+                self._update(x, self._seconds(tick - self._tick))
             needed = stored + self._period / 4 * float(self._damping @ velocity**2)
             if needed <= self.available:
-                self._given[:] = self.newest
+                self._modulated[:] = self.newest
             else:
                 share = math.sqrt(max(self.available, 0.0) / needed)
-                self._given[0], self._given[1] = x + share * error, share * velocity
+                self._modulated[0], self._modulated[1] = x + share * error, share * velocity
             self._tick, self._x = tick, x
-        return self._given
+        return self._modulated
 
-    def _take_in(self, x: Vector, seconds: float) -> None:
-        position, velocity = self._given
+    def _update(self, x: Vector, seconds: float) -> None:
+        """Adds the energy that the local side put in over the last step, A_{k+1} - A_k."""
+        position, velocity = self._modulated
         moved = x - self._x
         # V(x) - V(x_k) without the difference of two squares.
         spring = float((self._stiffness * moved) @ (self._x + moved / 2 - position))

@@ -1,8 +1,8 @@
 """First-order hold from the source's own derivative: y_n + yd_n s with s = t - t_n.
 
-Order 2, no delay at low frequency, right from the first sample, and deaf to the noise that a
-difference of samples amplifies. The source must put its derivative out too (v beside x): a
-sample is y, then yd (1/s of y's unit).
+Order 2 from the first sample on and no delay at low frequency; unlike `foh` it does not amplify
+noise by a difference of samples. The source must have its derivative as an output as well (v
+beside x): a sample is y followed by yd (unit of y per s).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Hermite: the cubic through the two newest samples and their derivatives.
+"""Cubic Hermite hold: the cubic through the two newest samples and their derivatives.
 
 With s = (t - t_{n-1})/H, H = t_n - t_{n-1}: h00 y_{n-1} + h10 H yd_{n-1} + h01 y_n + h11 H yd_n,
-h00 = (1 + 2 s)(1 - s)^2, h10 = s (1 - s)^2, h01 = s^2 (3 - 2 s), h11 = s^2 (s - 1). Order 4. Made
-for interpolation (coupling = "iterated"); extrapolated it amplifies more than second order. From
-one sample, the first-order hold of its derivative.
+h00 = (1 + 2 s)(1 - s)^2, h10 = s (1 - s)^2, h01 = s^2 (3 - 2 s), h11 = s^2 (s - 1). Order 4. Meant
+for interpolation (coupling = "iterated"); extrapolated it amplifies more than the second-order
+hold. With one sample it is the first-order hold from the derivative.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ class Hermite(Hold):
             return newest[:n] + newest[n:] * self._seconds(tick - stamp + ahead)
         before, first = self._samples[0]
         s, width = (tick - before + ahead) / (stamp - before), self._seconds(stamp - before)
-        kept, gone = (1 - s) * (1 - s), s * s
+        falling, rising = (1 - s) * (1 - s), s * s
         return (
-            (1 + 2 * s) * kept * first[:n]
-            + s * kept * width * first[n:]
-            + (3 - 2 * s) * gone * newest[:n]
-            + (s - 1) * gone * width * newest[n:]
+            (1 + 2 * s) * falling * first[:n]
+            + s * falling * width * first[n:]
+            + (3 - 2 * s) * rising * newest[:n]
+            + (s - 1) * rising * width * newest[n:]
         )

@@ -11,7 +11,7 @@ Vector = NDArray[np.float64]
 
 
 class History:
-    """At most `depth` samples, oldest first; a second sample of one stamp takes the place of the
+    """At most `depth` samples, oldest first; a second sample with the same stamp replaces the
     first."""
 
     def __init__(self, depth: int) -> None:
@@ -29,7 +29,7 @@ class History:
         return self._samples[index]
 
     def slope(self, index: int = -1) -> Vector:
-        """The backward difference at a sample, per tick; 0 where there is none before it."""
+        """The backward difference quotient at a sample, per tick; 0 for the oldest sample."""
         if len(self) + index < 1:
             return np.zeros_like(self[index][1])
         (before, first), (stamp, sample) = self[index - 1], self[index]

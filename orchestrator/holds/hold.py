@@ -1,4 +1,4 @@
-"""What every hold is."""
+"""The base class of holds: the contract that each of them fulfils."""
 
 from __future__ import annotations
 
@@ -14,41 +14,46 @@ Vector = NDArray[np.float64]
 
 
 class Hold(ABC):
-    """What stands on an input between two samples of its source. Times are ticks of the base.
+    """Gives the value of an input between two samples of its source. Times are in ticks.
 
-    At t = 0 it gets the source's initial output, stamped 0, before it is asked for a value; so it
-    does where samples come late. Nothing is known of the time before: until a second sample comes
-    that one is all that it can use. Where steps are taken back so is the hold, by a deep copy of
-    its attributes: all that it remembers is among them.
+    At t = 0 a hold receives the source's initial output, stamped 0, before its value is read, also
+    where samples are delayed. There is no sample of the time before: until the second one arrives,
+    the hold has only that. A rollback restores a hold from a deep copy of its attributes, so they
+    must contain its whole state.
     """
 
     needs: ClassVar[Literal["derivative", "power", "spring"] | None] = None
-    """derivative: samples are the signal and then its derivative (1/s of its unit). power: the
-    connection carries power, and the context reads the displacement that it works on. spring: the
-    connection sets a spring-damper, whose energy is the context's tank."""
+    """derivative: a sample is the signal followed by its time derivative (its unit per s). power:
+    the connection carries power, and the context reads the conjugate displacement. spring: the
+    connection sets a spring-damper, whose energy tank is in the context."""
     gives_samples: ClassVar[bool] = False
-    """Whether every value is one of the samples, unchanged, so that a matrix stays what it is."""
+    """Whether every value is one of the samples, unchanged, so that a matrix keeps its kind."""
     degree: ClassVar[int] = 0
-    """Of the polynomial in time that a value is within a step of the target; 0 where it stands."""
+    """Degree of the value as a polynomial in time within a step of the target; 0 if constant."""
     order: ClassVar[int] = 1
-    """Of the error over a run, between plants of one rate; step control goes by it."""
+    """Order of the global error between plants of one rate, which step control uses."""
     interpolates: ClassVar[bool] = False
-    """Whether it interpolates once it has the sample at the end of the step (`iteration`)."""
+    """Whether it interpolates once the sample of the step's end is known (coupling "iterated")."""
     downsamples: ClassVar[bool] = False
-    """Whether it may be a scene's `downsampling`, the default from a fast rate to a slow one."""
+    """Whether a scene may choose it as `downsampling`, the default from a fast to a slow rate."""
 
     @abstractmethod
     def __init__(self, context: HoldContext) -> None:
-        """With what is known of the connection; there is no sample yet."""
+        """Construct the hold from what is known of its connection; there is no sample yet."""
 
     @abstractmethod
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        """Take a sample that is true at `stamp` and known from `arrival` on; stamps never fall, and
-        a second sample of one stamp takes the place of the first. `sample` is only valid during
-        the call."""
+        """Take a sample of the instant `stamp` that the target knows from `arrival` on.
+
+        Stamps never decrease; a second sample with the same stamp replaces the first. `sample` is
+        a view that is valid only during the call: copy what is kept.
+        """
 
     @abstractmethod
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        """What the target reads at `tick` for the instant `tick + ahead`, made from samples
-        that are known at `tick`. `ahead` is half a step for a plant, which holds its inputs
-        over the step, and 0 for a sampled block."""
+        """The input for the instant `tick + ahead`, read by the target at `tick` and computed from
+        the samples known by then.
+
+        For a plant that holds its inputs constant over a step, `ahead` is half the step; for a
+        sampled block it is 0.
+        """

@@ -1,7 +1,7 @@
 """Half-step lead: y_n + (y_n - y_{n-1})/2, constant until the next sample.
 
-The first-order hold at the middle of a period: order 2 where the target takes a constant input,
-and no delay at low frequency. With one sample, that sample.
+The first-order hold evaluated at the middle of a period: order 2 where the target holds its inputs
+constant over the period, and no delay at low frequency. Zero-order until the second sample.
 """
 
 from __future__ import annotations

@@ -1,17 +1,17 @@
-"""What a signal is, where its entries must not be held each for itself.
+"""Holds on manifolds: signals whose entries cannot be extrapolated independently.
 
-projector: a symmetric square matrix of eigenvalues 0 and 1. Extrapolated, then taken to the
-nearest projector of the same rank, on the eigenvectors of the largest eigenvalues (Fan and
-Hoffman 1955). Samples of different rank are never mixed: the hold starts anew.
+projector: a symmetric matrix with eigenvalues 0 and 1. The extrapolated matrix is replaced by the
+nearest projector of the same rank, onto the eigenvectors of its largest eigenvalues (Fan and
+Hoffman 1955). When the rank changes, the hold starts anew from the new sample.
 
-semidefinite: symmetric with no negative eigenvalue (Lambda^-1, an inertia). Extrapolated, then
-its negative eigenvalues are set to 0, in coordinates scaled by the newest sample's diagonal, so
-that units do not matter.
+semidefinite: a symmetric matrix with no negative eigenvalue (Lambda^-1, an inertia). The negative
+eigenvalues of the extrapolated matrix are set to 0, in coordinates scaled by the newest sample's
+diagonal, so that the result does not depend on units.
 
-angle: entries in rad, deg or the like that an FMU wraps. Unwrapped by whole turns against the
-sample before.
+angle: an angle (rad, deg, ...) that its FMU wraps. Each sample is unwrapped by whole turns relative
+to the sample before.
 
-Holds that only ever give samples leave the matrices as they are.
+Matrices behind a hold that only returns samples (`gives_samples`) need none of this.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Vector = NDArray[np.float64]
 
 
 class Projector(Hold):
-    """A hold whose values are projectors of the rank of its newest sample."""
+    """Wraps a hold: its values are orthogonal projectors with the rank of the newest sample."""
 
     def __init__(self, make: Callable[[], Hold], size: int) -> None:
         self._make, self._n = make, math.isqrt(size)
@@ -43,12 +43,12 @@ class Projector(Hold):
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         extrapolated = self._hold.value(tick, ahead).reshape(self._n, self._n)
         vectors = np.linalg.eigh((extrapolated + extrapolated.T) / 2)[1]
-        resisted = vectors[:, self._n - self._rank :]
-        return (resisted @ resisted.T).ravel()
+        basis = vectors[:, self._n - self._rank :]
+        return (basis @ basis.T).ravel()
 
 
 class Semidefinite(Hold):
-    """A hold whose values are symmetric and have no negative eigenvalue."""
+    """Wraps a hold: its values are symmetric positive semidefinite matrices."""
 
     def __init__(self, make: Callable[[], Hold], size: int) -> None:
         self._n, self._hold = math.isqrt(size), make()
@@ -68,8 +68,8 @@ class Semidefinite(Hold):
 
 
 class Unwrapped(Hold):
-    """A hold of angles: `angles` are the places of the entries that wrap, `turn` what a turn is in
-    the unit of each."""
+    """Wraps a hold: `angles` are the indices of the entries to unwrap, `turn` a full turn in the
+    unit of each."""
 
     def __init__(
         self, make: Callable[[], Hold], angles: Sequence[int], turn: Sequence[float]

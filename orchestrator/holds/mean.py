@@ -1,10 +1,10 @@
-"""Mean over the slow step: what the source was on average since the target last asked,
+"""Mean of the source since the target last read it, for a fast source and a slow target:
 
-(1/(b - a)) integral from a to b of y dt, y straight between samples; a is the newest stamp of the
-last time, b the newest of now.
+(1/(b - a)) integral from a to b of y dt, y linear between samples; a is the newest stamp at the
+previous reading, b the newest stamp now.
 
-For a fast source and a slow target: what happens between two frames is not lost. Late by half a
-period beside the half of the hold itself; order 1. Where no sample came since, the value stays.
+What happens between two frames is not lost. Delayed by half a period in addition to the half
+period of the hold itself; order 1. Without a new sample the value does not change.
 """
 
 from __future__ import annotations

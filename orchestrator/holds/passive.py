@@ -1,32 +1,33 @@
-"""Passive hold: zero-order, and a friction that keeps the energy it makes from being positive.
+"""Passive hold: a zero-order hold with a friction that keeps the energy it generates at or below 0.
 
-F_held = F_n - beta sign(d) c, by axis, at every step of the target, with d its displacement over
-the step as it is foreseen, v T + dv T/2 (v its velocity, dv what it gained in the last step):
+F_held = F_n - beta sign(d) c, by axis, at every step of the target, with d its predicted
+displacement over the step, v T + dv T/2 (v its velocity, dv the change of v over the last step):
 
-c = max(0, r + P/D),    P = made + r |x - x(t_n)|,    D = |d| + |v| T where P <= 0, |d| where P > 0
+c = max(0, r + P/D),    P = E + r |x - x(t_n)|,    D = |d| + |v| T where P <= 0, |d| where P > 0
 
-made is the hold's energy (`account`), r the most by which the mean of the source between two
-bookings ever left the force that was held: the passivity observer. P is then the most that may
-turn out to have been made, and the controller, in series as that of Hannaford & Ryu (IEEE Trans.
-Robotics and Automation 18, 2002), keeps a reserve r D for the worst that the source may do over
-the next step. c is at most the larger of r and the last two samples.
+The passivity observer gives E, the energy generated (`energy_account`), and r, the running maximum
+of the difference between the source's mean between two stamps and the force held meanwhile. P is
+thus an upper bound of the energy generated once the samples to come are known. The series
+passivity controller after Hannaford & Ryu (IEEE Trans. Robotics and Automation 18, 2002) keeps a
+reserve r D for the worst case of the next step. c is at most the larger of r and the last two
+samples.
 
-Theorem. Let the displacement dx of each step go the way foreseen, |dx| <= D (so that beta = 1), and
-let the mean of the source leave F_n by at most r from t_n until the next sample is known. Then what
-is really made, m, is at most P, and a step adds at most (r - c) |dx|: where P <= 0,
-m' <= P + (r - c) |dx| <= 0; where P > 0, c >= r and m' <= m. Nothing is ever made. A larger swing
-than ever, R > r, makes at most (R - r) W until it is known, W the way from a stamp until then, so
-that m <= R W at any time. Each step outside the premises makes at most (R + C) |dx| on top, C the
-largest c.
+Theorem. Let the displacement dx of each step have the predicted sign and |dx| <= D (so that
+beta = 1), and let the mean of the source from t_n until the next sample is known differ from F_n by
+at most r. Then the energy really generated, m, is at most P, and a step adds at most (r - c) |dx|:
+where P <= 0, m' <= P + (r - c) |dx| <= 0; where P > 0, c >= r and m' <= m. So m <= 0 throughout. A
+difference R larger than the r so far generates at most (R - r) W until it is known, W the distance
+from a stamp until then, so that m <= R W at any time. Each step outside the premises generates at
+most (R + C) |dx| in addition, C the largest c.
 
-With a latency the premises reach over it: |x - x(t_n)| is then the whole way since t_n, as several
-samples may be under way, and W grows with it. What a sample that is lost or overtaken did nobody
-knows at the target: the theorem has none of those.
+With a latency the premises extend over it: |x - x(t_n)| is then the path length since t_n, as
+several samples may be in transit, and W grows with it. The theorem does not cover lost or overtaken
+samples, whose effect the target cannot know.
 
-No hold can do without such premises. made' - made = (F_held - mean) dx, and mean and dx come after
-F_held is chosen: whichever it is, even 0, one of mean = F_n +- r with one of dx = +-d makes r d or
-more, at every step. Where a step goes against what was foreseen, beta is halved (a friction that
-turns the target round is too large), and grows by a tenth a step after that.
+No hold is passive without such premises. m' - m = (F_held - mean) dx, and mean and dx are only
+determined after F_held is chosen: for any choice, even 0, one of mean = F_n +- r with one of
+dx = +-d generates r d or more, at every step. Where a step goes against the prediction, beta is
+halved (a friction that reverses the target is too large); after that it grows by a tenth a step.
 """
 
 from __future__ import annotations
@@ -41,15 +42,16 @@ class Passive(Account):
     def __init__(self, context: HoldContext) -> None:
         super().__init__(context)
         self.beta = np.ones(context.size)
-        self._foreseen = np.zeros(context.size)
+        self._last_predicted = np.zeros(context.size)
 
     def correction(self, fresh: bool) -> Vector:
-        turned = self.motion * self._foreseen < 0.0
-        self.beta = np.where(turned, self.beta / 2, np.minimum(1.1 * self.beta, 1.0))
-        self._foreseen = self.ahead
-        most = self.made + self.swing * self.travelled
-        way = np.abs(self.ahead) + np.where(most > 0.0, 0.0, np.abs(self.straight))
-        share = np.zeros_like(way)
-        np.divide(most, way, out=share, where=way > 0.0)
+        reversed_ = self.motion * self._last_predicted < 0.0
+        self.beta = np.where(reversed_, self.beta / 2, np.minimum(1.1 * self.beta, 1.0))
+        self._last_predicted = self.predicted
+        bound = self.generated + self.swing * self.travelled  # P
+        d = np.abs(self.predicted)
+        distance = d + np.where(bound > 0.0, 0.0, np.abs(self.predicted_steady))  # D
+        share = np.zeros_like(distance)
+        np.divide(bound, distance, out=share, where=distance > 0.0)
         friction = np.clip(self.swing + share, 0.0, np.maximum(self.swing, self.largest))
-        return -np.sign(self.ahead) * self.beta * friction
+        return -np.sign(self.predicted) * self.beta * friction

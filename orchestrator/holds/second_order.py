@@ -3,7 +3,7 @@
 y_n + d1 (t - t_n) + d2 (t - t_n)(t - t_{n-1}),  d1 = [y_n, y_{n-1}],  d2 = [y_n, y_{n-1}, y_{n-2}]
 
 with divided differences, so that periods may vary. Order 3; amplifies at most 2.83-fold, at
-omega H = 2.61. With two samples the first-order hold, with one that sample.
+omega H = 2.61. With two samples it is the first-order hold, with one the zero-order hold.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Smooth hold: continuous in value and slope (C1), late by a period H = t_n - t_{n-1}.
+"""Smooth hold: continuous in value and slope (C1), delayed by a period H = t_n - t_{n-1}.
 
-A cubic Hermite curve from where the hold stands when sample n arrives, with the slope it has
-there, to y_n with the slope (y_n - y_{n-1})/H, reached H later; after that a straight line on.
-With r = s/H and s the time since the arrival:
+A cubic Hermite curve from the held value w and slope w' at the arrival of sample n to y_n with the
+slope (y_n - y_{n-1})/H, which it reaches H later and continues as a straight line. With r = s/H and
+s the time since the arrival:
 
 w (1 + 2r)(1 - r)^2 + w' H r (1 - r)^2 + y_n r^2 (3 - 2r) + (y_n - y_{n-1}) r^2 (r - 1)
 
-Order 1. The first sample stands until the second arrives.
+Order 1. The first sample is held until the second arrives.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Smooth(Hold):
         return self._curve(tick + ahead)[0]
 
     def _curve(self, time: float) -> tuple[Vector, Vector]:
-        """Value and slope (per tick) at a time in ticks."""
+        """The value and the slope (per tick) at `time` (ticks)."""
         (before, first), (stamp, newest) = self._samples[0], self._samples[-1]
         if stamp == before:
             return newest.copy(), np.zeros_like(newest)
@@ -49,8 +49,8 @@ class Smooth(Hold):
         r = (time - self._arrival) / period
         if r >= 1.0:
             return newest + rise * (r - 1.0), rise / period
-        start, slope, back = self._from, self._slope * period, (1.0 - r) ** 2
-        curve = start * ((1 + 2 * r) * back) + slope * (r * back)
+        start, slope, falling = self._from, self._slope * period, (1.0 - r) ** 2
+        curve = start * ((1 + 2 * r) * falling) + slope * (r * falling)
         curve += newest * (r * r * (3 - 2 * r)) + rise * (r * r * (r - 1))
         tangent = (newest - start) * (6 * r * (1 - r)) + slope * ((1 - r) * (1 - 3 * r))
         tangent += rise * (r * (3 * r - 2))

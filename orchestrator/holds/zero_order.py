@@ -24,7 +24,7 @@ class ZeroOrder(Hold):
 
 
 class Latest(ZeroOrder):
-    """The same, by its name where a slow target reads a fast source."""
+    """The zero-order hold under the name that it has where a slow target reads a fast source."""
 
     interpolates = False
     downsamples = True

@@ -1,4 +1,4 @@
-"""From a scene to the FMUs of its blocks: which there are, of which settings, at which rate."""
+"""The blocks that a scene needs: which FMUs are built, with which settings, at which rate."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 
 @dataclass(frozen=True)
 class BlockPlan:
-    """A block that the scene asks for: its settings and its rate, which of the loop's own blocks is
-    "haptics" or "graphics"."""
+    """A block of the scene with its settings and its rate; "haptics" or "graphics" for blocks of
+    the haptic loop."""
 
     name: str
     rate: AnyRate
@@ -23,18 +23,21 @@ class BlockPlan:
 
     @property
     def made_by(self) -> str:
-        """Its name in `components.blocks.BLOCKS`."""
+        """The name in `components.blocks.BLOCKS` of the function that builds it."""
         return self.kind or self.name
 
 
 def blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
-    """All blocks that are built into FMUs: those of the loop, then those that [[fmu]] names."""
+    """All blocks that are built into FMUs: those of the haptic loop, then those of [[fmu]] tables.
+
+    skip=False includes what nothing in the scene uses.
+    """
     named = (BlockPlan(f.name, f.rate, dict(f.settings), f.block) for f in scene.fmu if f.block)
     return (*loop_blocks(scene, skip=skip), *named)
 
 
 def loop_blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
-    """The blocks of the haptic loop, in its order; skip=False with all that they can have."""
+    """The blocks of the haptic loop, in its order; skip=False includes what nothing uses."""
     if not skip:
         scene = unskipped(scene)
     found = []
@@ -73,15 +76,17 @@ def loop_blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
 
 
 def fmu_rates(scene: Scene) -> dict[str, AnyRate]:
-    """The rate of each FMU by its name: of the scene's blocks, then of [[fmu]]."""
+    """The rate of each FMU by its name: the scene's blocks, then those of [[fmu]]."""
     return {b.name: b.rate for b in blocks(scene)} | {f.name: f.rate for f in scene.fmu}
 
 
 def impedance(scene: Scene) -> bool:
+    """Whether the controller shapes the device's impedance."""
     return scene.controller is not None and scene.controller.impedance
 
 
 def topology(scene: Scene) -> bool:
+    """Whether the controller has a topology force F_T."""
     return scene.controller is not None and scene.controller.topology is not False
 
 
@@ -91,7 +96,8 @@ def mobility_from_graphics(scene: Scene) -> bool:
 
 
 def directions_from_graphics(scene: Scene) -> bool:
-    """Whether the virtual environment's P_c is used, or the scene asks to see directions."""
+    """Whether the virtual environment computes P_c: for the controller, or as an output that the
+    scene requests beside the mobility."""
     wanted = topology(scene) or (impedance(scene) and scene.mechanism.directions)
     return scene.directions_from == "graphics" and wanted
 
@@ -104,7 +110,7 @@ def contacts_from_graphics(scene: Scene) -> bool:
 
 
 def graphics_block(scene: Scene) -> list[str]:
-    """What the virtual environment is there for."""
+    """What the virtual environment computes for other blocks; empty where it is not needed."""
     reasons = {
         "Lambda_inv": mobility_from_graphics(scene),
         "P_c": directions_from_graphics(scene),
@@ -115,7 +121,7 @@ def graphics_block(scene: Scene) -> list[str]:
 
 
 def unskipped(scene: Scene) -> Scene:
-    """The scene whose mechanism puts out all that it can, with every pair of contacts."""
+    """The scene with all optional outputs of the mechanism and every pair of contacts."""
     contacts = scene.contacts and replace(scene.contacts, broad_phase=False)
     mechanism = replace(scene.mechanism, directions=True, diagnostics=True)
     return replace(scene, mechanism=mechanism, contacts=contacts)

@@ -19,7 +19,7 @@ _PATTERN = re.compile(r"\s*(\w+)\.([\w.]+(?:\[[\d,]+\])?)\s*(<=|>=|<|>)\s*(\S+)\
 
 @dataclass(frozen=True)
 class Condition:
-    """`fmu.variable comparison value`."""
+    """A comparison of a variable with a number: `fmu.variable comparison value`."""
 
     fmu: str
     variable: str
@@ -31,7 +31,7 @@ class Condition:
 
 
 def parse_condition(text: str) -> Condition:
-    """Raises ValueError, with an example, where `text` is no condition."""
+    """The condition that `text` writes. Raises ValueError, with an example, where it is none."""
     match = _PATTERN.fullmatch(text)
     try:
         if match is None or not math.isfinite(value := float(match[4])):

@@ -1,4 +1,4 @@
-"""The tables of a scene as it was meant: laid over those it extends, families written out."""
+"""Resolves `extends` and linkage families: a scene's tables merged over those it builds on."""
 
 from __future__ import annotations
 
@@ -17,20 +17,25 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Place, flatten, key_li
 
 @dataclass(frozen=True, kw_only=True)
 class SceneFile(Scene):
-    """Everything a run needs. A block is simulated where its table is present; a scene with nothing
-    but a [linkage] runs the mechanism alone."""
+    """A complete experiment. A block is simulated if its table is present; a scene with nothing but
+    a [linkage] runs the mechanism alone."""
 
     extends: str | None = None
-    """The scene over which this one's tables are laid: a shipped one by its name, or a path from
-    the file that says it. Tables merge key by key; arrays, and tables of another `type`, replace
-    those below."""
+    """The base scene, over which this one's tables are merged: the name of a shipped scene, or a
+    path relative to this file. Tables merge key by key; arrays, and tables of another `type`,
+    replace those of the base."""
 
 
 def document(
     text: str, name: str, folder: FilePath | None, above: tuple[str, ...] = (), file: str = ""
 ) -> tuple[dict[str, Any], dict[Path, Place]]:
-    """The tables of a scene, laid over those of the scene that it `extends`, and where each key
-    stands. `above` are the scenes that extend this one, `file` is its name to them."""
+    """The tables of a scene, merged over those of the scene that it `extends`, and the file and
+    line of each key.
+
+    folder: where relative paths start. above: the scenes that extend this one, the first one
+    first. file: the name by which they refer to this one. Raises SceneFault for text that is no
+    TOML, a base that cannot be read, and scenes that extend each other in a circle.
+    """
     try:
         data = tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
@@ -64,16 +69,16 @@ def document(
     if so_far[-1] in above:
         raise refuse(f"runs in a circle: {' -> '.join(so_far)}")
     below, below_places = document(found, base, where, so_far, base)
-    return _laid_over(below, data), _places_over(below_places, below, places, data)
+    return _merged(below, data), _merged_places(below_places, below, places, data)
 
 
-def _places_over(
+def _merged_places(
     base_places: Mapping[Path, Place],
     base: Mapping[str, Any],
     top_places: Mapping[Path, Place],
     top: Mapping[str, Any],
 ) -> dict[Path, Place]:
-    """Where the keys of `_laid_over(base, top)` stand: what `top` replaces stands there alone."""
+    """File and line of each key of `_merged(base, top)`: none in `base` of what `top` replaces."""
     replaced = set(_replaced(base, top))
     kept = {
         path: place
@@ -84,7 +89,7 @@ def _places_over(
 
 
 def _replaced(base: Mapping[str, Any], top: Mapping[str, Any], at: Path = ()) -> Iterator[Path]:
-    """The paths at which `top` takes the place of what `base` says."""
+    """The paths at which the value of `top` replaces that of `base` instead of merging."""
     for key, value in top.items():
         below = base.get(key)
         if isinstance(below, dict) and isinstance(value, dict) and _alike(below, value):
@@ -96,35 +101,36 @@ def _replaced(base: Mapping[str, Any], top: Mapping[str, Any], at: Path = ()) ->
 def with_family(
     data: dict[str, Any], name: str, places: Mapping[Path, Place], set_by: Mapping[Path, str]
 ) -> dict[str, Any]:
-    """The scene with a linkage's `family` and `n` written out as bodies, joints and loops."""
+    """The scene with a linkage's `family` and `n` expanded into bodies, joints and loops, over
+    which its other keys are merged. Raises SceneFault for an unknown family or a bad `n`."""
     linkage = data.get("linkage")
     if not isinstance(linkage, dict) or "family" not in linkage:
         return data
     try:
-        made = families.members(linkage)
+        expanded = families.members(linkage)
     except families.FamilyError as error:
         option = f"--set {set_by[error.path]}" if error.path in set_by else None
         file, line = place_of(error.path, places)
         finding = Finding(".".join(map(str, error.path)), error.message, line, option, file)
         raise SceneFault(name, [finding]) from None
-    said = {k: v for k, v in linkage.items() if k not in families.ARGUMENTS}
-    return {**data, "linkage": _laid_over(made, said)}
+    others = {k: v for k, v in linkage.items() if k not in families.ARGUMENTS}
+    return {**data, "linkage": _merged(expanded, others)}
 
 
-def _laid_over(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables merge key by key; anything else of `top`, and a table that names another `type`,
-    takes the place of the base's."""
+def _merged(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
+    """`top` over `base`: tables merge key by key; other values of `top`, and tables of another
+    `type`, replace those of `base`."""
     merged = dict(base)
     for key, value in top.items():
         below = base.get(key)
         if isinstance(below, dict) and isinstance(value, dict) and _alike(below, value):
-            value = _laid_over(below, value)
+            value = _merged(below, value)
         merged[key] = value
     return merged
 
 
 def tables_of(data: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
-    """The entries of [[key]] that are tables; what else stands there is told later."""
+    """The entries of [[key]] that are tables; anything else is reported by the schema."""
     entries = data.get(key)
     return [e for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
 
@@ -134,7 +140,7 @@ def _alike(below: Mapping[str, Any], table: Mapping[str, Any]) -> bool:
 
 
 def traced(data: Mapping[str, Any]) -> list[tuple[Path, dict[str, Any]]]:
-    """[graphics] and [[fmu]] tables that say `rate = { trace = FILE }`, with their paths."""
+    """The [graphics] and [[fmu]] tables with `rate = { trace = FILE }`, and their paths."""
     fmus = data.get("fmu")
     tables: list[tuple[Path, Any]] = [(("graphics",), data.get("graphics"))]
     tables += [(("fmu", i), f) for i, f in enumerate(fmus if isinstance(fmus, list) else ())]

@@ -1,6 +1,6 @@
 """Linkages that repeat a pattern: `family` and `n` of [linkage] become its bodies, joints, loops.
 
-What the table says besides is laid over what the family gives.
+The other keys of the table are merged over those of the family.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ MEMBERS = Quantity("1", ge=1, le=1000)
 @dataclass(frozen=True, kw_only=True)
 class FamilyLinkage(Linkage):
     """Bodies, a tree of joints, and the cut joints that close loops; or a family of linkages, over
-    which the other keys are laid."""
+    which the other keys are merged."""
 
     family: Annotated[str, FAMILIES.names()] | None = None
     """A linkage that repeats a pattern: n-four-bar."""
     n: Annotated[int, MEMBERS] | None = None
-    """How many members the family's linkage has."""
+    """Number of repetitions of the pattern."""
 
 
 class FamilyError(ValueError):
-    """An argument of a family that cannot be used: its path in the file, and a message."""
+    """An invalid `family` or `n`: its path in the file, and a message."""
 
     def __init__(self, key: str, message: str) -> None:
         self.path: Path = ("linkage", key)
@@ -40,8 +40,8 @@ class FamilyError(ValueError):
 
 
 def n_four_bar(n: int) -> dict[str, Any]:
-    """n square windows in a row: 2n + 1 uniform rods of 1 m and 1 kg, all parallel at the start,
-    the rockers upright with the tip of the first (B0) moving at 1 m/s in x.
+    """The tables of n square windows in a row: 2n + 1 uniform rods of 1 m and 1 kg. At the start
+    the rockers are upright and the tip of the first one (B0) moves at 1 m/s in x.
 
     Problem A02 of the IFToMM library of computational benchmark problems.
     """
@@ -85,7 +85,8 @@ FAMILIES: Registry[Callable[[int], dict[str, Any]]] = Registry("family", {"n-fou
 
 
 def members(arguments: dict[str, Any]) -> dict[str, Any]:
-    """The tables of the linkage that `family` and `n` name. Raises FamilyError."""
+    """The tables of the linkage that `family` and `n` select. Raises FamilyError for an unknown
+    family, or an `n` that is no whole number within its range."""
     family, n = str(arguments.get("family")), arguments.get("n")
     if family not in FAMILIES:
         raise FamilyError("family", FAMILIES.unknown(family))
@@ -95,5 +96,5 @@ def members(arguments: dict[str, Any]) -> dict[str, Any]:
 
 
 def is_argument(names: Path) -> bool:
-    """Whether a key of the scene says which linkage of which family it is."""
+    """Whether a dotted key is `linkage.family` or `linkage.n`."""
     return len(names) == 2 and names[0] == "linkage" and names[1] in ARGUMENTS

@@ -1,4 +1,4 @@
-"""Where scenes are: files, and those that come with the package."""
+"""Finds scenes: files, and those shipped with the package."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from hapticlink.orchestrator.base.faults import InputFault, near
 
 
 def shipped() -> dict[str, Any]:
-    """The scenes that come with the package, by name."""
+    """The files of the scenes that are shipped with the package, by name."""
     folder = importlib.resources.files("hapticlink.scenes")
     names = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
     return {entry.name.removesuffix(".toml"): entry for entry in sorted(names, key=str)}
 
 
 def find(scene: str, folder: FilePath | None = None) -> tuple[str, str]:
-    """(name, text) of a scene: a path from `folder`, or the name of a shipped one. Raises
-    InputFault."""
+    """Name and text of a scene: a path relative to `folder`, or the name of a shipped one. Raises
+    InputFault where there is none, or where it cannot be read as text."""
     path, known = (folder or FilePath()) / scene, shipped()
     if path.is_file():
         try:
@@ -31,6 +31,6 @@ def find(scene: str, folder: FilePath | None = None) -> tuple[str, str]:
 
 
 def folder_of(scene: str, folder: FilePath | None = None) -> FilePath | None:
-    """Where the file of a scene lies, seen from `folder`; None for a shipped one."""
+    """The folder of a scene's file, relative paths starting at `folder`; None for a shipped one."""
     path = (folder or FilePath()) / scene
     return path.parent if path.is_file() else None

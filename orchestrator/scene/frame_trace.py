@@ -1,8 +1,8 @@
 """A recorded trace of frames: `graphics.rate = { trace = "frames.csv" }`.
 
-One time stamp (s) a line, the first column of a CSV, rising; a first line that is no number is a
-heading, and # starts a remark. Times count from the first stamp, where the run starts. The trace
-becomes the list of its times in the scene, so that run.json holds the frames themselves.
+One time stamp (s) per line, increasing, in the first column of a CSV; a first line that is no
+number is a header, and # starts a comment. Times count from the first stamp, at which the run
+starts. The scene keeps the list of times instead of the file, so that run.json contains the frames.
 """
 
 from __future__ import annotations
@@ -14,20 +14,21 @@ from pathlib import Path
 from hapticlink.orchestrator.base.faults import InputFault
 
 LONGEST = Decimal("1e12")
-"""s; a clock that counts from 1970 shows 2e9."""
+"""Largest time stamp (s); seconds since 1970 are about 2e9."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trace:
-    """A recorded trace of frames, instead of a rate."""
+    """A recorded trace of frame times, in place of a rate."""
 
     trace: str
-    """A CSV file with the times (s) at which frames ended in its first column, from the folder of
-    the scene's file."""
+    """A CSV file, relative to the scene's file, whose first column holds the times (s) at which
+    frames ended."""
 
 
 def frame_times(path: Path) -> list[float]:
-    """The ends of the frames (s). Raises InputFault for what is no trace, naming the line."""
+    """The ends of the frames (s), counted from the first stamp. Raises InputFault, with the line,
+    for a file that is no trace."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -50,5 +51,5 @@ def frame_times(path: Path) -> list[float]:
         stamps.append(stamp)
     if len(stamps) < 2:
         raise InputFault(f"{path}: {len(stamps)} time stamps; a trace of frames has at least 2")
-    # In decimals: 1.7 - 1.6 is 0.1 here.
+    # Decimals subtract exactly: 1.7 - 1.6 is 0.1.
     return [float(stamp - stamps[0]) for stamp in stamps[1:]]

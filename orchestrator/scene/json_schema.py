@@ -1,7 +1,7 @@
-"""A JSON schema (draft 2020-12) of scene files, made from the records, for editors.
+"""JSON schema (draft 2020-12) of scene files, generated from the records, for editors.
 
-It says what each key may hold, and refuses others. What a table lacks may stand in the scene that
-this one extends; entries of arrays are not laid over each other, so these alone require their keys.
+It states what each key may hold and refuses unknown keys. Keys that a table lacks may come from the
+scene that it extends, so only entries of arrays, which are not merged, require theirs.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ def json_schema() -> Json:
 
 
 def _measure(kind: Any) -> str:
-    """` (N/m; >= 0)`"""
-    said = [text for text in (key_descriptions.unit(kind), key_descriptions.limits(kind)) if text]
-    return f" ({'; '.join(said)})" if said else ""
+    """Unit and range of a value as a suffix, ` (N/m; >= 0)`; "" where it has neither."""
+    found = [text for text in (key_descriptions.unit(kind), key_descriptions.limits(kind)) if text]
+    return f" ({'; '.join(found)})" if found else ""
 
 
 class _Definitions:
-    """The tables that are referred to, by name."""
+    """Collects the tables that the schema refers to by name ($defs)."""
 
     def __init__(self) -> None:
         self.found: dict[str, Json] = {}
@@ -58,7 +58,7 @@ class _Definitions:
         return {"$ref": f"#/$defs/{name}"}
 
     def table(self, record: Any, entry: bool) -> Json:
-        """A record; of an array, `entry`, with the keys that it requires."""
+        """The schema of a record; required keys are stated for an `entry` of an array only."""
         properties, required = {}, []
         for key, hint in schema.hints(record).items():
             default = schema.default(record, key)
@@ -66,7 +66,7 @@ class _Definitions:
             if isinstance(default, str | bool | int | float | tuple) and default != ():
                 found["default"] = default
             if key in NAMED or (record is ForeignFmu and key in ("start", "derivatives")):
-                # A name with dots may be written as tables in tables.
+                # A dotted name may also be written as nested tables.
                 values = {"anyOf": [found["additionalProperties"], {"type": "object"}]}
                 found["additionalProperties"] = values
             about = key_descriptions.meanings(record)[key]
@@ -92,7 +92,7 @@ class _Definitions:
         origin, arguments = typing.get_origin(kind), typing.get_args(kind)
         if origin is typing.Literal:
             return {"enum": list(arguments)}
-        if kind is Any:  # a part of a registry says what
+        if kind is Any:  # defined by a part of a registry, such as a block or a force
             return {}
         if origin is tuple and Ellipsis in arguments:
             of_tables = is_dataclass(arguments[0])

@@ -1,4 +1,4 @@
-"""A scene's keys in words: what a value is, its unit, its range, its meaning."""
+"""Describes a scene's keys in words: type, unit, range and meaning of a value."""
 
 from __future__ import annotations
 
@@ -13,31 +13,32 @@ from types import NoneType
 from typing import Any
 
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.scene.schema import as_written, at, measured, said_of
+from hapticlink.orchestrator.scene.schema import annotations_at, as_written, at, measured
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 _COUNTS = ("no", "one", "two", "three", "four")
 
 
 def vector(path: Path, data: Any) -> str:
-    """`three numbers (N/m, N/m, N.m/rad)`: the array at `path`, "" where there is none."""
+    """The array that may be at `path` in words, `three numbers (N/m, N/m, N.m/rad)`; "" where no
+    array may be."""
     arrays = [k for k in at(path, data) if typing.get_origin(k) is tuple]
     return " or ".join(dict.fromkeys(words(k) + _beside(unit(k)) for k in arrays))
 
 
 def expected(path: Path, data: Any) -> str:
-    """What may stand at `path`, in words."""
-    found = [pair for kind in said_of(path, data) for pair in measured(kind)]
-    told = {_word(k, q): _beside(q.unit if q else unit(k)) for k, q in found}
-    if "a number" in told:
-        told.pop("a whole number", None)
-    return _either([word + unit for word, unit in told.items() if word])
+    """What the value at `path` may be, in words."""
+    found = [pair for kind in annotations_at(path, data) for pair in measured(kind)]
+    units = {_word(k, q): _beside(q.unit if q else unit(k)) for k, q in found}
+    if "a number" in units:
+        units.pop("a whole number", None)
+    return _either([word + unit for word, unit in units.items() if word])
 
 
 def number(path: Path, data: Any) -> str:
-    """`number > 0 (kg)`: the number that may stand at `path`, with its range and unit."""
-    kinds = [pair for hint in said_of(path, data) for pair in measured(hint)]
-    plain = Quantity("1")  # of a part that says no more
+    """The number that may be at `path` with its range and unit, `number > 0 (kg)`."""
+    kinds = [pair for hint in annotations_at(path, data) for pair in measured(hint)]
+    plain = Quantity("1")  # for a part of a registry that declares no quantity
     numbers = [(kind, quantity or plain) for kind, quantity in kinds if kind in (float, int)]
     word = "whole number" if all(kind is int for kind, _ in numbers) else "number"
     quantity = numbers[0][1]
@@ -50,7 +51,7 @@ def _beside(unit: str) -> str:
 
 
 def words(kind: Any) -> str:
-    """What a value is: `a number`, `three numbers`, `"a" or "b"`, `a table`."""
+    """The type of a value in words: `a number`, `three numbers`, `"a" or "b"`, `a table`."""
     found = [_word(branch, quantity) for branch, quantity in measured(kind)]
     if "a number" in found:
         found = [word for word in found if word != "a whole number"]
@@ -85,12 +86,12 @@ def _either(words: list[str]) -> str:
 
 
 def unit(kind: Any) -> str:
-    """The unit of the numbers of a value, entry by entry where they differ; "" for none."""
+    """The unit of a value's numbers, entry by entry where they differ; "" where they have none."""
     return _of_numbers(kind, lambda quantity: "" if quantity.unit == "1" else quantity.unit)
 
 
 def limits(kind: Any) -> str:
-    """The range of the numbers of a value, entry by entry where they differ; "" without any."""
+    """The range of a value's numbers, entry by entry where they differ; "" where it has none."""
     return _of_numbers(kind, lambda quantity: quantity.range)
 
 
@@ -108,18 +109,17 @@ def _of_numbers(kind: Any, what: Callable[[Quantity], str]) -> str:
 
 @cache
 def meanings(record: Any) -> dict[str, str]:
-    """The meaning of each key of a record: the docstring under its field."""
+    """The meaning of each key of a record, from the docstrings under its fields."""
     found = {}
     for kind in reversed(as_written(record).__mro__[:-1]):
         (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
         for field, text in pairwise(typing.cast("ast.ClassDef", body).body):
             if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
                 name = typing.cast("ast.Name", field.target).id.rstrip("_")
-                said = ast.literal_eval(text.value)
-                found[name] = " ".join(said.split())
+                found[name] = " ".join(ast.literal_eval(text.value).split())
     return found
 
 
 def about(record: Any) -> str:
-    """What a record says of its table."""
+    """The meaning of a record's table, from its docstring."""
     return inspect.cleandoc(as_written(record).__doc__ or "")

@@ -1,4 +1,4 @@
-"""From a TOML file to a `Scene`: all faults at once, each with its place and a remedy."""
+"""Reads a TOML file as a `Scene`, and reports all faults at once, each with place and remedy."""
 
 from __future__ import annotations
 
@@ -23,19 +23,22 @@ from hapticlink.orchestrator.scene.validation_errors import beyond, problems
 def read(
     text: str, options: Sequence[str] = (), name: str = "scene", folder: FilePath | None = None
 ) -> Scene:
-    """The scene that `text` writes, its relative paths from `folder`. Raises SceneFault with every
-    finding, InputFault for an option that cannot be applied."""
+    """The scene that `text` writes, changed by `options`; relative paths start at `folder`.
+
+    Raises SceneFault with every finding, InputFault for an option that cannot be applied.
+    """
     return from_source(Source(name, *document(text, name, folder), tuple(options)))
 
 
 def from_source(source: Source) -> Scene:
-    """The scene of the tables of `source` with its options; faults as of `read`."""
+    """The scene of the tables of `source`, changed by its options; raises as `read` does."""
     data, options = deepcopy(dict(source.tables)), source.options
     name = source.name
-    which = [o for o in options if families.is_argument(overrides.parse(o)[0])]
-    set_by = {**source.set_by, **{overrides.apply(data, option): option for option in which}}
+    # Options of the family come first, since others may change the bodies that it expands to.
+    of_family = [o for o in options if families.is_argument(overrides.parse(o)[0])]
+    set_by = {**source.set_by, **{overrides.apply(data, option): option for option in of_family}}
     data = with_family(data, name, source.places, set_by)
-    set_by |= {overrides.apply(data, o): o for o in options if o not in which}
+    set_by |= {overrides.apply(data, o): o for o in options if o not in of_family}
     flatten(data)
     wrong: list[tuple[Path, str]] = []
     for path, recorded in traced(data):
@@ -53,7 +56,7 @@ def from_source(source: Source) -> Scene:
     parts, unread = read_parts.read(data)
     wrong += unread
     try:
-        # As JSON, because strict JSON takes arrays for tuples and still refuses "1" for 1.
+        # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
         found = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
     except pydantic.ValidationError as error:
         wrong += problems(error.errors(include_url=False), data)

@@ -1,4 +1,4 @@
-"""`--set key=value`: a scene's keys changed before it is checked."""
+"""`--set key=value`: changes a scene's keys before it is checked."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ Options = Mapping[str, Any] | Sequence[str]
 
 
 def written(options: Options) -> tuple[str, ...]:
-    """The options as `key=value`. Raises InputFault for a value that TOML cannot write."""
+    """The options as `key=value` texts. Raises InputFault for a single text in place of a list, and
+    for a value that TOML cannot write."""
     if isinstance(options, str):
         raise InputFault(f"options {options!r}: give a mapping, or a list of key=value")
     if not isinstance(options, Mapping):
@@ -25,7 +26,8 @@ def written(options: Options) -> tuple[str, ...]:
 
 
 def text(value: Any, key: str) -> str:
-    """A Python value of `key` as `parse` reads it back; words go without quotes."""
+    """A Python value of `key` as text that `parse` reads back; quoted only where it must be. Raises
+    InputFault for a value that TOML cannot write."""
     if isinstance(value, str):
         try:
             tomllib.loads(f"value = {value}")
@@ -53,10 +55,10 @@ def _toml(value: Any, key: str) -> str:
 
 
 def parse(option: str) -> tuple[tuple[str, ...], Any]:
-    """The names of the dotted key, and the value as TOML or else as text.
+    """The names of the dotted key, and the value as TOML or, where it is none, as text.
 
-    The key is one of TOML, names in quotes too: `holds."virtual_environment.P_c"=lead` is
-    `holds.virtual_environment.P_c=lead`. Raises InputFault where there is no `=` or no key.
+    Names in the key may be quoted, as in TOML: `holds."virtual_environment.P_c"=lead` is the same
+    as `holds.virtual_environment.P_c=lead`. Raises InputFault where there is no `=` or no key.
     """
     names, equals, text = _key(option)
     if not equals or not all(names):
@@ -68,21 +70,22 @@ def parse(option: str) -> tuple[tuple[str, ...], Any]:
 
 
 def _key(option: str) -> tuple[tuple[str, ...], str, str]:
-    """(names of the key, "=" or nothing, text of the value)."""
+    """Names of the key, "=" or nothing, and text of the value."""
     if match := ASSIGNMENT.match(option):
         try:
             return parts(match[1].strip()), "=", option[match.end() :]
         except tomllib.TOMLDecodeError:
-            pass  # such as a vector's entry, `fmu.plant.start.x[1]`
+            pass  # a key that TOML does not allow, such as `fmu.plant.start.x[1]`
     key, equals, text = option.partition("=")
     return tuple(name.strip() for name in key.split(".")), equals, text
 
 
 def apply(data: dict[str, Any], option: str) -> Path:
-    """Set the key in `data`, and give the path of what is new: the key, or a table made for it.
+    """Set the key in `data`; returns the path of the key, or of the first table created for it.
 
-    Entries of an array of tables go by their name or by their place (from 0):
-    `linkage.body.link1.mass=2`. Raises InputFault where there is no such entry.
+    Entries of an array of tables are addressed by name or by index (from 0):
+    `linkage.body.link1.mass=2`. Raises InputFault where there is no such entry, or where a part of
+    the key is no table.
     """
     names, value = parse(option)
     names = whole(names)

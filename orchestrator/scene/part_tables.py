@@ -1,5 +1,5 @@
-"""Tables whose keys a part of a registry says: `settings` of an [[fmu]] with a block, and the
-entries of [[linkage.force]]."""
+"""Tables whose keys are defined by a part of a registry: `settings` of an [[fmu]] with a `block`,
+and the entries of [[linkage.force]]."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from hapticlink.orchestrator.scene.toml_keys import Path, value
 
 
 def tables(data: Any) -> Iterator[tuple[Path, Any]]:
-    """Every such table of a scene's `data`; settings that a block does without are made empty."""
+    """Path and content of every such table in a scene's `data`; missing settings are added as an
+    empty table."""
     for i, fmu in enumerate(_list(data, "fmu")):
         if isinstance(fmu, dict) and "block" in fmu:
             yield ("fmu", i, "settings"), fmu.setdefault("settings", {})
@@ -28,14 +29,14 @@ def _list(data: Any, *path: str) -> list[Any]:
 
 
 def record_of(path: Path, data: Any) -> Any:
-    """The record of the table at `path` of a scene's `data`; None where no part has its name, and
-    for any other table."""
+    """The record that defines the table at `path` of a scene's `data`; None where the registry has
+    no part of that name, and for any other table."""
     match path:
         case ("fmu", int(), "settings"):
             name = value(data, (*path[:2], "block"))
             return _arguments(BLOCKS[name]) if name in tuple(BLOCKS) else None
         case ("linkage", "force", int()) if (name := value(data, (*path, "type"))) is not None:
-            from hapticlink.components.forces import FORCES  # and with it all equations
+            from hapticlink.components.forces import FORCES  # loads CasADi
 
             return FORCES[name] if name in tuple(FORCES) else None
     return None
@@ -43,12 +44,12 @@ def record_of(path: Path, data: Any) -> Any:
 
 @cache
 def _arguments(block: Callable[..., Any]) -> Any:
-    """A record of the arguments of a block after the first, the communication step."""
+    """A record of a block's arguments, without the first, the communication step size."""
     _, *arguments = inspect.signature(block).parameters.values()
     return make_dataclass(
         "Settings",
         [(a.name, a.annotation, field(**_default(a))) for a in arguments],
-        namespace={"__module__": block.__module__},  # where annotations as text are resolved
+        namespace={"__module__": block.__module__},  # resolves annotations that are texts
         kw_only=True,
     )
 

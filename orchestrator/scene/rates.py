@@ -1,4 +1,4 @@
-"""Rates and times that a scene may write exactly."""
+"""Rates and times of a scene, which may be written as exact fractions."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class VariableRate:
     max: Rate
     """Highest rate."""
     seed: Seed = 0
-    """Seed of numpy's PCG64, which draws."""
+    """Seed of the generator, numpy's PCG64."""
 
 
 AnyRate = Rate | VariableRate | tuple[Elapsed, ...]
-"""A tuple holds the times (s) at which steps end. A file may also give a recorded trace,
-`{ trace = FILE }`, which becomes such times."""
+"""A rate (Hz), bounds of a varying rate, or the times (s) at which steps end; a recorded trace,
+`{ trace = FILE }`, is read as such times."""

@@ -1,4 +1,5 @@
-"""Reads the tables whose keys a part of a registry says, by the rules of the scene's own."""
+"""Reads the tables whose keys are defined by a part of a registry (`part_tables`), as strictly as
+the scene's own."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from hapticlink.orchestrator.scene.validation_errors import problems
 
 
 def read(data: Any) -> tuple[dict[Path, Any], list[Problem]]:
-    """The records of such tables of a scene's `data`, by path, and what is wrong with them."""
+    """The records of such tables in a scene's `data`, by path, and the problems found in them."""
     found: dict[Path, Any] = {}
     errors: list[Any] = []
     names: set[Any] = set()
@@ -38,7 +39,7 @@ def read(data: Any) -> tuple[dict[Path, Any], list[Problem]]:
 
 
 def _of_a_force(path: Path, table: Any, names: set[Any]) -> Iterator[Problem]:
-    """What is wrong with the names in an entry of [[linkage.force]]."""
+    """Problems with `type` and `name` of an entry of [[linkage.force]]."""
     from hapticlink.components.forces import FORCES
 
     if not isinstance(table, dict):
@@ -55,13 +56,14 @@ def _of_a_force(path: Path, table: Any, names: set[Any]) -> Iterator[Problem]:
 
 @cache
 def _reader(record: Any) -> pydantic.TypeAdapter[Any]:
-    """Reads a record by the rules of a scene: no unknown keys, no text for a number."""
+    """A pydantic reader of a record with a scene's strictness: no unknown keys, no text for a
+    number."""
     rules = {"__pydantic_config__": Scene.__pydantic_config__}
     return pydantic.TypeAdapter(make_dataclass("Holder", [("table", record)], namespace=rules))
 
 
 def put(scene: Scene, found: Mapping[Path, Any]) -> Scene:
-    """The scene with the records that `read` has found in place of its tables."""
+    """The scene with such tables replaced by the records that `read` returned."""
 
     def settings(i: int) -> dict[str, Any]:
         record = found["fmu", i, "settings"]

@@ -1,4 +1,4 @@
-"""A scene's own tables beside those of the components, as frozen records."""
+"""A scene's tables that do not describe components, as frozen records."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Seconds
 
 SCHEMES: Registry[Any] = Registry("scheme", {})
-"""Coupling schemes. `plan.schemes` puts them here: what they order is of rooms above this one."""
+"""Coupling schemes, registered by `plan.schemes`, which this package may not import."""
 HoldName = Annotated[str, HOLDS.names()]
 
 OWN = "the variable's own"
-"""The unit of what belongs to an FMU that is not the project's."""
+"""The unit of values of a foreign FMU's variables."""
 Value = (
     bool
     | Annotated[int, Quantity(OWN)]
@@ -31,107 +31,109 @@ Value = (
 
 @dataclass(frozen=True, kw_only=True)
 class ForeignFmu:
-    """An FMU of FMI 2.0 or 3.0 co-simulation, or a block that is built into one."""
+    """An FMU for co-simulation (FMI 2.0 or 3.0), or a block that is built into one."""
 
     name: str
-    """By which connections and results speak of it: letters, digits and _."""
+    """Its name in connections and results: letters, digits and _."""
     path: str | None = None
-    """Its file, from the folder of the scene's."""
+    """Its file, relative to the scene's file."""
     block: Annotated[str, BLOCKS.names()] | None = None
-    """In place of a file, the block that is built ([extending](extending.md#a-block))."""
+    """In place of a file, the block to build ([extending](extending.md#a-block))."""
     settings: Mapping[str, Any] = field(default_factory=dict)
-    """Those of the block, by name."""
+    """Settings of the block, by name."""
     rate: Literal["haptics", "graphics"] | AnyRate = "haptics"
-    """Its communication rate: that of the scene, or one of its own, as graphics.rate."""
+    """Its communication rate: one of the scene's, or its own, written as graphics.rate is."""
     timing: Literal["sampled", "continuous"] | None = None
-    """sampled: doStep(t, h) puts out y(t) of the inputs of t; continuous: y(t + h). What the FMU
-    declares where left out, "continuous" where it does not."""
+    """sampled: doStep(t, h) computes y(t) from the inputs at t; continuous: y(t + h). By default
+    what the FMU declares, else "continuous"."""
     start: Mapping[str, Value] = field(default_factory=dict)
-    """Values of inputs and parameters by name; a list for a whole vector."""
+    """Start values of inputs and parameters by name; a list for a whole vector."""
     derivatives: Mapping[str, str] = field(default_factory=dict)
-    """By an output, the output that is its derivative, where the FMU does not declare it."""
+    """For an output, the output that is its time derivative, where the FMU does not declare it."""
     isolate: bool = False
     """Runs it in a process of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wire:
-    """A connection of a scalar or a whole vector, between any FMUs of the scene. One to an input of
-    a block takes the place of the loop's own."""
+    """A connection of a scalar or a whole vector, between any FMUs of the scene. A connection to an
+    input of a block replaces the one that the haptic loop has there."""
 
     from_: Annotated[str, Field(alias="from")]
     """The output, `fmu.variable`."""
     to: str
     """The input, `fmu.variable`."""
     hold: HoldName | None = None
-    """Its hold between rates; the scene's where left out."""
+    """Its hold; by default that of the scene."""
     factor: Annotated[float, Quantity("1")] = 1.0
-    """The input gets factor y + offset, after the conversion of units; not 0."""
+    """The input is factor y + offset, after the conversion of units; not 0."""
     offset: Annotated[float, Quantity(OWN)] = 0.0
     """See `factor`."""
     convert: bool = True
-    """Converts between the units of the two ends."""
+    """Whether to convert between the units of the two ends."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Iteration:
-    """What `coupling = "iterated"` repeats until connected plants of a rate agree."""
+    """The fixed-point iteration of `coupling = "iterated"`: it repeats a communication step until
+    connected plants of one rate agree."""
 
     method: Literal["aitken", "newton"] = "aitken"
     """Fixed point with Aitken's relaxation, or Newton."""
     tolerance: Annotated[float, Quantity("1", gt=0, lt=1)] = 1e-9
     """Outputs y agree where they differ by at most tolerance (1 + |y|)."""
     most: Annotated[int, Quantity("1", ge=1, le=10000)] = 50
-    """Most repetitions of a step; those that make Newton's Jacobian are not counted."""
+    """Largest number of iterations of a step, without those that evaluate Newton's Jacobian."""
     interpolation: Annotated[str, HOLDS.names(lambda hold: hold.interpolates)] = "foh"
-    """Hold on connections between plants of a rate: zoh, their value at the end of the step; foh,
-    linear from its start; second-order; hermite, which needs derivatives (foh without)."""
+    """Hold on connections between plants of one rate: zoh, the value at the end of the step; foh,
+    linear over the step; second-order; hermite, which needs derivatives (foh without them)."""
     unconverged: Literal["stop", "accept"] = "stop"
-    """Ends the run, or goes on with what there is."""
+    """Without convergence, stop the run or accept the last iterate."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Latency:
-    """Latency and loss of each sample of a connection, drawn by numpy's PCG64. Connections of one
-    seed lose and delay the same samples, as one packet would."""
+    """Latency and loss of each sample of a connection, drawn by numpy's PCG64. Connections with the
+    same seed lose and delay the same samples, as if they were sent in one packet."""
 
     min: Elapsed = 0.0
-    """Least latency."""
+    """Smallest latency."""
     max: Elapsed | None = None
-    """Largest latency; `min` where left out, a constant latency."""
+    """Largest latency; by default `min`, a constant latency."""
     loss: Annotated[float, Quantity("1", ge=0, le=1)] = 0.0
     """Probability that a sample is lost."""
     seed: Seed = 0
-    """Seed."""
+    """Seed of the generator."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StepControl:
-    """Steps chosen for accuracy."""
+    """Adaptive communication step sizes."""
 
     method: Literal["doubling", "ecco"]
-    """doubling: a step against two of half its size; ecco: the residual energy of a step."""
+    """Error estimate. doubling: a step compared with two of half its size; ecco: the residual
+    energy of a step."""
     tolerance: Annotated[float, Quantity("1", gt=0)]
-    """doubling: error per second of an output y over its nominal (1 where it has none) + |y|; ecco:
-    residual energy over `energy`."""
+    """doubling: error per second of an output y, relative to its nominal (by default 1) + |y|;
+    ecco: residual energy relative to `energy`."""
     min: Seconds
     """Shortest step, accepted whatever its error."""
     max: Seconds | None = None
-    """Longest step; a period of the rate where left out."""
+    """Longest step; by default a period of the rate."""
     energy: Annotated[float, Quantity("J", gt=0)] | None = None
-    """The energy that matters in the scene, which ecco needs."""
+    """Typical energy in the scene, which ecco needs."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PowerPort:
-    """The power into a plant is sign * effort . d(displacement)/dt."""
+    """A power port: the power into a plant is sign * effort . d(displacement)/dt."""
 
     effort: str
-    """An input, `fmu.port` or an entry of it (N and N.m; other units count by their factors)."""
+    """An input, `fmu.port` or an entry of it (N and N.m; other units are converted)."""
     displacement: str
-    """The output of the same FMU that the effort works on (m and rad)."""
+    """The conjugate displacement, an output of the same FMU (m and rad)."""
     sign: Annotated[float, Quantity("1", ge=-1, le=1)] = 1.0
-    """-1 where the effort counts against the displacement."""
+    """-1 where the effort acts against the displacement."""
 
     @property
     def fmu(self) -> str:
@@ -140,8 +142,8 @@ class PowerPort:
 
 @dataclass(frozen=True, kw_only=True)
 class SetSpring:
-    """F = stiffness (set_position - position) + damping (set_velocity - velocity), entry by entry,
-    of an FMU whose far end the scene sets."""
+    """A spring-damper within an FMU, F = stiffness (set_position - position) + damping
+    (set_velocity - velocity), entry by entry, whose far end is set by an input."""
 
     set_position: str
     """The input that sets the far end, `fmu.port`."""
@@ -150,11 +152,11 @@ class SetSpring:
     stiffness: tuple[Annotated[float, Quantity(OWN, ge=0)], ...]
     """Stiffness, entry by entry."""
     damping: tuple[Annotated[float, Quantity(OWN, ge=0)], ...] = ()
-    """Damping, entry by entry; 0 where left out."""
+    """Damping, entry by entry; by default 0."""
     set_velocity: str = ""
-    """The input that sets the far end's velocity; 0 where left out."""
+    """The input that sets the velocity of the far end; by default it is 0."""
 
     @property
     def ports(self) -> tuple[str, ...]:
-        """What the far end sets."""
+        """The inputs that set the far end: set position, and set velocity if there is one."""
         return tuple(p for p in (self.set_position, self.set_velocity) if p)

@@ -1,4 +1,4 @@
-"""What a scene needs of the blocks, and what is left out of them because nothing uses it."""
+"""The parts of the equations that a scene needs, and those left out because nothing uses them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Need:
 
 
 def needs(scene: Scene) -> Iterator[Need]:
-    """Every part that a scene may leave out."""
+    """Every optional part of the equations, for a scene with a linkage."""
     if scene.linkage is None:
         return
     loops = len(scene.linkage.loop)

@@ -1,11 +1,11 @@
-"""A scene: what the user wrote, as frozen records.
+"""The scene: a description of an experiment, as frozen records.
 
-The blocks' own tables (linkage, device, controller, ...) are the records of
-`components.specs`; this file adds rates, holds and the order of calls.
+The tables of the blocks (linkage, device, controller, ...) are the records of `components.specs`;
+this file adds rates, holds and the coupling scheme.
 
-A block is simulated where its table is present: [linkage] the virtual mechanism, [graphics]
-the virtual environment (not where the mechanism gives the directions itself), [device],
-[controller] and [hand] theirs.
+A block is simulated if its table is present: [linkage] the virtual mechanism, [graphics] the
+virtual environment (only if another block uses an output of it), [device], [controller] and [hand]
+the blocks of these names.
 """
 
 from __future__ import annotations
@@ -57,12 +57,13 @@ class Graphics(GraphicsCopy):
     controller (section B.6)."""
 
     rate: AnyRate = 30
-    """Frames: a rate, bounds and a seed, the times at which frames end, or a recorded trace."""
+    """Frame rate: a number, bounds and a seed, the times at which frames end, or a recorded
+    trace."""
     phase: Seconds | None = None
-    """End of the first frame of a fixed rate, at most a period; a period where left out."""
+    """End of the first frame of a fixed rate, at most a period; by default a period."""
     align: Literal["exact", "tick"] | None = None
-    """exact: frame i ends at i/rate; tick: at the first haptic tick at or after that. Exact for a
-    fixed rate where left out; rates that vary are always on ticks."""
+    """exact: frame i ends at i/rate; tick: at the first haptic tick at or after that. By default
+    exact for a fixed rate; varying rates are always on ticks."""
 
 
 def _hand_type(table: Any) -> str:
@@ -84,14 +85,14 @@ Hand = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """Everything a run needs. A block is simulated where its table is present."""
+    """A complete experiment. A block is simulated if its table is present."""
 
     __pydantic_config__ = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     title: str
-    """Of figures and messages."""
+    """Title of figures and messages."""
     description: str = ""
-    """What `hapticlink info` tells."""
+    """Text that `hapticlink info` prints."""
     duration: Duration
     """Simulated time."""
     hold: HoldName = "zoh"
@@ -100,43 +101,46 @@ class Scene:
     """Hold on connections from a fast rate to a slow one: the latest sample, or the mean over the
     slow step."""
     holds: Mapping[str, HoldName] = field(default_factory=dict)
-    """Another hold for a connection, by source, target or "source -> target"."""
+    """Hold of single connections, by source, target or "source -> target"."""
     delays: Mapping[str, Elapsed | Latency] = field(default_factory=dict)
-    """Latency of a connection, or a table of latency and loss, by the same names."""
+    """Latency of single connections, or a table of latency and loss, by the same names."""
     phases: Mapping[str, Seconds] = field(default_factory=dict)
     """End of an FMU's first step, by the FMU's name; whole periods follow."""
     kinds: Mapping[str, Literal[Kind, "none"]] = field(default_factory=dict)
-    """What a signal is where its FMU does not say, by connection; "none" overrides its FMU."""
+    """Kind of a signal, by connection, where its FMU does not declare it; "none" overrides the
+    FMU's declaration."""
     power: tuple[PowerPort, ...] = ()
-    """Efforts and displacements of FMUs other than the scene's own blocks."""
+    """Power ports of FMUs other than the scene's own blocks."""
     spring: tuple[SetSpring, ...] = ()
-    """Inputs of FMUs that set a spring within: [holds](holds.md), pspm."""
+    """Spring-dampers within FMUs whose set position is an input: [holds](holds.md), pspm."""
     substeps: Mapping[str, Substeps] = field(default_factory=dict)
-    """Steps of a plant between two reads, its held inputs renewed at each; by the FMU's name."""
+    """Number of doSteps of a plant per communication step, held inputs updated before each; by the
+    FMU's name."""
     get_after_set: tuple[str, ...] = ()
-    """Plants whose feed-through may be read after new inputs are set, which FMI forbids between two
-    steps."""
+    """Plants whose feed-through outputs are read after new inputs are set without a doStep between,
+    which FMI does not allow."""
     coupling: Annotated[str, SCHEMES.names()] = "gauss-seidel"
-    """Order of calls: jacobi is get all, set all, step all; [coupling](coupling.md)."""
+    """Coupling scheme, the order of calls; jacobi is get all, set all, step all:
+    [coupling](coupling.md)."""
     iteration: Iteration = field(default_factory=Iteration)
-    """Of coupling = "iterated"."""
+    """Settings of coupling = "iterated"."""
     step_control: StepControl | None = None
-    """Steps chosen for accuracy."""
+    """Adaptive communication step sizes."""
     sensing: Literal["ideal", "encoders"] = "ideal"
-    """ideal: controller and mechanism get the hand's wrench and the true pose; encoders: the
-    observer's."""
+    """ideal: controller and mechanism get the hand's wrench and the true pose; encoders: those that
+    the observer estimates."""
     mechanism_at: Literal["haptics", "graphics"] = "haptics"
     """Rate of the virtual mechanism."""
     directions_from: Literal["graphics", "mechanism"] = "graphics"
-    """Who computes Lambda^-1, the mobility at the operational point, and P_c, the projector on the
-    constrained directions ([theory](theory.md#what-the-hand-feels)): the graphics copy, or the
-    mechanism itself."""
+    """Block that computes Lambda^-1, the mobility at the operational point, and P_c, the projector
+    on the constrained directions ([theory](theory.md#what-the-hand-feels)): the graphics copy, or
+    the mechanism itself."""
     local_model: bool = False
-    """Holds the mechanism's D, W, w and J_h of (B.15) from the graphics rate:
+    """Whether the mechanism uses D, W, w and J_h of (B.15) computed at the graphics rate and held:
     [local model](local-model.md)."""
     stop_when: str | None = None
-    """A signal against a number, which ends the run in good order. Where left out,
-    "haptic_device.workspace_margin < 0" where there is a device; "" is never."""
+    """Comparison of a signal with a number that ends the run early, without an error. By default
+    "haptic_device.workspace_margin < 0" if there is a device; "" for never."""
     haptics: Haptics = field(default_factory=Haptics)
     """The fast rate."""
     graphics: Graphics | None = None
@@ -144,11 +148,11 @@ class Scene:
     linkage: Linkage | None = None
     """The mechanism, the block `virtual_mechanism`: [mechanisms](mechanisms.md)."""
     contacts: Contacts | None = None
-    """What the links can touch."""
+    """Obstacles that the links can touch."""
     mechanism: Mechanism = field(default_factory=Mechanism)
     """Time integration of the mechanism."""
     directions: Directions = field(default_factory=Directions)
-    """The test for constrained directions, those in which the closures let nothing move."""
+    """Detection of constrained directions, in which the loop closures allow no motion."""
     device: Device | None = None
     """The twin pantograph, the block `haptic_device`: [device](device.md)."""
     controller: Controller | None = None
@@ -158,23 +162,23 @@ class Scene:
     hands: Mapping[str, Hand] = field(default_factory=dict)
     """Hands at the further points of the linkage, by the point's name."""
     fmu: tuple[ForeignFmu, ...] = ()
-    """Anyone's FMUs: [foreign FMUs](foreign-fmus.md)."""
+    """Further FMUs: [foreign FMUs](foreign-fmus.md)."""
     connection: tuple[Wire, ...] = ()
-    """Connections of them."""
+    """Connections to and from them."""
     faults: Faults = field(default_factory=Faults)
-    """What a run does about an FMU that fails: [faults](faults.md)."""
+    """How a run reacts to an FMU that fails: [faults](faults.md)."""
     isolate: bool = False
     """Runs every FMU in a process of its own."""
     packaging: Literal["python", "native"] = "python"
-    """native: compiles the scene's own blocks, which then need no Python: [FMUs](fmus.md)."""
+    """native: the scene's own blocks are compiled, and then need no Python: [FMUs](fmus.md)."""
 
     def place(self, path: Path, message: str) -> Finding:
-        """What is wrong at a path of the scene; where it was read from a file, with its line."""
+        """A finding at a path of the scene, with its line if the scene was read from a file."""
         return Finding(".".join(map(str, path)), message)
 
     @property
     def source(self) -> Source | None:
-        """What it was read from; None where it was made or changed in Python."""
+        """What the scene was read from; None where it was created or changed in Python."""
         return None
 
     def tables(self) -> dict[str, Any]:
@@ -182,12 +186,12 @@ class Scene:
         return asdict(self.plain())
 
     def plain(self) -> Scene:
-        """The scene without where it was written."""
+        """A copy of the scene without its origin."""
         return Scene(**{f.name: getattr(self, f.name) for f in fields(Scene)})
 
     @property
     def ends_when(self) -> str:
-        """The condition in force, "" where there is none."""
+        """The condition that ends the run, its default included; "" where there is none."""
         if self.stop_when is None:
             return "haptic_device.workspace_margin < 0" if self.device else ""
         return self.stop_when
@@ -195,11 +199,11 @@ class Scene:
 
 @dataclass(frozen=True, kw_only=True)
 class WrittenScene(Scene):
-    """A scene that was read, which knows where its keys were written; so do its changed copies."""
+    """A scene that was read, with the file and line of its keys; changed copies keep them."""
 
     origin: Origin = field(compare=False, repr=False)
     written: Scene = field(compare=False, repr=False)
-    """What was read, before any change."""
+    """The scene as it was read, before any change in Python."""
 
     def place(self, path: Path, message: str) -> Finding:
         return self.origin.finding(path, message)
@@ -211,5 +215,6 @@ class WrittenScene(Scene):
 
 @cache
 def adapter() -> TypeAdapter[Scene]:
-    """What reads a scene. Making it takes ten times as long as a scene; sweeps read hundreds."""
+    """The pydantic reader of scenes. It is cached since building it takes ten times as long as
+    reading a scene."""
     return TypeAdapter(Scene)

@@ -1,4 +1,4 @@
-"""What may stand at a path of a scene, read off the annotations of its records."""
+"""The types that are allowed at a path of a scene, from the annotations of its records."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, value
 
 _WRITTEN: dict[Any, Any] = {Scene: SceneFile, Linkage: FamilyLinkage}
-"""Records that a file writes with keys that are resolved before they are read."""
+"""Records that have further keys in a file, which are resolved before the record is read."""
 
 
 def keys(kinds: list[Any]) -> set[str]:
@@ -30,24 +30,24 @@ def keys(kinds: list[Any]) -> set[str]:
 
 
 def types(kind: Any) -> tuple[str, ...]:
-    """The values of `type` that a record stands for, its default first; none without the key."""
+    """The values of `type` that select a record, its default first; none without that key."""
     return typing.get_args(hints(kind)["type"]) if "type" in keys([kind]) else ()
 
 
 def chosen(kinds: list[Any], table: Any) -> list[Any]:
-    """The records among `kinds` that `table` names by its `type`; all where it names none."""
+    """The records among `kinds` that `table` selects by its `type`; all where it selects none."""
     name = table.get("type") if isinstance(table, dict) else None
     return [k for k in _records(kinds) if name in types(k)] or kinds
 
 
 def at(path: Path, data: Any = None) -> list[Any]:
     """The types that the value at `path` may have, unions and annotations taken apart."""
-    return [branch for kind in said_of(path, data) for branch in branches(kind)]
+    return [branch for kind in annotations_at(path, data) for branch in branches(kind)]
 
 
-def said_of(path: Path, data: Any = None) -> list[Any]:
-    """What the records say of the value at `path`; where the scene's `data` is given, those that
-    its tables name by their `type`."""
+def annotations_at(path: Path, data: Any = None) -> list[Any]:
+    """The annotations of the value at `path`; with the scene's `data`, only those of the records
+    that its tables select by their `type`."""
     if not path:
         return [Scene]
     if record := part_tables.record_of(path, data):
@@ -62,13 +62,13 @@ def said_of(path: Path, data: Any = None) -> list[Any]:
 
 
 def branches(kind: Any) -> list[Any]:
-    """The members of a union, annotations taken off."""
+    """The members of a union, without their annotations."""
     return [branch for branch, _ in measured(kind)]
 
 
 def measured(kind: Any, quantity: Quantity | None = None) -> Iterator[tuple[Any, Quantity | None]]:
-    """The members of a union, each with the quantity that it is; names as the literals that they
-    are."""
+    """The members of a union, each with the quantity in its annotation; names of a registry become
+    literals."""
     origin = typing.get_origin(kind)
     if origin is typing.Annotated:
         inner, *beside = typing.get_args(kind)

@@ -1,4 +1,4 @@
-"""What a scene was read from: where its keys stand, and how it is read with further options."""
+"""What a scene was read from: its tables and options, and the file and line of its keys."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Place, place_of
 
 @dataclass(frozen=True)
 class Source:
-    """The tables of a scene before its `options` (`key=value`), and where each key stands; set_by
-    are options that the tables hold already, by the paths that they set."""
+    """The tables of a scene, the options (`key=value`) still to be applied, and the file and line
+    of each key. set_by: options already applied to the tables, by the paths that they set."""
 
     name: str
     tables: Mapping[str, Any]
@@ -24,14 +24,15 @@ class Source:
 
 @dataclass(frozen=True)
 class Origin:
-    """The tables of a source with its options, and which option set what."""
+    """The tables of a source with its options applied, and the option that set each path."""
 
     source: Source
     tables: Mapping[str, Any]
     set_by: Mapping[Path, str]
 
     def finding(self, path: Path, message: str) -> Finding:
-        """What is wrong at a path: with the option, or the line of the key or of its table."""
+        """A finding at a path, located by the option that set it, or else by the line of the key or
+        of the nearest table around it."""
         key = self._dotted(path)
         for length in range(len(path), 0, -1):
             if path[:length] in self.set_by:
@@ -40,7 +41,8 @@ class Origin:
         return Finding(key, message, line or None, file=file)
 
     def _dotted(self, path: Path) -> str:
-        """`linkage.body[2] (link3).mass`: entries of arrays from 0, with their name."""
+        """The path as text, entries of arrays by index (from 0) and name:
+        `linkage.body[2] (link3).mass`."""
         text = ""
         node: Any = self.tables
         for part in path:

@@ -1,4 +1,4 @@
-"""The keys of a TOML file: the names of a dotted one, and the line on which each stands."""
+"""The keys of a TOML file: names of dotted keys, and the line of each key."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hapticlink.orchestrator.scene.records import Latency
 
 Path = tuple[str | int, ...]
 Problem = tuple[Path, str]
-"""A path of keys, and what is wrong there with its remedy."""
+"""A path of keys, and a message that says what is wrong there, with a remedy."""
 Place = tuple[str, int]
 """File ("" for the scene itself) and line."""
 
@@ -29,7 +29,7 @@ ASSIGNMENT = re.compile(r"""\s*((?:[\w-]|"(?:\\.|[^"\\])*"|'[^']*'|\s*\.\s*)+)\s
 
 
 def _statements(text: str) -> list[tuple[int, str]]:
-    """(line number, text) of each header or assignment, values over several lines in one."""
+    """Line number and text of each table header or assignment, which may span several lines."""
     found, start, depth = [], 0, 0
     for token in _TOKEN.finditer(text + "\n"):
         if token[0] in "[{":
@@ -53,9 +53,9 @@ def parts(dotted: str) -> tuple[str, ...]:
 
 
 def key_lines(text: str) -> dict[Path, int]:
-    """Line numbers by path; entries of [[arrays]] of tables have their index in the path.
+    """Line number of each path; entries of arrays of tables have their index in the path.
 
-    `text` has been parsed as TOML without an error.
+    `text` must be valid TOML.
     """
     lines: dict[Path, int] = {}
     counts: dict[Path, int] = {}
@@ -90,7 +90,7 @@ def key_lines(text: str) -> dict[Path, int]:
 
 
 def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
-    """Where `path` stands, or the nearest table that holds it; line 0 where none does."""
+    """File and line of `path`, or of the nearest table around it; line 0 where there is none."""
     while path:
         if path in places:
             return places[path]
@@ -99,6 +99,7 @@ def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
 
 
 NAMED = ("holds", "delays", "kinds")
+"""Tables whose keys are names of connections, which contain dots."""
 
 
 LATENCY = {f.name for f in fields(Latency)}
@@ -107,8 +108,8 @@ LATENCY = {f.name for f in fields(Latency)}
 def flat(
     table: Mapping[str, Any], leaves: Set[str] = frozenset(), prefix: str = ""
 ) -> Iterator[tuple[str, Any]]:
-    """The entries of a table under their whole names; a value with one of the keys `leaves`, or
-    under a whole name, is a table of its own."""
+    """The entries of nested tables under dotted names, `{"a": {"b": 1}}` as `a.b`. With `leaves`, a
+    table that has one of these keys, or whose own key contains a dot, is a value."""
     for key, value in table.items():
         inside = isinstance(value, dict) and value
         if inside and not (leaves and ("." in key or value.keys() & leaves)):
@@ -118,14 +119,15 @@ def flat(
 
 
 def flatten(data: dict[str, Any]) -> None:
-    """Writes the scene's own such tables under whole names."""
+    """Replaces nested tables of `NAMED` in a scene's `data` by entries with dotted names."""
     for table in NAMED:
         if isinstance(data.get(table), dict):
             data[table] = dict(flat(data[table], LATENCY if table == "delays" else frozenset()))
 
 
 def whole(names: tuple[Any, ...]) -> tuple[Any, ...]:
-    """The path of the names of a dotted key, in the tables that `flatten` has written."""
+    """The path of a dotted key in the tables as `flatten` leaves them: the name of a connection is
+    one part."""
     if names[0] not in NAMED or len(names) < 3 or "." in names[1]:
         return names
     end = len(names) - (names[0] == "delays" and names[-1] in LATENCY)
@@ -133,7 +135,7 @@ def whole(names: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def value(data: Any, path: Path) -> Any:
-    """What stands at `path`, None where nothing does."""
+    """The value at `path` of nested tables and arrays; None where there is none."""
     for part in path:
         try:
             data = data[part]

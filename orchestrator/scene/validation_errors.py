@@ -1,4 +1,4 @@
-"""pydantic's findings as faults of the file: path, what is wrong, what to do."""
+"""Translates pydantic's errors into problems of the scene: path in the file, fault and remedy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hapticlink.orchestrator.scene.toml_keys import Path, value
 
 
 def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
-    """pydantic's errors as (path in the file, message), unions folded into one each."""
+    """pydantic's errors as (path in the file, message), with one for all branches of a union."""
     by_path: dict[Path, list[Any]] = {}
     for error in errors:
         path = _path(error, data)
@@ -27,11 +27,11 @@ def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
     for at, group in by_path.items():
         deeper = any(len(other) > len(at) and other[: len(at)] == at for other in by_path)
         if deeper and all(e["type"].endswith(("_type", "literal_error")) for e in group):
-            continue  # the other branches of a union whose right branch says more below
+            continue  # branches of a union that do not apply; the one that does has deeper errors
         limited = [e for e in group if e["type"] in _RANGE]
-        told = {_message(e, at, data) for e in limited or group}
+        messages = {_message(e, at, data) for e in limited or group}
         expected = f"{_shown(group[0]['input'])} should be {key_descriptions.expected(at, data)}"
-        found.append((at, told.pop() if len(told) == 1 else expected))
+        found.append((at, messages.pop() if len(messages) == 1 else expected))
     return found
 
 
@@ -42,7 +42,7 @@ _RANGE = {
 
 
 def _path(error: Any, data: Any) -> Path | None:
-    """Where in the file an error is; None for one of a branch that the table's `type` is not."""
+    """The path of an error in the file; None for a branch that the table's `type` excludes."""
     path: Path = ()
     node = data
     for i, part in enumerate(error["loc"]):
@@ -62,11 +62,13 @@ def _path(error: Any, data: Any) -> Path | None:
 
 
 def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str]]:
-    """What the later checks find once every faulty value is taken out, or has a stand-in where
-    one is needed; nothing where that makes no scene, or where a name is missing by which other
-    tables speak of this one."""
-    whole, told = copy.deepcopy(data), {path for path, _ in known}
-    # A table that is of no known kind is wrong as a whole.
+    """Semantic errors that remain when the schema errors `known` are removed from `data`.
+
+    Faulty values are dropped, or replaced by a placeholder where one is required. Returns nothing
+    where no valid scene results, as where a name is missing that other tables refer to.
+    """
+    whole, reported = copy.deepcopy(data), {path for path, _ in known}
+    # A table of an unknown type is replaced as a whole.
     untyped = [path for path, _ in known if path[-1:] == ("type",) and _is_kind(path[:-1])]
     wrong = [path[:-1] if path in untyped else path for path, _ in known if path]
     for path in wrong:
@@ -74,7 +76,7 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
         if isinstance(node, dict):
             node.pop(path[-1], None)
     for path in wrong:
-        node, filled = value(whole, path[:-1]), _stand_in(path)
+        node, filled = value(whole, path[:-1]), _placeholder(path)
         if isinstance(node, list):
             place = typing.cast("int", path[-1])
             node += [filled] * (place + 1 - len(node))  # too short a vector
@@ -86,16 +88,16 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
         found = checks.check(adapter().validate_json(document))
     except pydantic.ValidationError:
         return []
-    return [problem for problem in found if problem[0] not in told]
+    return [problem for problem in found if problem[0] not in reported]
 
 
 def _is_kind(path: Path) -> bool:
-    """Whether the record at `path` is one of several, by its `type`."""
+    """Whether the record at `path` is one of several, selected by its `type`."""
     return sum(bool(schema.types(kind)) for kind in schema.at(path)) > 1
 
 
-def _stand_in(path: Path) -> Any:
-    """A value of the right kind that makes no fault elsewhere, None where there is none."""
+def _placeholder(path: Path) -> Any:
+    """A value of the right type that causes no error elsewhere; None where there is none."""
     kinds = schema.at(path)
     if float in kinds or int in kinds:
         return 1
@@ -104,9 +106,9 @@ def _stand_in(path: Path) -> Any:
     for kind in kinds:
         if schema.types(kind):
             needed = ((*path, key) for key in schema.keys([kind]))
-            return {p[-1]: _stand_in(p) for p in needed if schema.is_needed(p, kind)}
+            return {p[-1]: _placeholder(p) for p in needed if schema.is_needed(p, kind)}
         if typing.get_origin(kind) is tuple and Ellipsis not in typing.get_args(kind):
-            return [_stand_in((*path, 0)) for _ in typing.get_args(kind)]
+            return [_placeholder((*path, 0)) for _ in typing.get_args(kind)]
     return None
 
 
@@ -116,7 +118,7 @@ def _message(error: Any, path: Path, data: Any) -> str:
         return "is missing"
     if kind == "unexpected_keyword_argument":
         return _unknown_key(path, error["loc"], data)
-    if kind == "value_error":  # a name that is none
+    if kind == "value_error":  # an unknown name of a registry
         return str(error["ctx"]["error"])
     if kind == "union_tag_invalid":
         known = [t for k in schema.at(path[:-1]) for t in schema.types(k)]
@@ -138,10 +140,10 @@ def _shown(value: Any) -> str:
 
 
 def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
-    """That a table has no such key, or that only one of another type has."""
+    """The message for an unknown key, or for one that belongs to another `type` of the table."""
     kinds, table, key = schema.at(path[:-1], data), value(data, path[:-1]), str(path[-1])
     types = {name: k for k in kinds for name in schema.types(k)}
-    branch = loc[-2] if len(loc) > 1 else None  # where the table has no type: the default's
+    branch = loc[-2] if len(loc) > 1 else None  # without a type, pydantic tried the default's
     this = table.get("type", branch) if isinstance(table, dict) else branch
     owners = [repr(name) for name, k in types.items() if key in schema.keys([k])]
     if this in types and owners:

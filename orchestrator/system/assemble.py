@@ -1,4 +1,4 @@
-"""The system of a scene: its FMUs described, connected, held and checked."""
+"""Builds the system of a scene: FMU descriptions, connections, holds, and their checks."""
 
 from __future__ import annotations
 
@@ -22,8 +22,11 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
 def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> System:
-    """The system of `scene` with the FMUs of its blocks in `files`. Raises SceneFault for FMUs
-    and connections that do not fit, and for names in holds and stop_when that it does not have."""
+    """The system of `scene`; `files` are the FMU files of its blocks, by name.
+
+    Raises SceneFault with every finding: FMUs that cannot be read or used, connections and holds
+    that do not fit, and names in the scene that its FMUs do not have.
+    """
     problems: list[Problem] = []
     of = timeline.of
     ours = tuple(Fmu(b.name, describe(files[b.name]), of[b.name]) for b in loop_blocks(scene))
@@ -34,10 +37,10 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     fmus = tuple(replace(u, isolate=u.isolate or scene.isolate) for u in (*ours, *foreign))
     connections = _connections(scene, ours, fmus, problems)
     rules = rules_of(scene, fmus, connections)
-    made, refused = assign(fmus, connections, timeline, rules)
-    problems += checks.unfit(scene, fmus, made, refused, rules.springs)
+    assigned, refused = assign(fmus, connections, timeline, rules)
+    problems += checks.unfit(scene, fmus, assigned, refused, rules.springs)
     problems += checks.step_sizes(scene, fmus, timeline)
-    problems += checks.iterated(scene, fmus, made)
+    problems += checks.iterated(scene, fmus, assigned)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(fmus, condition):
         problems.append((("stop_when",), f"{condition}: there is no such output"))
@@ -45,7 +48,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         raise SceneFault(scene.title, [scene.place(*problem) for problem in problems])
     return System(
         fmus,
-        made,
+        assigned,
         timeline,
         scene.coupling,
         condition,
@@ -64,13 +67,14 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
 def _connections(
     scene: Scene, ours: Iterable[Fmu], fmus: Iterable[Fmu], problems: list[Problem]
 ) -> tuple[Connection, ...]:
-    """Those of the loop whose targets no [[connection]] feeds, and those of [[connection]]."""
+    """The connections of [[connection]], and those of the haptic loop to inputs that no
+    [[connection]] feeds."""
     described = {u.name: u.description for u in fmus}
     wires: list[tuple[Keys, Wire]] = [
         (("connection", i), wire)
         for i, wire in enumerate(scene.connection)
         if all(end.split(".")[0] in described for end in (wire.from_, wire.to))
-    ]  # an FMU that cannot be read is a problem of its own
+    ]  # an FMU that cannot be read has its own finding already
     asked = tuple(connect(wires, described, problems))
     fed = {f"{c.target}.{s.port}" for _, c in asked for s in c.inputs}
     rows = haptic_loop.wires(scene, {u.name: u.description for u in ours})

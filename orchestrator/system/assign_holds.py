@@ -1,11 +1,11 @@
-"""Which hold stands on which connection, and why a default does not.
+"""Assigns a hold to each connection, and says why a default was refused.
 
-[holds], [delays] and [kinds] speak of a connection as `source -> target`, by its target's port
-or by its source's port (all connections from there), the most precise first. Without a word of
-its own, a connection from a slower clock takes the scene's `hold`, one from a faster clock its
-`downsampling`, and one between clocks that only a phase parts `zoh`: the newest sample, of which
-nothing is missing; one within a rate holds nothing unless it is named or late. A hold that keeps
-account of energy goes, as a default, to every connection across clocks that carries power.
+[holds], [delays] and [kinds] name a connection as `source -> target`, by its target's port or by
+its source's port (all connections from there); the most precise name wins. By default a connection
+from a slower clock has the scene's `hold`, one from a faster clock its `downsampling`, and one
+between clocks that differ only in phase `zoh`, since every sample is read there. A connection
+within a rate has no hold unless it is named or has a latency. A default hold that needs power is
+assigned to every connection across clocks that carries power, in either direction.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 @dataclass(frozen=True)
 class Rules:
-    """What a scene says of its connections."""
+    """What a scene states about its connections, for `assign`."""
 
     hold: str = "zoh"
     downsampling: str = "latest"
@@ -33,7 +33,7 @@ class Rules:
     kinds: Mapping[str, str] = field(default_factory=dict)
     power: tuple[PowerPort, ...] = ()
     between_plants: str | None = None
-    """The hold within a rate between plants that are iterated; None where they are not."""
+    """The hold between plants of one rate under coupling "iterated"; None for other couplings."""
     springs: tuple[SetSpring, ...] = ()
 
 
@@ -46,8 +46,8 @@ def assign(
     assigned = tuple(_assign(connections, by_name, timeline, rules, refused))
     assigned = tuple(_with_springs(assigned, by_name, rules, refused))
     if rules.hold not in {c.hold for c in assigned}:
-        # A default that fits nowhere is a mistake where it needs something that is nowhere. Between
-        # iterated plants it was the interpolation that did not fit, and that gives way.
+        # A default hold that fits no connection is an error. Between iterated plants it was the
+        # interpolation that did not fit, which is replaced silently.
         refused = [
             r if r.key or _between_plants(r.connection, by_name) else replace(r, key="hold")
             for r in refused
@@ -95,7 +95,7 @@ def _with_springs(
     rules: Rules,
     refused: list[Refused],
 ) -> Iterator[Connection]:
-    """The connections, a hold that needs a spring refused where there is none for it."""
+    """The connections, with `zoh` where the hold needs a spring and has none that fits."""
     for c in connections:
         needs = HOLDS[c.hold].needs if c.hold else None
         reason = springs.misfit(c, rules.springs, connections, fmus) if needs == "spring" else None
@@ -107,7 +107,7 @@ def _with_springs(
 
 
 def _between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:
-    """Whether two plants of a rate are connected."""
+    """Whether the connection is between two plants of one clock."""
     source, target = fmus[c.source], fmus[c.target]
     return source.clock == target.clock and not source.sampled and not target.sampled
 
@@ -119,17 +119,18 @@ def _misfit(
     power: Iterable[PowerPort],
     iterated: bool,
 ) -> str | None:
-    """Why a hold cannot stand on a connection."""
+    """Why `hold` cannot be used on a connection, None where it can."""
     needs = HOLDS[hold].needs
     if iterated and not HOLDS[hold].interpolates:
         able = ", ".join(HOLDS.names(lambda kind: kind.interpolates))
         return f"coupling = 'iterated' interpolates here; take one of {able}"
     if c.kind == "table" and not HOLDS[hold].gives_samples:
-        return f"rows of {c.source_port} name things: between two samples there is none"
+        able = ", ".join(HOLDS.names(lambda kind: kind.gives_samples))
+        return f"{c.source_port} is a table, whose rows have no values in between; take {able}"
     if needs == "derivative" and derivative(c, fmus) is None:
         return (
-            f"{c.source} does not put out the derivative of {c.source_port}, or does not say so "
-            "(docs/holds.md, Derivatives); take 'foh', which makes it from two samples"
+            f"{c.source} does not put out the derivative of {c.source_port}, or does not declare "
+            "it (docs/holds.md, Derivatives); take 'foh', which uses the difference of two samples"
         )
     if needs == "power" and not carries_power(c, power):
         return (
@@ -141,7 +142,8 @@ def _misfit(
 
 
 def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connection]) -> Rules:
-    """The rules of `scene`, whose words go before what its FMUs declare."""
+    """The rules of `scene`. Power ports and springs of the scene come before those that its FMUs
+    declare, so that they take precedence."""
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
     delays = {
         key: d if isinstance(d, Latency) else Latency(min=d) for key, d in scene.delays.items()

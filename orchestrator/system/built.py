@@ -1,4 +1,4 @@
-"""The system of a scene with its FMUs built: what runs, prints and exports a scene starts from."""
+"""The system of a scene with its FMUs built: the start of a run, of `info` and of an export."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from hapticlink.orchestrator.system.timeline import timeline
 
 @contextmanager
 def built(scene: Scene, starts: Mapping[str, Starts] = MappingProxyType({})) -> Iterator[System]:
-    """The system of `scene`. Its FMU files are there within; those in the cache, later too.
-    `starts` by block go before the start values of its parameters.
+    """The system of `scene`, with its FMU files built or taken from the cache. `starts`, by block,
+    override the start values of its parameters.
 
-    Raises InputFault where the settings give no FMU, SceneFault for what does not fit together.
+    Files that are not in the cache exist only within the context. Raises InputFault where no FMU
+    can be built from the settings, SceneFault where FMUs and connections do not fit.
     """
     with temporary_folders.room() as room:
         time = timeline(scene)

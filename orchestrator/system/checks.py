@@ -1,4 +1,5 @@
-"""A scene's [holds], [delays], [kinds], [substeps], [[power]] and [[spring]] against its FMUs."""
+"""Checks a scene's [holds], [delays], [kinds], [substeps], [[power]] and [[spring]] against the
+ports of its FMUs, and its rates and coupling against their capabilities."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ def unfit(
     refused: Iterable[Refused],
     sets: Iterable[SetSpring],
 ) -> Iterator[Problem]:
-    """What these tables say of things that are not there, or that cannot be."""
+    """A finding for each name in these tables that the system does not have, and for each entry
+    that does not fit it; `sets` are the springs of the scene and of its FMUs."""
     by_name = {u.name: u for u in units}
     found = [c for c in connections if not c.initial]
     for table in ("holds", "delays", "kinds"):
@@ -59,18 +61,19 @@ def unfit(
 
 NOWHERE = {
     "spring": "no held connection sets a spring whose energy is known. One does in "
-    "closed-loop-direct, whose poses reach the mechanism's far end of F_drift; [[spring]] names "
+    "closed-loop-direct: its held poses are the set position of F_drift; [[spring]] declares "
     "those of other FMUs (docs/holds.md, pspm)",
     "power": "no connection across rates carries power that is known. One does in "
-    "closed-loop-direct; [[power]] names those of other FMUs (docs/holds.md, Energy)",
+    "closed-loop-direct; [[power]] declares those of other FMUs (docs/holds.md, Energy)",
 }
+"""Why a default hold fits no connection, by what it needs."""
 
 
 def _refused(
     scene: Scene, refused: Iterable[Refused], sets: Iterable[SetSpring]
 ) -> Iterator[Problem]:
-    """Holds that do not fit, each where the scene asks for it. A default that fits nowhere is told
-    where it nearly does, or else once."""
+    """A finding for each requested hold that does not fit, at its key in the scene. For a default
+    that fits no connection: one for each connection that sets a spring, or else a single one."""
     wires = {f"{w.from_} -> {w.to}": i for i, w in enumerate(scene.connection) if w.hold}
     sets = tuple(sets)
     asked = [r for r in refused if r.key]
@@ -105,7 +108,7 @@ def _power(scene: Scene, i: int, p: PowerPort, units: Mapping[str, Fmu]) -> Iter
 
 
 def step_sizes(scene: Scene, units: Iterable[Fmu], timeline: Timeline) -> Iterator[Problem]:
-    """A finding for each FMU that takes steps of one size only, where its clock's differ."""
+    """A finding for each FMU with a fixed communication step size on a clock whose steps vary."""
     paces, seconds = clocks(scene).paces, timeline.seconds
     for unit in units:
         clock = timeline.clock(unit.clock)
@@ -114,16 +117,16 @@ def step_sizes(scene: Scene, units: Iterable[Fmu], timeline: Timeline) -> Iterat
         least = seconds(min(clock.first, clock.shortest))
         yield (
             paces[clock.name].path,
-            f"{unit.name} takes steps of one size only ({VARIABLE_STEP} is not true), and here "
-            f"they are of {least:.6g} to {seconds(clock.longest):.6g} s: take a fixed rate, with "
-            "neither a phase nor align = 'tick'",
+            f"{unit.name} takes steps of one size only ({VARIABLE_STEP} is not true), but its "
+            f"steps here are {least:.6g} to {seconds(clock.longest):.6g} s: take a fixed rate, "
+            "with neither a phase nor align = 'tick'",
         )
 
 
 def iterated(
     scene: Scene, units: Iterable[Fmu], connections: Iterable[Connection]
 ) -> Iterator[Problem]:
-    """That nothing is there for `coupling = "iterated"` to iterate or interpolate."""
+    """A finding where coupling "iterated" has no connected plants of one rate to iterate."""
     plants = {u.name: u.clock for u in units if not u.sampled}
     between = any(
         c.source in plants and plants[c.source] == plants.get(c.target) and not c.initial
@@ -132,6 +135,6 @@ def iterated(
     if scene.coupling == "iterated" and not between:
         yield (
             ("coupling",),
-            "'iterated' makes connected plants of one rate agree at the end of their step, and "
+            "'iterated' repeats the steps of connected plants of one rate until they agree, and "
             "there are none: take it out (docs/coupling.md)",
         )

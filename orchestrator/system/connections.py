@@ -1,4 +1,4 @@
-"""Connections of the loop's own rows and of [[connection]] tables: two ends, found in the FMUs."""
+"""Resolves the haptic loop's wires and [[connection]] tables to variables of the FMUs."""
 
 from __future__ import annotations
 
@@ -19,36 +19,35 @@ def connect(
     described: Mapping[str, Description],
     problems: list[Problem],
 ) -> Iterator[tuple[Path, Connection]]:
-    """The connection of each wire between `described` FMUs, on which no hold stands yet; those that
-    cannot be go to `problems`, by the path of the wire."""
+    """The connection, without a hold yet, of each wire between the `described` FMUs. What cannot be
+    connected is appended to `problems`, at the wire's path."""
     fed: dict[tuple[str, str], str] = {}
     for path, wire in wires:
-        (giver, output), (taker, entry) = (e.split(".", 1) for e in (wire.from_, wire.to))
-        given: tuple[Scalar, ...] = ()
+        (source, output), (target, entry) = (e.split(".", 1) for e in (wire.from_, wire.to))
+        found: tuple[Scalar, ...] = ()
         inputs: tuple[Scalar, ...] = ()
         try:
-            given = outputs(described[giver], output)
+            found = outputs(described[source], output)
         except ValueError as error:
             problems.append(((*path, "from"), str(error)))
         try:
-            inputs = settable(described[taker], entry)
+            inputs = settable(described[target], entry)
         except ValueError as error:
             problems.append(((*path, "to"), str(error)))
-        if not given or not inputs:
+        if not found or not inputs:
             continue
         try:
-            inputs = _converted(wire, described[giver], given, described[taker], inputs)
+            inputs = _converted(wire, described[source], found, described[target], inputs)
         except ValueError as error:
             problems.append((path, str(error)))
             continue
-        made = Connection(giver, output, taker, entry, given, inputs)
-        twice = [s.name for s in inputs if (taker, s.name) in fed]
+        twice = [s.name for s in inputs if (target, s.name) in fed]
         if twice:
-            message = f"{taker}.{twice[0]} is fed by {fed[taker, twice[0]]} already; keep one"
+            message = f"{target}.{twice[0]} is fed by {fed[target, twice[0]]} already; keep one"
             problems.append(((*path, "to"), message))
             continue
-        fed |= {(taker, s.name): wire.from_ for s in inputs}
-        yield path, made
+        fed |= {(target, s.name): wire.from_ for s in inputs}
+        yield path, Connection(source, output, target, entry, found, inputs)
 
 
 def whole(
@@ -56,8 +55,8 @@ def whole(
     rows: Iterable[Wire],
     described: Mapping[str, Description],
 ) -> Iterator[Problem]:
-    """Connections to some entries of a vector that the loop's own `rows` feed: they take the place
-    of such a row, and the other entries would have no source."""
+    """A finding for each connection to only some entries of a vector that the haptic loop's `rows`
+    feed: it replaces the row, and would leave the other entries without a source."""
     sources, asked = {row.to: row.from_ for row in rows}, tuple(asked)
     fed = {(c.target, s.name) for _, c in asked for s in c.inputs}
     for path, c in asked:
@@ -71,25 +70,26 @@ def whole(
 
 def _converted(
     wire: Wire,
-    giver: Description,
-    given: tuple[Scalar, ...],
-    taker: Description,
+    source: Description,
+    outputs: tuple[Scalar, ...],
+    target: Description,
     inputs: tuple[Scalar, ...],
 ) -> tuple[Scalar, ...]:
-    """The inputs with what the connection does to their values. Raises ValueError."""
-    if len(given) != len(inputs) or inputs[0].type == "String":
-        sizes = f"{wire.from_} has {len(given)} numbers, {wire.to} takes {len(inputs)}"
+    """The inputs with the conversion of the wire: units, then its factor and offset. Raises
+    ValueError for different sizes, Strings, and units that cannot be converted."""
+    if len(outputs) != len(inputs) or inputs[0].type == "String":
+        sizes = f"{wire.from_} has {len(outputs)} numbers, {wire.to} takes {len(inputs)}"
         raise ValueError(f"{sizes}; connect their entries one by one")
     found = []
-    for a, b in zip(given, inputs, strict=True):
+    for a, b in zip(outputs, inputs, strict=True):
         units = SAME
         if wire.convert:
             try:
-                units = conversion(giver.unit(a), taker.unit(b), a.relative or b.relative)
+                units = conversion(source.unit(a), target.unit(b), a.relative or b.relative)
             except ValueError as error:
                 raise ValueError(
-                    f"{a.name} is in {a.unit}, {b.name} in {b.unit}: {error}; connect signals of "
-                    "one kind, or say convert = false"
+                    f"{a.name} is in {a.unit}, {b.name} in {b.unit}: {error}; connect quantities "
+                    "of one dimension, or write convert = false"
                 ) from None
         found.append(replace(b, conversion=Linear(wire.factor, wire.offset).after(units)))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""Operations and signals of a scene's blocks, as it is and with nothing left out."""
+"""Computational cost of a scene's blocks: arithmetic operations and signals per haptic tick."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hapticlink.orchestrator.system.fmu_files import settled
 
 @dataclass(frozen=True)
 class BlockCost:
-    """A block's cost, and how often it steps in a haptic tick (below 1 for the graphics rate)."""
+    """The cost of a block and its steps per haptic tick (below 1 at the graphics rate)."""
 
     name: str
     cost: Cost
@@ -23,28 +23,31 @@ class BlockCost:
 
     @property
     def operations(self) -> float:
-        """A haptic tick, on the average."""
+        """Arithmetic operations per haptic tick, on average."""
         return self.steps * (self.cost.step + self.cost.output)
 
     @property
     def signals(self) -> float:
-        """Inputs set and outputs read in a haptic tick, on the average."""
+        """Inputs set and outputs read per haptic tick, on average."""
         ports = (*self.cost.inputs.values(), *self.cost.outputs.values())
         return self.steps * sum(ports)
 
 
 def costs(scene: Scene, timeline: Timeline, *, skip: bool = True) -> tuple[BlockCost, ...]:
-    """Of every block; skip=False counts what the scene leaves out as well. Raises InputFault."""
+    """The cost of each block of `scene`; skip=False includes blocks and outputs that nothing needs.
+
+    Raises InputFault where no FMU can be built from the settings.
+    """
     tick = timeline.clock("haptics").longest
     clocks = {clock.name for clock in timeline.clocks}
     found = []
     for block in blocks(scene, skip=skip):
-        # A rate that nothing runs at has no clock; what is left out would run at it.
+        # A block that the scene skips may have a rate that no clock runs at.
         clock = timeline.of.get(block.name, str(block.rate))
         period = timeline.clock(clock).longest if clock in clocks else tick
         try:
-            made = cost(block.made_by, settled(scene, block, timeline), timeline.seconds(period))
+            counted = cost(block.made_by, settled(scene, block, timeline), timeline.seconds(period))
         except FmuError as error:
             raise InputFault(str(error)) from error
-        found.append(BlockCost(block.name, made, tick / period))
+        found.append(BlockCost(block.name, counted, tick / period))
     return tuple(found)

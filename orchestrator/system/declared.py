@@ -1,4 +1,4 @@
-"""What FMUs declare of their own ports, by the names that they have in a system."""
+"""Power ports and springs that FMUs declare in their annotations, by their names in a system."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hapticlink.orchestrator.system.system import Connection, Fmu
 
 
 def power(fmus: Iterable[Fmu]) -> Iterator[PowerPort]:
-    """The inputs that carry power."""
+    """The inputs that carry power, with their conjugate displacements."""
     for fmu in fmus:
         for port, declared in fmu.description.power.items():
             displacement = f"{fmu.name}.{declared.displacement}"
@@ -19,8 +19,8 @@ def power(fmus: Iterable[Fmu]) -> Iterator[PowerPort]:
 
 
 def springs(fmus: Iterable[Fmu], connections: Collection[Connection]) -> Iterator[SetSpring]:
-    """The springs within FMUs, with the gains that they start with; not those whose gains a
-    connection sets, which are known only when the run begins."""
+    """The spring-dampers within FMUs, with the start values of their gains. Springs whose gains a
+    connection sets are left out: their values are only known once the run begins."""
     fed = {(c.target, s.port) for c in connections if c.to_parameter for s in c.inputs}
     for fmu in fmus:
         for declared in fmu.description.springs:

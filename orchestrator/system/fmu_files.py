@@ -17,7 +17,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 
 
 def settled(scene: Scene, block: BlockPlan, timeline: Timeline) -> dict[str, Any]:
-    """The settings of a block, with what the timeline says."""
+    """The settings of a block. A mechanism with a local model also gets the longest step of the
+    graphics copy, `frame_s` (s)."""
     if not scene.local_model or block.name != "virtual_mechanism":
         return block.settings
     frame = timeline.clock(timeline.of["virtual_environment"])
@@ -31,11 +32,12 @@ def fmu_files(
     platforms: Sequence[str] = (),
     starts: Mapping[str, Starts] = MappingProxyType({}),
 ) -> dict[str, Path]:
-    """Block name -> FMU file, from the cache, or made in `room` where the cache is off.
+    """The FMU file of each block by its name, from the cache, or built in `room` where the cache is
+    off.
 
-    platforms are those of native FMUs, this machine's where none is named; `starts` by block go
-    before the start values of its parameters. Raises InputFault where
-    the settings give no FMU (a loop that does not close).
+    platforms: those of native FMUs, by default this machine's. starts: by block, values that
+    override the start values of its parameters. Raises InputFault where no FMU can be built from
+    the settings (a loop that does not close), Fault where the compiler fails.
     """
     files = {}
     for block in blocks(scene):

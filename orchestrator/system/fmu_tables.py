@@ -1,5 +1,4 @@
-"""[[fmu]] tables against the FMUs that they name: descriptions, start values, and the entries of
-a name."""
+"""Reads the FMUs of [[fmu]] tables: descriptions, start values, and the scalars behind a name."""
 
 from __future__ import annotations
 
@@ -20,8 +19,8 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 def fmus(
     scene: Scene, files: Mapping[str, FilePath], problems: list[Problem]
 ) -> Iterator[tuple[ForeignFmu, Description, Starts]]:
-    """Each FMU that can be used, with its start values; `files` are those of blocks that were
-    built. What is wrong goes to `problems`."""
+    """Each FMU that can be read, with its description and start values; `files` are the FMUs built
+    for blocks. Findings are appended to `problems`."""
     for i, fmu in enumerate(scene.fmu):
         try:
             found = describe(files.get(fmu.name) or FilePath(fmu.path or ""))
@@ -45,7 +44,8 @@ def fmus(
 
 
 def _with_derivative(found: Description, name: str, derivative: str) -> Description:
-    """Raises ValueError where the two are no outputs of one size."""
+    """The description with `derivative` declared as the derivative of `name`. Raises ValueError
+    unless both are outputs of one size."""
     entries, slopes = outputs(found, name), outputs(found, derivative)
     if len(entries) != len(slopes):
         raise ValueError(f"{derivative} has {len(slopes)} entries for the {len(entries)} of {name}")
@@ -54,7 +54,8 @@ def _with_derivative(found: Description, name: str, derivative: str) -> Descript
 
 
 def _start(found: Description, name: str, value: Value) -> Starts:
-    """Raises ValueError for a name that takes no start, and values that do not fit it."""
+    """The start value of each scalar of `name`. Raises ValueError for a name that takes no start
+    value, and for a value of a different size, type or range."""
     scalars = settable(found, name, start=True)
     values = value if isinstance(value, tuple) else (value,)
     if len(values) != len(scalars):
@@ -63,7 +64,7 @@ def _start(found: Description, name: str, value: Value) -> Starts:
 
 
 def outputs(found: Description, name: str) -> tuple[Scalar, ...]:
-    """The entries of an output. Raises ValueError where there is none."""
+    """The scalars of the output `name`. Raises ValueError where there is no such output."""
     entries = found.port(name, "output")
     if not entries:
         others = [s for s in found.scalars if name in (s.name, s.port)]
@@ -74,8 +75,8 @@ def outputs(found: Description, name: str) -> tuple[Scalar, ...]:
 
 
 def settable(found: Description, name: str, start: bool = False) -> tuple[Scalar, ...]:
-    """The entries of `name`, where a value may come in: once, at the `start`, or always. Raises
-    ValueError where there are none."""
+    """The scalars of the input or parameter `name`: those that can be connected, or with `start`,
+    those that take a start value. Raises ValueError where there are none."""
     able = attrgetter("startable" if start else "settable")
     every = (*found.scalars, *found.strings)
     named = [s for s in every if name in (s.name, s.port)]
@@ -90,7 +91,7 @@ def settable(found: Description, name: str, start: bool = False) -> tuple[Scalar
     if start:
         others = ", ".join(dict.fromkeys(s.port for s in found.scalars if able(s))) or "none"
         hint = (
-            ", and the FMU gives it no start of its own (initial exact or approx); what takes a "
-            f"start: {others}"
+            ", and the FMU gives it no start value (initial exact or approx); variables that take "
+            f"one: {others}"
         )
     raise ValueError(f"{name} cannot be set: its causality is {what}{hint}")

@@ -1,9 +1,10 @@
 """The report's block diagram (figures 4.1 and 4.4) as a table of connections.
 
-A row is made where both ends exist. x_start and x_ref are parameters: they are set once, in
-initialisation, so the device starts where the mechanism is. F_drift acts on the device as +
-and on the mechanism as -; the minus is the mechanism's own. The hand holds the true handle, not
-the measured one; without a device it holds the operational point itself.
+A row becomes a connection where both of its ends exist. x_start and x_ref are parameters that are
+set once, in initialisation mode, so that the device starts at the pose of the mechanism. F_drift
+acts on the device with + and on the mechanism with -; the mechanism applies the minus itself. The
+hand moves with the true pose of the handle, not with the measured one; without a device it moves
+with the operational point.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 Row = tuple[str, str]
 MECHANISM, CONTROLLER = "virtual_mechanism", "controller"
 WORKSPACE = ("haptic_device", "workspace_margin")
-"""The output that is negative where the device is out of its workspace."""
+"""The output (m) that is negative where the device is outside its workspace."""
 
 _LOOP: tuple[Row, ...] = (
     ("virtual_mechanism.x", "haptic_device.x_start"),
@@ -47,7 +48,7 @@ _LOOP: tuple[Row, ...] = (
 
 
 def wires(scene: Scene, described: Mapping[str, Description]) -> tuple[Wire, ...]:
-    """The rows whose two ends the scene's blocks, `described` by name, have."""
+    """The rows of which both ends are variables of the scene's blocks, `described` by name."""
 
     def has(end: str, *causalities: str) -> bool:
         block, port = end.split(".", 1)
@@ -61,13 +62,13 @@ def wires(scene: Scene, described: Mapping[str, Description]) -> tuple[Wire, ...
 
 
 def _rows(scene: Scene) -> tuple[Row, ...]:
-    """(source, target) as `fmu.variable`, of every connection that the scene may have."""
-    felt = "hand.F" if scene.sensing == "ideal" else "haptic_device.F_hand_observed"
-    directions = {"graphics": "virtual_environment", "mechanism": "virtual_mechanism"}
-    giver = directions[scene.directions_from]
-    held = ("haptic_device.x_true", "haptic_device.v_true")
+    """(source, target) as `fmu.variable`, for every connection that the scene may have."""
+    wrench = "hand.F" if scene.sensing == "ideal" else "haptic_device.F_hand_observed"
+    blocks = {"graphics": "virtual_environment", "mechanism": "virtual_mechanism"}
+    directions = blocks[scene.directions_from]
+    handle = ("haptic_device.x_true", "haptic_device.v_true")
     if not scene.device:
-        held = ("virtual_mechanism.x", "virtual_mechanism.v")
+        handle = ("virtual_mechanism.x", "virtual_mechanism.v")
     further: list[Row] = []
     for name in scene.hands:
         hand, at = f"hand_{name}", f"virtual_mechanism.{name}"
@@ -79,18 +80,19 @@ def _rows(scene: Scene) -> tuple[Row, ...]:
     return (
         *_LOOP,
         *further,
-        (held[0], "hand.x"),
-        (held[1], "hand.v"),
-        (felt, "controller.F_hand"),
-        (felt, "virtual_mechanism.F_hand"),
-        (f"{giver}.Lambda_inv", "controller.Lambda_inv"),
-        (f"{giver}.P_c", "controller.P_c"),
+        (handle[0], "hand.x"),
+        (handle[1], "hand.v"),
+        (wrench, "controller.F_hand"),
+        (wrench, "virtual_mechanism.F_hand"),
+        (f"{directions}.Lambda_inv", "controller.Lambda_inv"),
+        (f"{directions}.P_c", "controller.P_c"),
     )
 
 
 def energy_in_play(scene: Scene) -> float | None:
-    """J that gravity can turn over in the linkage; None where more than wrenches at its points put
-    energy into it: drives, forces of plugins, matrices or contacts that are held."""
+    """Scale (J) of the linkage's gravitational potential energy: weight times the sum of all link
+    lengths. None where not only wrenches at its points put energy into it: with drives, forces of
+    plugins, a held local model or held contacts."""
     linkage = scene.linkage
     held = scene.local_model or (scene.contacts and scene.contacts.detection == "graphics")
     if linkage is None or held or linkage.force or any(j.drive for j in linkage.joint):

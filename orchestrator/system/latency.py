@@ -1,8 +1,8 @@
-"""Samples on their way: a latency (computing, communication) and losses on a connection.
+"""Latency (of computing or communication) and loss of samples on a connection.
 
-A sample stamped t is known to the target from t + latency on, rounded up to a tick. Where
-latencies differ samples overtake each other: the newest stamp wins, and one that comes later
-than a newer one is dropped. The sample of t = 0 is known at once: a run starts in agreement.
+A sample stamped t is known to the target from t + latency on, rounded up to a tick. Where latencies
+differ, samples can overtake each other: one that arrives after a newer one is dropped. The sample
+of t = 0 is known at once, so that a run starts consistently.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ from hapticlink.orchestrator.scene.records import Latency
 
 
 class Link:
-    """The samples under way on one connection."""
+    """The samples in transit on one connection. A latency is drawn uniformly between min and max
+    (s), a loss with the given probability, both from PCG64 with the seed."""
 
     def __init__(self, latency: Latency, base: Fraction) -> None:
         self._low = exact(latency.min)
         self._spread = exact(latency.max) - self._low if latency.max is not None else Fraction(0)
         self._loss, self._base = latency.loss, base
         self._draw = np.random.Generator(np.random.PCG64(latency.seed)).random
-        self._under_way: list[tuple[int, int, int, Any]] = []
+        self._in_transit: list[tuple[int, int, int, Any]] = []
         self._order, self._newest = count(), 0
         self.sent = self.lost = self.overtaken = 0
 
@@ -41,12 +42,12 @@ class Link:
             self.lost += 1
             return
         late = math.ceil((self._low + self._spread * Fraction(share)) / self._base)
-        heapq.heappush(self._under_way, (stamp + late, stamp, next(self._order), item))
+        heapq.heappush(self._in_transit, (stamp + late, stamp, next(self._order), item))
 
     def arrived(self, tick: int) -> Iterator[tuple[int, int, Any]]:
-        """(arrival, stamp, item) of what is known at `tick` and was not before."""
-        while self._under_way and self._under_way[0][0] <= tick:
-            arrival, stamp, _, item = heapq.heappop(self._under_way)
+        """(arrival, stamp, item) of each sample that has arrived by `tick` since the last call."""
+        while self._in_transit and self._in_transit[0][0] <= tick:
+            arrival, stamp, _, item = heapq.heappop(self._in_transit)
             if stamp < self._newest:
                 self.overtaken += 1
                 continue
@@ -55,7 +56,7 @@ class Link:
 
 
 class Late(Hold):
-    """A hold at the far end of a link."""
+    """A hold that receives its samples through a link."""
 
     def __init__(self, hold: Hold, link: Link) -> None:
         self._hold, self.link = hold, link

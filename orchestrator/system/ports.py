@@ -1,4 +1,4 @@
-"""What a connection is by its ports: its names, its kind, its power, its derivative."""
+"""Properties of a connection that follow from its ports: names, kind, power and derivative."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ from hapticlink.orchestrator.system.system import Connection, Fmu
 
 
 def names(c: Connection) -> tuple[str, str, str]:
-    """The names under which a scene may speak of a connection, the most precise first."""
+    """The names by which a scene may refer to a connection, the most precise first."""
     return (c.name, f"{c.target}.{c.target_port}", f"{c.source}.{c.source_port}")
 
 
 def paired(c: Connection, entry: Scalar, power: Iterable[PowerPort]) -> PowerPort | None:
-    """The port of an input of a connection: the one that names it, or the vector that it is of."""
+    """The power port of an input of a connection, declared for that entry or for its vector; None
+    where there is none."""
     names = (f"{c.target}.{entry.name}", f"{c.target}.{entry.port}")
     return next((p for p in power if p.effort in names), None)
 
 
 def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
-    """Whether an entry of a connection does."""
+    """Whether an entry of a connection has a power port."""
     power = tuple(power)
     return any(paired(c, entry, power) for entry in c.inputs)
 
 
 def kind(c: Connection, fmus: Mapping[str, Fmu]) -> Kind | None:
-    """What the source declares of the connection's port; an entry of a matrix is no matrix."""
+    """The kind that the source declares for the connection's port; None for single entries of a
+    matrix."""
     source = fmus[c.source].description
     port = c.outputs[0].port
     found = source.kinds.get(port)
@@ -38,12 +40,13 @@ def kind(c: Connection, fmus: Mapping[str, Fmu]) -> Kind | None:
 
 
 def turns(c: Connection, fmus: Mapping[str, Fmu]) -> dict[int, float]:
-    """A whole turn in the unit of each entry of a connection that is an angle."""
+    """For each entry that is an angle, by its index, a full turn in its unit."""
     source = fmus[c.source].description
     found = {i: turn(source.unit(s)) for i, s in enumerate(c.outputs)}
     return {i: whole for i, whole in found.items() if whole}
 
 
 def derivative(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...] | None:
-    """The outputs of the source that are the derivatives of what the connection carries."""
+    """The outputs of the source that are the time derivatives of the connection's outputs; None
+    where the source does not declare them."""
     return fmus[c.source].description.derivative(c.outputs)

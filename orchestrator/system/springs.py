@@ -1,5 +1,5 @@
-"""Which connections set a spring-damper within a block, so that a hold may keep its energy in
-check."""
+"""Connections that set the position or velocity of a spring-damper within an FMU, whose energy a
+hold can then limit (`pspm`)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hapticlink.orchestrator.system.system import Connection, Fmu
 
 
 def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
-    """The spring that a connection sets."""
+    """The spring whose set position or set velocity a connection feeds; None if there is none."""
     return next((s for s in springs if _end(c) in s.ports), None)
 
 
@@ -23,7 +23,7 @@ def misfit(
     connections: Collection[Connection],
     units: Mapping[str, Fmu],
 ) -> str | None:
-    """Why what a connection sets cannot be kept in check."""
+    """Why a hold cannot limit the energy of the spring that a connection sets; None if it can."""
     found = spring(c, springs)
     if found is None:
         return (
@@ -35,11 +35,11 @@ def misfit(
     if near is None and not units[fmu].description.port(name, "output"):
         return f"the near end of its spring, {found.position}, is connected to nothing"
     if near and (near.hold or units[near.source].clock != units[near.target].clock):
-        return f"{found.position} is held too: the near end of its spring has to be at hand"
+        return f"{found.position} is held too: the near end of its spring must be read unheld"
     if any(gain < 0 for gain in (*found.stiffness, *found.damping)):
         return f"a gain of its spring is below 0: {[*found.stiffness]}, {[*found.damping]}"
     if any(s.conversion != SAME for k in (c, near) if k for s in k.inputs):
-        return f"a connection to its spring converts units: give them in those of {fmu}"
+        return f"a connection to its spring converts units: connect signals in the units of {fmu}"
     for other in connections:
         if _end(other) in found.ports and not other.initial and other.hold != c.hold:
             held = f"held by {other.hold!r}" if other.hold else "not held"
@@ -48,7 +48,7 @@ def misfit(
 
 
 def unfit(scene: Scene, units: Mapping[str, Fmu]) -> Iterator[Problem]:
-    """What [[spring]] says of ports that are not there, or that do not fit together."""
+    """A finding for each [[spring]] with ports that do not exist or that do not fit together."""
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]
         size = _size(s.set_position, units, "input")

@@ -1,4 +1,4 @@
-"""FMUs, the connections between them, and the hold of each that crosses rates."""
+"""The records of a system: FMUs, connections with their holds, and the timeline."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from hapticlink.orchestrator.scene.records import (
 
 @dataclass(frozen=True)
 class Fmu:
-    """One FMU of the system and the clock it steps at."""
+    """One FMU of the system, the clock that it steps at, its start values, and whether it runs in
+    a process of its own."""
 
     name: str
     description: Description
@@ -38,10 +39,11 @@ class Fmu:
 
 @dataclass(frozen=True)
 class Connection:
-    """A vector from one FMU's outputs to another's inputs; hold is None within one rate.
+    """A vector from outputs of one FMU to inputs of another; hold is None where every sample is
+    passed on as it is.
 
-    A connection to parameters acts at each communication point where they are tunable, else once,
-    in initialisation (`initial`; FMI 2.0.5 section 2.2.7).
+    A connection to tunable parameters acts at each communication point, one to fixed parameters
+    once, in initialisation mode (`initial`; FMI 2.0.5 section 2.2.7).
     """
 
     source: str
@@ -69,13 +71,13 @@ class Connection:
 
 @dataclass(frozen=True)
 class System:
-    """What is simulated, on which timeline, in which order of calls.
+    """What is simulated, on which timeline, with which coupling scheme.
 
-    power: the ports that carry it. substeps: steps that a plant takes between two reads, its
-    held inputs renewed at each. get_after_set: plants that may be read again after new inputs
-    are set. refused: default holds that did not fit. springs: what set positions set.
-    energy_in_play (J): what gravity can turn over in the mechanism, None where its energy is not
-    judged.
+    ends_when: condition that ends the run early. power: the power ports. substeps: by plant, the
+    doSteps per communication step, held inputs updated before each. get_after_set: plants whose
+    outputs may be read again after inputs are set, without a doStep between. refused: holds that
+    did not fit. springs: spring-dampers whose set positions are connected. energy_in_play: scale
+    of the mechanism's gravitational energy (J), None where its energy balance is not checked.
     """
 
     fmus: tuple[Fmu, ...]
@@ -112,7 +114,8 @@ class System:
 
 @dataclass(frozen=True)
 class Refused:
-    """A hold that does not fit: `key` is where the scene asks for it, None for the default."""
+    """A hold that does not fit a connection: `key` is the scene's key that requests it, None for a
+    default."""
 
     key: str | None
     connection: Connection

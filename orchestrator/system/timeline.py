@@ -1,4 +1,4 @@
-"""The exact timeline of a scene."""
+"""The timeline of a scene: its clocks, in exact ticks."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from hapticlink.orchestrator.scene.toml_keys import Path
 
 
 def timeline(scene: Scene) -> Timeline:
-    """The clocks that FMUs run at, and `haptics`; the end is the last haptic tick at or before the
-    duration. Raises SceneFault where a rate gives no steps."""
+    """The timeline with the clock `haptics` and those of all FMUs; it ends at the last haptic tick
+    at or before the duration. Raises SceneFault for a rate that cannot be put on ticks."""
     haptic = 1 / exact(scene.haptics.rate)
     steps = math.floor(exact(scene.duration) / haptic)
     given = clocks(scene)
@@ -58,21 +58,22 @@ def _period(pace: Pace) -> Fraction:
 
 
 def _on_ticks(pace: Pace, haptic: Fraction, steps: int) -> Sequence[int]:
-    """Starts of steps on haptic ticks, in those."""
+    """Starts of steps that are aligned to haptic ticks, counted in haptic ticks."""
     if isinstance(pace.rate, VariableRate):
         low, high, seed = exact(pace.rate.min), exact(pace.rate.max), pace.rate.seed
         return variable(low, high, seed, haptic, steps)
     if isinstance(pace.rate, tuple):
         starts = listed([exact(time) for time in pace.rate], haptic)
-        # A last time that is the end of the run has a row, too.
+        # One more step, so that a last time at the end of the run has a communication point.
         return (*starts, 2 * starts[-1] - starts[-2])
     return aligned(_period(pace), haptic, steps, pace.first)
 
 
 @dataclass(frozen=True)
 class Pace:
-    """rate: Hz, bounds, or the times (s) at which steps end. first: the end of the first step (s),
-    None where a rate varies. on_ticks: steps end on haptic ticks. path: where the scene says so."""
+    """When a clock steps. rate: Hz, bounds (Hz), or the times (s) at which steps end. first: end of
+    the first step (s), None where the rate varies. on_ticks: steps end on haptic ticks. path: the
+    scene's key for it."""
 
     rate: Fraction | VariableRate | tuple[float, ...]
     first: Fraction | None
@@ -82,14 +83,14 @@ class Pace:
 
 @dataclass(frozen=True)
 class Clocks:
-    """of: the clock of each FMU; paces: of each clock, the haptic one first."""
+    """of: the clock of each FMU. paces: the pace of each clock, the haptic one first."""
 
     of: Mapping[str, str]
     paces: Mapping[str, Pace]
 
 
 def clocks(scene: Scene) -> Clocks:
-    """The clocks of `scene`: `graphics` and others only where an FMU runs at them."""
+    """The clocks of `scene`: `haptics` always, others only where an FMU runs at them."""
     paths: dict[str, Path] = {fmu.name: ("fmu", i, "rate") for i, fmu in enumerate(scene.fmu)}
     rates = fmu_rates(scene).items()
     found = {fmu: _of(fmu, rate, paths.get(fmu, ()), scene) for fmu, rate in rates}
@@ -100,7 +101,7 @@ def clocks(scene: Scene) -> Clocks:
 
 
 def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> tuple[str, Pace]:
-    """The clock of an FMU and its pace."""
+    """The name of an FMU's clock, and its pace."""
     name, pace = _name(rate, scene), _pace(rate, path, scene)
     if fmu not in scene.phases or exact(scene.phases[fmu]) == pace.first:
         return name, pace
@@ -136,6 +137,6 @@ def _name(rate: AnyRate, scene: Scene) -> str:
 
 
 def _text(number: Fraction) -> str:
-    """One text for each number, fit for a file's name: 0.0005, 30000_1001."""
+    """A unique text for a number that can be part of a file name: 0.0005, 30000_1001."""
     short = f"{float(number):.12g}"
     return short if exact(short) == number else f"{number.numerator}_{number.denominator}"

@@ -1,6 +1,5 @@
-"""What a scene's records cannot say of one key alone: names that must exist, numbers that limit
-each other, tables that need each other. Each check yields (path in the file, message with
-remedy)."""
+"""Semantic checks of a scene: names that must exist, numbers that limit each other, tables that
+need each other. Each check yields (path in the file, message with remedy)."""
 
 from __future__ import annotations
 
@@ -21,7 +20,7 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 
 
 def check(scene: Scene) -> list[Problem]:
-    """Every fault found, in the order of the file's sections."""
+    """Every problem found."""
     found = [
         *_condition(scene),
         *rates.check(scene),

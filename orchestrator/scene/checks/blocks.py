@@ -1,4 +1,5 @@
-"""What further hands, the local model and `packaging` need; each yields (path, message)."""
+"""Checks that blocks have the tables they depend on: local model, packaging, controller, hand, and
+further points; each yields (path, message)."""
 
 from __future__ import annotations
 
@@ -40,6 +41,7 @@ def check(scene: Scene) -> Iterator[Problem]:
 
 
 def missing(scene: Scene) -> Iterator[Problem]:
+    """A problem for each table that needs another one which is missing."""
     if not scene.linkage and not scene.device and not scene.fmu:
         yield ("linkage",), "nothing to simulate: give a [linkage], a [device] or an [[fmu]]"
     if not scene.linkage:

@@ -1,4 +1,5 @@
-"""What the shape of [contacts] cannot say. Each check yields (path in the file, message)."""
+"""Checks [contacts] and the shapes of bodies: convex polygons, unique names, something to touch.
+Each check yields (path in the file, message)."""
 
 from __future__ import annotations
 
@@ -53,7 +54,7 @@ def _obstacles(contacts: Contacts) -> Iterator[Problem]:
 
 
 def _convex(path: Path, corners: tuple[Point, ...]) -> Iterator[Problem]:
-    """Every corner turns left, and all of them together once around."""
+    """Problems unless the polygon is convex: every corner turns left, by one turn in all."""
     if len(corners) < 3:
         yield path, f"{len(corners)} corners: a polygon has 3 or more"
         return

@@ -1,4 +1,4 @@
-"""What the records of delays and [step_control] cannot say."""
+"""Checks the bounds of [delays] and [step_control] against each other."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 
 
 def check(scene: Scene) -> Iterator[Problem]:
-    """Every fault found."""
+    """A problem where the shortest step is longer than the longest one."""
     control = scene.step_control
     if control and control.max is not None and exact(control.min) > exact(control.max):
         yield ("step_control", "min"), f"{control.min} s is above max = {control.max} s: swap them"
 
 
 def delays(scene: Scene) -> Iterator[Problem]:
+    """A problem for each latency whose max is below its min."""
     for name, late in scene.delays.items():
         if isinstance(late, Latency) and late.max is not None and late.max < late.min:
             message = f"max = {late.max} s is below min = {late.min} s: swap them"

@@ -1,4 +1,4 @@
-"""Numbers of [device] and [directions] that limit each other; each yields (path, message)."""
+"""Checks numbers of [device] and [directions] that limit each other."""
 
 from __future__ import annotations
 

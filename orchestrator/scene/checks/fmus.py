@@ -1,5 +1,5 @@
-"""What [[fmu]], [[connection]] and [faults] must say before any FMU is opened; `wiring` checks them
-against the FMUs themselves. Each check yields (path in the file, message with remedy)."""
+"""Checks [[fmu]] and [[connection]] before any FMU is opened; `system` checks them against the FMUs
+themselves. Each check yields (path in the file, message with remedy)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
 def check(scene: Scene) -> Iterator[Problem]:
-    """Every fault found, in the order of the file."""
+    """Every problem found, in the order of the file."""
     taken = [b.name for b in loop_blocks(scene)]
     for i, fmu in enumerate(scene.fmu):
         path: Path = ("fmu", i)
@@ -37,7 +37,7 @@ def check(scene: Scene) -> Iterator[Problem]:
 
 
 def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
-    """A file, or a block that is built."""
+    """Problems unless the FMU is either a file or a block to build."""
     if fmu.path is None and fmu.block is None:
         yield (*path, "block"), "is missing, and so is path: give a block to build or an FMU's file"
     if fmu.path is not None and not FilePath(fmu.path).is_file():

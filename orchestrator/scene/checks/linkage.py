@@ -1,4 +1,4 @@
-"""Names and numbers of a linkage that its records cannot check: trees, loops, points."""
+"""Checks the names of a linkage: a tree of joints, loops between bodies, points on bodies."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def check(linkage: Linkage) -> Iterator[Problem]:
 
 
 def _tree(linkage: Linkage, frames: list[str]) -> Iterator[Problem]:
-    """Every body hangs on ground by exactly one joint of each body on the way."""
+    """Problems unless the joints form a tree: each body is the child of exactly one joint, and is
+    connected to ground."""
     parents: dict[str, str] = {}
     names: set[str] = set()
     for i, joint in enumerate(linkage.joint):
@@ -75,6 +76,7 @@ def _tree(linkage: Linkage, frames: list[str]) -> Iterator[Problem]:
 
 
 def points(scene: Scene) -> Iterator[Problem]:
+    """Problems of [[linkage.point]] and of the hands at these points."""
     points = scene.linkage.point if scene.linkage else ()
     bodies = [b.name for b in scene.linkage.body] if scene.linkage else []
     names: set[str] = {"operational_point"}

@@ -1,5 +1,5 @@
-"""What the records of rates and phases cannot say. Each check yields (path in the file, message
-with remedy)."""
+"""Checks rates and phases against each other and the duration. Each check yields (path in the file,
+message with remedy)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
 def check(scene: Scene) -> Iterator[Problem]:
-    """Every fault found."""
+    """Every problem found."""
     if exact(scene.duration) * exact(scene.haptics.rate) < 1:
         yield (
             ("duration",),
@@ -60,7 +60,7 @@ def _phases(scene: Scene) -> Iterator[Problem]:
             rate = scene.haptics.rate
         elif rate == "graphics":
             if not scene.graphics:
-                continue  # told of already
+                continue  # reported already
             rate = scene.graphics.rate
         yield from _phase(path, phase, rate)
 

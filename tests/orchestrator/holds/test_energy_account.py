@@ -117,7 +117,7 @@ def test_its_account_is_the_meters(
         return float(generator.normal()) * step * moves
 
     line.run(500, lambda: generator.uniform(-LARGEST, LARGEST), go)
-    made, scale = float(line.hold.made.sum()), 5.0 * 200
+    made, scale = float(line.hold.generated.sum()), 5.0 * 200
     assert made == pytest.approx(line.told.energy(1.0).made, abs=1e-12 * scale)
     link = line.late.link
     if not link.lost and not link.overtaken:
@@ -191,8 +191,9 @@ def test_what_passive_makes_of_white_noise_is_bounded(
         line.v[:] = generator.normal()
         line.held[:] = line.late.value(tick, step / 2)
         way = (float(line.v[0]) if known else 0.0) + generator.normal() * generator.choice([0.1, 1])
-        moved, ahead = way * step, float(hold.ahead[0])
-        foreseen = moved * ahead > 0 and abs(moved) <= abs(ahead) + abs(float(hold.straight[0]))
+        moved, ahead = way * step, float(hold.predicted[0])
+        limit = abs(ahead) + abs(float(hold.predicted_steady[0]))
+        foreseen = moved * ahead > 0 and abs(moved) <= limit
         if not foreseen or hold.beta[0] < 1.0:
             unforeseen += abs(moved)
         return moved

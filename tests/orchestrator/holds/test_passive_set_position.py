@@ -158,7 +158,7 @@ def test_where_no_spring_is_set_or_half_of_one_it_is_refused(
 
 
 def test_a_near_end_that_is_late_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SceneFault, match="near end of its spring has to be at hand"):
+    with pytest.raises(SceneFault, match="near end of its spring must be read unheld"):
         simulate("closed-loop-direct", tmp_path, ["hold=pspm", "delays.controller.x_D=0.004"])
 
 

@@ -253,7 +253,7 @@ def test_an_ssp_whose_structure_is_to_change(tmp_path: Path) -> None:
 
 
 def test_iterated_where_no_plants_of_a_rate_are_connected(tmp_path: Path) -> None:
-    with pytest.raises(SceneFault, match=r"coupling: 'iterated' makes connected plants"):
+    with pytest.raises(SceneFault, match=r"'iterated' repeats the steps of connected plants"):
         simulate("pendulum", tmp_path, ["coupling=iterated"])
 
 
