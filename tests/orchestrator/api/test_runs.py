@@ -15,7 +15,7 @@ import hapticlink as hl
 from hapticlink.orchestrator.results import figures
 from tests.orchestrator.conftest import status
 
-SHORT = {"duration": 0.2, "graphics.rate": 40}
+SHORT = {"duration": 0.1, "graphics.rate": 40}
 FAR = {"linkage.start_velocity.slide": 1e308, "linkage.start.slide": 1.7e308}
 """A pose that is finite, and overflows after some steps."""
 
@@ -45,7 +45,7 @@ def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
     for key in ("scene", "options", "files", "holds", "end", "stop_when"):
         assert folder.run[key] == command.run[key]
     assert set(folder.run["files"]) == {p.name for p in (tmp_path / "api").iterdir()}
-    assert folder.run["options"] == ["duration=0.2", "graphics.rate=40"]
+    assert folder.run["options"] == ["duration=0.1", "graphics.rate=40"]
 
 
 def test_options_of_a_scene_object_act(bar: Path) -> None:

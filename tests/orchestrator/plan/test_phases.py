@@ -37,7 +37,7 @@ def test_a_phase_of_our_block_moves_it_alone(share: tuple[int, int], rate: str) 
 def test_explain_and_run_json_tell_phases(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["phases.virtual_mechanism=0.0005", "duration=0.2"]
+    options = ["phases.virtual_mechanism=0.0005", "duration=0.1"]
     flags = [text for option in options for text in ("--set", option)]
     with pytest.raises(SystemExit, match="0"):
         main(["run", "closed-loop", "--explain", *flags])
@@ -74,7 +74,7 @@ def test_explain_goes_on_until_all_phases_have_begun_and_come_again(
 
 
 def test_clocks_that_a_phase_parts_hold_the_newest_sample_unless_named(tmp_path: Path) -> None:
-    options = ["duration=0.2", "hold=foh", "downsampling=mean"]
+    options = ["duration=0.02", "hold=foh", "downsampling=mean"]
     options += ["phases.virtual_mechanism='1/1024'", "holds.controller.F_drift=lead"]
     run = simulate("closed-loop", tmp_path, options).results.run
     assert run["holds"] == {
