@@ -109,6 +109,7 @@ def _story(scene: Scene, plan: Plan) -> dict[str, Any]:
         "coupling": system.coupling,
         "loops": [asdict(loop) for loop in plan.loops()],
         "connections": [c.name for c in system.connections],
+        "replaced": {name: asdict(r) for name, r in system.replacements.items()},
     } | holds(system)
 
 
@@ -118,7 +119,7 @@ def _compilers(scene: Scene) -> tuple[str, ...]:
 
 def _seeds(scene: Scene, system: System) -> dict[str, int]:
     rates = {"graphics.rate": scene.graphics.rate} if scene.graphics else {}
-    rates |= {f"fmu.{fmu.name}.rate": fmu.rate for fmu in scene.fmu}
+    rates |= {f"fmu.{fmu.name}.rate": fmu.rate for fmu in scene.fmu if fmu.rate}
     seeds = {name: r.seed for name, r in rates.items() if isinstance(r, VariableRate)}
     return seeds | {c.name: c.latency.seed for c in system.connections if c.latency}
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.orchestrator.commands.options import Out, Scene, Set
+from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, options
 from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.results.summary import MECHANISM
 from hapticlink.orchestrator.system.system import System
@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from hapticlink.orchestrator.base.ticks import Timeline
 
 
-def info(scene: Scene | None = None, /, *, set: Set = None, out: Out = None) -> int:
+def info(
+    scene: Scene | None = None, /, *, set: Set = None, swap: Swap = None, out: Out = None
+) -> int:
     """Tell what a scene consists of: rates, FMUs, connections, holds; where the device's workspace
     lies, and whether the scene starts in it; what it needs and leaves out, and what that saves.
     Without SCENE, list the shipped scenes. With OUT, draw the workspace there, as workspace.png.
@@ -32,7 +34,7 @@ def info(scene: Scene | None = None, /, *, set: Set = None, out: Out = None) -> 
         for name, title in api.shipped().items():
             print(f"{name}: {title}")
         return 0
-    read = api.scene(scene, set or ())
+    read = api.scene(scene, options(set, swap))
     with built(read) as made:
         time = made.timeline
         start = at_start(made) if read.linkage and (read.linkage.loop or read.device) else {}
@@ -54,6 +56,8 @@ def info(scene: Scene | None = None, /, *, set: Set = None, out: Out = None) -> 
         else:
             note = "at the start only"
         print(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
+    for line in summary.replaced({n: asdict(r) for n, r in made.replacements.items()}):
+        print(f"  {line}")
     if read.device:
         _workspace(read, [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)], out)
     _needs(read, time)

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.orchestrator.base.faults import Fault
-from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
+from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, default_folder, options
 from hapticlink.orchestrator.commands.progress import progress
 
 Explain = Annotated[
@@ -16,17 +16,25 @@ Explain = Annotated[
 ]
 
 
-def run(scene: Scene, /, *, out: Out = None, set: Set = None, explain: Explain = False) -> int:
+def run(
+    scene: Scene,
+    /,
+    *,
+    out: Out = None,
+    set: Set = None,
+    swap: Swap = None,
+    explain: Explain = False,
+) -> int:
     """Run a scene: results as CSV, run.json, plan.txt and figures in OUT (default runs/<scene>)."""
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.results import summary
 
     if explain:
-        print(*api.explain(scene, set or ()), sep="\n")
+        print(*api.explain(scene, options(set, swap)), sep="\n")
         return 0
     folder = out or default_folder("runs", scene)
     try:
-        read = api.scene(scene, set or ())
+        read = api.scene(scene, options(set, swap))
         with progress(read.title, read.duration) as told:
             made = api.run(read, out=folder, progress=told)
     except api.RunInterrupted as ended:

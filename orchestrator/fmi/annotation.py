@@ -33,9 +33,9 @@ TIMINGS = ("continuous", "sampled")
 
 @dataclass(frozen=True)
 class Annotation:
-    """kinds by output port, power by input port."""
+    """kinds by output port, power by input port; timing is None where the FMU declares none."""
 
-    timing: Timing = "continuous"
+    timing: Timing | None = None
     kinds: Mapping[str, Kind] = field(default_factory=dict)
     power: Mapping[str, Power] = field(default_factory=dict)
     springs: tuple[Spring, ...] = ()
@@ -46,7 +46,9 @@ def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) ->
     block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
     if block is None:
         return Annotation()
-    timing: Any = _one_of(block.get("timing", TIMINGS[0]), "timing", TIMINGS)
+    timing: Any = block.get("timing")
+    if timing is not None:
+        _one_of(timing, "timing", TIMINGS)
     ports = _Ports(scalars, units)
     kinds: dict[str, Kind] = {}
     power: dict[str, Power] = {}

@@ -60,6 +60,8 @@ class Description:
     power: Mapping[str, Power] = field(default_factory=dict)
     springs: tuple[Spring, ...] = ()
     """What the FMU declares of its ports, by port (`annotation`)."""
+    declares_timing: bool = False
+    """Whether the FMU itself says its timing."""
 
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
         """The entries of vector `name` (or the scalar of that very name), in the order of their
@@ -125,7 +127,7 @@ def describe(path: Path) -> Description:
         path,
         model.guid,
         model.coSimulation.modelIdentifier,
-        declared.timing,
+        declared.timing or "continuous",
         scalars,
         version[0],
         units,
@@ -141,6 +143,7 @@ def describe(path: Path) -> Description:
         kinds=declared.kinds,
         power=declared.power,
         springs=declared.springs,
+        declares_timing=declared.timing is not None,
     )
 
 

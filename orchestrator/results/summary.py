@@ -35,6 +35,7 @@ def lines(results: Results) -> Iterator[str]:
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
             "Lambda_inv, P_c and contacts: take graphics.sync = 'exact'"
         )
+    yield from replaced(run.get("replaced", {}))
     for fmu, count in run["held_outputs"].items():
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
     for fmu, count in run["smaller_steps"].items():
@@ -56,6 +57,15 @@ def lines(results: Results) -> Iterator[str]:
         gave_way = [f"{name} ({why['reason']})" for name, why in group]
         more = f" and {len(gave_way) - 1} more" if len(gave_way) > 1 else ""
         yield f"hold {hold} does not fit {gave_way[0]}{more}: zoh there"
+
+
+def replaced(found: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each kind of thing that an FMU in the place of a block lacks."""
+    for name, replacement in found.items():
+        if lost := replacement["lost"]:
+            yield f"{name} has no ports for {len(lost)} connections: {', '.join(lost)}"
+        if unfed := replacement["unfed"]:
+            yield f"{name}: inputs that nothing feeds: {', '.join(unfed)}"
 
 
 def _start(results: Results) -> Iterator[str]:

@@ -32,12 +32,32 @@ def blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
 
     skip=False includes what nothing in the scene uses.
     """
-    named = (BlockPlan(f.name, f.rate, dict(f.settings), f.block) for f in scene.fmu if f.block)
+    rates = fmu_rates(scene)
+    named = (
+        BlockPlan(f.name, rates[f.name], dict(f.settings), f.block) for f in scene.fmu if f.block
+    )
     return (*loop_blocks(scene, skip=skip), *named)
 
 
 def loop_blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
-    """The blocks of the haptic loop, in its order; skip=False includes what nothing uses."""
+    """The blocks of the haptic loop that no FMU replaces, in its order; skip=False includes what
+    nothing uses."""
+    replacing = {f.replaces for f in scene.fmu}
+    return tuple(b for b in _loop(scene, skip) if b.name not in replacing)
+
+
+def replaced_blocks(scene: Scene) -> dict[str, BlockPlan]:
+    """The blocks of the haptic loop that an FMU of the scene replaces, by name."""
+    replacing = {f.replaces for f in scene.fmu}
+    return {b.name: b for b in _loop(scene, True) if b.name in replacing}
+
+
+def loop_names(scene: Scene) -> list[str]:
+    """The names of the loop's blocks in its order, replaced ones among them."""
+    return [b.name for b in _loop(scene, True)]
+
+
+def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
     if not skip:
         scene = unskipped(scene)
     found = []
@@ -76,8 +96,10 @@ def loop_blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
 
 
 def fmu_rates(scene: Scene) -> dict[str, AnyRate]:
-    """The rate of each FMU by its name: the scene's blocks, then those of [[fmu]]."""
-    return {b.name: b.rate for b in blocks(scene)} | {f.name: f.rate for f in scene.fmu}
+    """The rate of each FMU by its name: of the scene's blocks, then of [[fmu]] tables."""
+    replaced = {name: b.rate for name, b in replaced_blocks(scene).items()}
+    foreign = {f.name: f.rate or replaced.get(f.name, "haptics") for f in scene.fmu}
+    return {b.name: b.rate for b in loop_blocks(scene)} | foreign
 
 
 def impedance(scene: Scene) -> bool:

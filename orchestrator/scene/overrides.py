@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from pathlib import PurePath
 from typing import Any
 
@@ -83,32 +84,35 @@ def _key(option: str) -> tuple[tuple[str, ...], str, str]:
 def apply(data: dict[str, Any], option: str) -> Path:
     """Set the key in `data`; returns the path of the key, or of the first table created for it.
 
-    Entries of an array of tables are addressed by name or by index (from 0):
-    `linkage.body.link1.mass=2`. Raises InputFault where there is no such entry, or where a part of
-    the key is no table.
+    Entries of an array of tables are addressed by name or by index (from 0), and + appends one:
+    `linkage.body.link1.mass=2`, `fmu.+={ name = "filter", path = "filter.fmu" }`.
+    Raises InputFault where there is no such entry, or where a part of the key is no table.
     """
     names, value = parse(option)
     names = whole(names)
     node: Any = data
     path: Path = ()
     new: Path | None = None
-    for name, last in zip(names, (*(False for _ in names[1:]), True), strict=True):
+    for name, following in zip_longest(names, names[1:]):
         place: str | int = name
         if isinstance(node, list):
             place = _entry(node, name, option)
         elif not isinstance(node, dict):
             raise InputFault(f"--set {option}: {'.'.join(map(str, path))} is {node!r}, not a table")
         path = (*path, place)
-        if last:
+        if following is None:
             node[place] = value
         elif isinstance(node, dict) and not isinstance(node.get(name), dict | list):
-            node[place] = {}
+            node[place] = [] if following == "+" else {}
             new = new or path
         node = node[place]
     return new or path
 
 
 def _entry(entries: list[Any], name: str, option: str) -> int:
+    if name == "+":
+        entries.append({})
+        return len(entries) - 1
     if name.isdigit() and int(name) < len(entries):
         return int(name)
     known = [str(e.get("name", i)) for i, e in enumerate(entries) if isinstance(e, dict)]

@@ -33,25 +33,34 @@ Value = (
 class ForeignFmu:
     """An FMU for co-simulation (FMI 2.0 or 3.0), or a block that is built into one."""
 
-    name: str
-    """Its name in connections and results: letters, digits and _."""
+    name: str = ""
+    """Its name in connections and results: letters, digits and _; that of the block that it
+    replaces."""
+    replaces: str | None = None
+    """The block of the haptic loop whose place it takes, with the connections of the ports that
+    both have: [foreign FMUs](foreign-fmus.md#in-the-place-of-a-block)."""
     path: str | None = None
     """Its file, relative to the scene's file."""
     block: Annotated[str, BLOCKS.names()] | None = None
     """In place of a file, the block to build ([extending](extending.md#a-block))."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the block, by name."""
-    rate: Literal["haptics", "graphics"] | AnyRate = "haptics"
-    """Its communication rate: one of the scene's, or its own, written as graphics.rate is."""
+    rate: Literal["haptics", "graphics"] | AnyRate | None = None
+    """Its communication rate: one of the scene's, or its own, written as graphics.rate is. By
+    default that of the block that it replaces, else "haptics"."""
     timing: Literal["sampled", "continuous"] | None = None
     """sampled: doStep(t, h) computes y(t) from the inputs at t; continuous: y(t + h). By default
-    what the FMU declares, else "continuous"."""
+    what the FMU declares, else that of the block that it replaces, else "continuous"."""
     start: Mapping[str, Value] = field(default_factory=dict)
     """Start values of inputs and parameters by name; a list for a whole vector."""
     derivatives: Mapping[str, str] = field(default_factory=dict)
     """For an output, the output that is its time derivative, where the FMU does not declare it."""
     isolate: bool = False
     """Runs it in a process of its own."""
+
+    def __post_init__(self) -> None:
+        if self.replaces and not self.name:
+            object.__setattr__(self, "name", self.replaces)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -193,7 +193,8 @@ class Scene:
     def ends_when(self) -> str:
         """The condition that ends the run, its default included; "" where there is none."""
         if self.stop_when is None:
-            return "haptic_device.workspace_margin < 0" if self.device else ""
+            own = self.device and all(f.replaces != "haptic_device" for f in self.fmu)
+            return "haptic_device.workspace_margin < 0" if own else ""
         return self.stop_when
 
 

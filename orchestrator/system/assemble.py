@@ -9,13 +9,13 @@ from pathlib import Path
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.scene.blocks import loop_blocks
+from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path as Keys
 from hapticlink.orchestrator.scene.toml_keys import Problem
-from hapticlink.orchestrator.system import checks, fmu_tables, haptic_loop
+from hapticlink.orchestrator.system import checks, fmu_tables, haptic_loop, replacements
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import connect, whole
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
@@ -29,13 +29,16 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     """
     problems: list[Problem] = []
     of = timeline.of
+    blocks = replacements.replaced(scene, timeline)
     ours = tuple(Fmu(b.name, describe(files[b.name]), of[b.name]) for b in loop_blocks(scene))
     foreign = (
         Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
-        for fmu, description, starts in fmu_tables.fmus(scene, files, problems)
+        for fmu, description, starts in fmu_tables.fmus(scene, files, blocks, problems)
     )
-    fmus = tuple(replace(u, isolate=u.isolate or scene.isolate) for u in (*ours, *foreign))
-    connections = _connections(scene, ours, fmus, problems)
+    order = {name: i for i, name in enumerate(loop_names(scene))}
+    every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
+    fmus = tuple(replace(u, isolate=u.isolate or scene.isolate) for u in every)
+    connections = _connections(scene, fmus, problems)
     rules = rules_of(scene, fmus, connections)
     assigned, refused = assign(fmus, connections, timeline, rules)
     problems += checks.unfit(scene, fmus, assigned, refused, rules.springs)
@@ -61,11 +64,12 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         refused,
         rules.springs,
         haptic_loop.energy_in_play(scene),
+        replacements.replacements(blocks, haptic_loop.rows(scene), fmus, assigned),
     )
 
 
 def _connections(
-    scene: Scene, ours: Iterable[Fmu], fmus: Iterable[Fmu], problems: list[Problem]
+    scene: Scene, fmus: Iterable[Fmu], problems: list[Problem]
 ) -> tuple[Connection, ...]:
     """The connections of [[connection]], and those of the haptic loop to inputs that no
     [[connection]] feeds."""
@@ -77,10 +81,19 @@ def _connections(
     ]  # an FMU that cannot be read has its own finding already
     asked = tuple(connect(wires, described, problems))
     fed = {f"{c.target}.{s.port}" for _, c in asked for s in c.inputs}
-    rows = haptic_loop.wires(scene, {u.name: u.description for u in ours})
-    loop = tuple(connect((((), w) for w in rows if w.to not in fed), described, problems))
+    own = {f.name for f in scene.fmu if not f.replaces}
+    rows = haptic_loop.wires(scene, {n: d for n, d in described.items() if n not in own})
+    paths: dict[str, Keys] = {f.name: ("fmu", i) for i, f in enumerate(scene.fmu)}
+    wires = [(_path(w, paths), w) for w in rows if w.to not in fed]
+    loop = tuple(connect(wires, described, problems))
     problems += whole(asked, rows, described)
     return tuple(c for _, c in (*loop, *asked))
+
+
+def _path(wire: Wire, paths: Mapping[str, Keys]) -> Keys:
+    """Where a connection of the loop comes from a scene's table: from that of a replacement."""
+    ends = (end.partition(".")[0] for end in (wire.from_, wire.to))
+    return next(((*paths[end], "replaces") for end in ends if end in paths), ())
 
 
 def _has_output(units: Iterable[Fmu], condition: Condition) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from operator import attrgetter
 from pathlib import Path as FilePath
 
+from hapticlink.components.component import Component
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.fmi.start_values import Starts, fitting
@@ -17,7 +18,10 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 
 
 def fmus(
-    scene: Scene, files: Mapping[str, FilePath], problems: list[Problem]
+    scene: Scene,
+    files: Mapping[str, FilePath],
+    replaced: Mapping[str, Component],
+    problems: list[Problem],
 ) -> Iterator[tuple[ForeignFmu, Description, Starts]]:
     """Each FMU that can be read, with its description and start values; `files` are the FMUs built
     for blocks. Findings are appended to `problems`."""
@@ -27,8 +31,11 @@ def fmus(
         except InputFault as fault:
             problems.append((("fmu", i, "path"), str(fault)))
             continue
+        block = replaced.get(fmu.name)
         if fmu.timing:
             found = replace(found, timing=fmu.timing)
+        elif block and not found.declares_timing:
+            found = replace(found, timing=block.timing)
         for name, derivative in fmu.derivatives.items():
             try:
                 found = _with_derivative(found, name, derivative)

@@ -47,6 +47,11 @@ _LOOP: tuple[Row, ...] = (
 )
 
 
+def rows(scene: Scene) -> tuple[Wire, ...]:
+    """Every connection that the loop of the scene may have."""
+    return tuple(Wire(from_=source, to=target) for source, target in _rows(scene))
+
+
 def wires(scene: Scene, described: Mapping[str, Description]) -> tuple[Wire, ...]:
     """The rows of which both ends are variables of the scene's blocks, `described` by name."""
 
@@ -55,9 +60,7 @@ def wires(scene: Scene, described: Mapping[str, Description]) -> tuple[Wire, ...
         return block in described and bool(described[block].port(port, *causalities))
 
     return tuple(
-        Wire(from_=source, to=target)
-        for source, target in _rows(scene)
-        if has(source, "output") and has(target, "input", "parameter")
+        row for row in rows(scene) if has(row.from_, "output") and has(row.to, "input", "parameter")
     )
 
 
@@ -92,10 +95,11 @@ def _rows(scene: Scene) -> tuple[Row, ...]:
 def energy_in_play(scene: Scene) -> float | None:
     """Scale (J) of the linkage's gravitational potential energy: weight times the sum of all link
     lengths. None where not only wrenches at its points put energy into it: with drives, forces of
-    plugins, a held local model or held contacts."""
+    plugins, a held local model or held contacts, or an FMU in the place of a block."""
     linkage = scene.linkage
+    replaced = any(f.replaces for f in scene.fmu)
     held = scene.local_model or (scene.contacts and scene.contacts.detection == "graphics")
-    if linkage is None or held or linkage.force or any(j.drive for j in linkage.joint):
+    if linkage is None or replaced or held or linkage.force or any(j.drive for j in linkage.joint):
         return None
     spans = [p for j in linkage.joint for p in (j.at_parent, j.at_child) if p]
     spans += [b.center for b in linkage.body if b.center]

@@ -70,6 +70,15 @@ class Connection:
 
 
 @dataclass(frozen=True)
+class Replacement:
+    """An FMU in the place of a block. lost: connections of the block to ports that the FMU does not
+    have. unfed: inputs of the FMU that no connection feeds, which keep their start values."""
+
+    lost: tuple[str, ...]
+    unfed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class System:
     """What is simulated, on which timeline, with which coupling scheme.
 
@@ -94,6 +103,7 @@ class System:
     refused: tuple[Refused, ...] = ()
     springs: tuple[SetSpring, ...] = ()
     energy_in_play: float | None = None
+    replacements: Mapping[str, Replacement] = field(default_factory=dict)
 
     @cached_property
     def fmu(self) -> Mapping[str, Fmu]:

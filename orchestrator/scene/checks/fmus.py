@@ -4,11 +4,11 @@ themselves. Each check yields (path in the file, message with remedy)."""
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path as FilePath
 
 from hapticlink.orchestrator.base.faults import unknown
-from hapticlink.orchestrator.scene.blocks import loop_blocks
+from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
 from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
@@ -25,6 +25,8 @@ def check(scene: Scene) -> Iterator[Problem]:
             yield (*path, "name"), f"{fmu.name!r} is taken: give every FMU and block its own name"
         taken.append(fmu.name)
         yield from _source(path, fmu)
+        if fmu.replaces is not None:
+            yield from _replacement(path, fmu, loop_names(scene))
     for i, wire in enumerate(scene.connection):
         for key, end in (("from", wire.from_), ("to", wire.to)):
             fmu_name, dot, variable = end.partition(".")
@@ -45,3 +47,12 @@ def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
     for key in ("block", "settings"):
         if fmu.path is not None and getattr(fmu, key):
             yield (*path, key), "is not for an FMU that is a file: take it out, or take path out"
+
+
+def _replacement(path: Path, fmu: ForeignFmu, known: Collection[str]) -> Iterator[Problem]:
+    """Problems unless it replaces one of the `known` blocks under that one's name."""
+    assert fmu.replaces is not None
+    if fmu.replaces not in known:
+        yield (*path, "replaces"), unknown("block", fmu.replaces, known)
+    elif fmu.name != fmu.replaces:
+        yield (*path, "name"), f"{fmu.name!r}: it has that of {fmu.replaces}; leave it out"

@@ -32,7 +32,7 @@ def check(scene: Scene) -> Iterator[Problem]:
         path: Path = ("fmu", i, "rate")
         if fmu.rate == "graphics" and not graphics:
             yield path, "there is no graphics rate: add [graphics] with its rate"
-        elif fmu.rate not in ("haptics", "graphics"):
+        elif fmu.rate not in (None, "haptics", "graphics"):
             yield from _rate(path, fmu.rate, scene)
     yield from _phases(scene)
 

@@ -1,0 +1,63 @@
+"""FMUs in the place of the haptic loop's own blocks, and what they lack of those."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from hapticlink.components.component import Component
+from hapticlink.fmus.blocks import component
+from hapticlink.fmus.errors import FmuError
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.scene.blocks import replaced_blocks
+from hapticlink.orchestrator.scene.records import Wire
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.fmu_files import settled
+from hapticlink.orchestrator.system.system import Connection, Fmu, Replacement
+
+
+def replaced(scene: Scene, timeline: Timeline) -> dict[str, Component]:
+    """The blocks that FMUs replace, by name. Raises InputFault where the settings of one give no
+    block."""
+    found = {}
+    for name, plan in replaced_blocks(scene).items():
+        size = timeline.seconds(timeline.clock(timeline.of[name]).longest)
+        try:
+            found[name] = component(plan.made_by, settled(scene, plan, timeline), size)
+        except FmuError as error:
+            raise InputFault(str(error)) from error
+    return found
+
+
+def replacements(
+    blocks: Mapping[str, Component],
+    rows: Iterable[Wire],
+    fmus: Iterable[Fmu],
+    connections: Iterable[Connection],
+) -> dict[str, Replacement]:
+    """By replaced block. `rows` are all connections that the haptic loop may have."""
+    rows, connections = tuple(rows), tuple(connections)
+    described = {u.name: u.description for u in fmus}
+    ports = {name: {s.port for s in found.scalars} for name, found in described.items()}
+
+    def lost(name: str, block: Component) -> Iterator[str]:
+        variables = (*block.inputs, *block.parameters, *block.outputs)
+        before = {**ports, name: {v.name for v in variables}}
+        for row in rows:
+            ends = [end.split(".", 1) for end in (row.from_, row.to)]
+            there = [
+                all(port in known.get(fmu, ()) for fmu, port in ends) for known in (before, ports)
+            ]
+            if name in (ends[0][0], ends[1][0]) and there == [True, False]:
+                yield f"{row.from_} -> {row.to}"
+
+    def unfed(name: str) -> Iterator[str]:
+        fed = {s.name for c in connections if c.target == name for s in c.inputs}
+        inputs = (s for s in described[name].scalars if s.causality == "input")
+        yield from dict.fromkeys(s.port for s in inputs if s.name not in fed)
+
+    return {
+        name: Replacement(tuple(lost(name, block)), tuple(unfed(name)))
+        for name, block in blocks.items()
+        if name in described
+    }

@@ -1,0 +1,108 @@
+"""FMUs in the place of blocks."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from pythonfmu.builder import FmuBuilder
+
+import hapticlink as hl
+from hapticlink.orchestrator.base.faults import SceneFault
+from tests.orchestrator.conftest import status
+
+SHORT = {"duration": 0.2, "graphics.rate": 40}
+SPRING = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class Spring(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.values = {{}}
+        for name, causality in ({ports}):
+            for i in range(1, {size} + 1):
+                entry = f"{{name}}[{{i}}]"
+                self.values[entry] = 0.0
+                self.register_variable(Real(
+                    entry, causality=causality,
+                    getter=lambda e=entry: self.get(e),
+                    setter=lambda v, e=entry: self.values.update({{e: v}})))
+
+    def get(self, entry):
+        i = entry[entry.index("["):]
+        return 50.0 * (self.values["x_S" + i] - self.values["x_D" + i])
+
+    def do_step(self, time, size):
+        return True
+"""
+INPUT, OUTPUT = "Fmi2Causality.input", "Fmi2Causality.output"
+PORTS = {"x_S": INPUT, "x_D": INPUT, "own": INPUT, "F_motor": OUTPUT}
+
+
+def spring(folder: Path, size: int = 3) -> Path:
+    """A controller of a spring alone, with an input that the scene does not know."""
+    ports = ", ".join(f'("{name}", {causality})' for name, causality in PORTS.items())
+    script = folder / "spring.py"
+    script.write_text(SPRING.format(ports=ports, size=size))
+    return Path(FmuBuilder.build_FMU(script, dest=folder))
+
+
+@pytest.mark.parametrize("block", ["hand", "controller", "haptic_device", "virtual_environment"])
+def test_a_block_s_own_fmu_in_its_place_changes_no_byte(tmp_path: Path, block: str) -> None:
+    """Connections, order, rate and timing are those of the block."""
+    file = hl.build("closed-loop", SHORT, out=tmp_path)[block]
+    swap = {**SHORT, "fmu.+": {"replaces": block, "path": str(file)}}
+    ours = hl.run("closed-loop", SHORT, out=tmp_path / "a")
+    theirs = hl.run("closed-loop", swap, out=tmp_path / "b")
+    assert theirs.run["replaced"] == {block: {"lost": [], "unfed": []}}
+    assert theirs.run["connections"] == ours.run["connections"]
+    for table in ("haptics.csv", "graphics.csv"):
+        assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()
+
+
+def test_by_one_option_and_what_does_not_meet_is_listed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, file = tmp_path / "run", spring(tmp_path)
+    command = ["run", "closed-loop", "--set", "duration=0.2", "--swap", f"controller={file}"]
+    assert status(*command, "--out", out) == 0
+    told = capsys.readouterr().out
+    run = json.loads((out / "run.json").read_text())
+    assert run["replaced"]["controller"]["unfed"] == ["own"]
+    lost = run["replaced"]["controller"]["lost"]
+    assert "haptic_device.M -> controller.M" in lost
+    assert "controller.F_drift -> virtual_mechanism.F_drift" in lost
+    assert all(name in told for name in ("own", *lost))
+    assert "virtual_mechanism.x -> controller.x_S" in run["connections"]
+    assert not any("F_drift" in name for name in run["connections"])
+    assert run["fmus"]["controller"] == {"rate": "haptics", "timing": "sampled"}
+
+
+def test_a_port_of_another_size_is_refused_by_its_connection(tmp_path: Path) -> None:
+    swap = {"fmu.+": {"replaces": "controller", "path": str(spring(tmp_path, 2))}}
+    with pytest.raises(SceneFault, match=r"virtual_mechanism\.x has 3 .* controller\.x_S takes 2"):
+        hl.run("closed-loop", {**SHORT, **swap})
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"replaces": "controler"}, "no block 'controler'; did you mean 'controller'"),
+        ({"replaces": "controller", "name": "mine"}, "'mine': it has that of controller"),
+        ({"replaces": "hand_left"}, "no block 'hand_left'"),
+    ],
+)
+def test_what_replaces_no_block_is_refused(
+    tmp_path: Path, table: dict[str, str], message: str
+) -> None:
+    given = {**table, "path": str(spring(tmp_path))}
+    with pytest.raises(SceneFault, match=message):
+        hl.scene("closed-loop", {"fmu.+": given})
+
+
+def test_two_in_one_place_are_refused(tmp_path: Path) -> None:
+    file = str(spring(tmp_path))
+    one = f'fmu.+={{ replaces = "controller", path = "{file}" }}'
+    with pytest.raises(SceneFault, match="'controller' is taken"):
+        hl.scene("closed-loop", [one, one])
