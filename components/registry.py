@@ -81,13 +81,20 @@ def origins(*kinds: str) -> list[str]:
     return sorted({module for registry in chosen for module in registry.origins.values()})
 
 
+MOST = 100
+"""Names that are searched for one that is near, and shown where none is."""
+
+
 def near(name: str, known: Iterable[str]) -> str:
     """The nearest of what there is, or all of it."""
     known = list(known)
-    found = difflib.get_close_matches(name, known, 1)
-    return f"did you mean {found[0]!r}?" if found else f"there are {', '.join(known) or 'none'}"
+    found = difflib.get_close_matches(name[:MOST], known[:MOST], 1)
+    more = f" and {len(known) - MOST} more" if len(known) > MOST else ""
+    there = ", ".join(known[:MOST]) or "none"
+    return f"did you mean {found[0]!r}?" if found else f"there are {there}{more}"
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     """That there is no `kind` of this name, with the nearest that there is."""
-    return f"no {kind} {name!r}; {near(name, known)}"
+    shown = repr(name) if len(name) <= MOST else f"{name[:MOST]!r}..."
+    return f"no {kind} {shown}; {near(name, known)}"

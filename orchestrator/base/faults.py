@@ -8,6 +8,14 @@ from dataclasses import dataclass
 from hapticlink.components.registry import near as near  # re-exported
 from hapticlink.components.registry import unknown as unknown
 
+SHOWN, COUNTED = 20, 1000
+"""Findings of a scene that are shown, and that are looked for."""
+
+
+def shortened(text: str) -> str:
+    """What somebody wrote, as much of it as makes it known again."""
+    return text if len(text) <= 100 else f"{text[:97]}..."
+
 
 class Fault(Exception):
     """A failure that is reported in one message, without a traceback.
@@ -40,17 +48,22 @@ class Finding:
 
     def __str__(self) -> str:
         line = f"line {self.line}" if self.line else ""
-        place = self.option or ", ".join(part for part in (self.file, line) if part)
-        return ": ".join(part for part in (place, self.key, self.message) if part)
+        place = ", ".join(part for part in (self.file, line) if part)
+        place = shortened(self.option) if self.option else place
+        return ": ".join(part for part in (place, shortened(self.key), self.message) if part)
 
 
 class SceneFault(InputFault):
-    """An invalid scene, with all findings."""
+    """An invalid scene, with its findings; the message shows the first SHOWN of them."""
 
     def __init__(self, scene: str, findings: Sequence[Finding]) -> None:
         self.findings = tuple(findings)
         count = f"{len(findings)} fault" + ("s" if len(findings) > 1 else "")
-        super().__init__("\n".join([f"{scene}: {count}", *(f"  {f}" for f in findings)]))
+        more = " or more" if len(findings) >= COUNTED else ""
+        lines = [f"{scene}: {count}{more}", *(f"  {f}" for f in findings[:SHOWN])]
+        if len(findings) > SHOWN:
+            lines.append(f"  and {len(findings) - SHOWN}{more or ' more'}, left out here")
+        super().__init__("\n".join(lines))
 
 
 class FmuFault(Fault):

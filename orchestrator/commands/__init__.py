@@ -10,8 +10,8 @@ from typing import Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 
 from hapticlink.components.registry import Registry
-from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
-from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base import internal_error, interrupt, plugins, temporary_folders
+from hapticlink.orchestrator.base.faults import Fault, InputFault
 
 app = App(
     name="hapticlink",
@@ -93,6 +93,8 @@ def _status(arguments: Sequence[str] | None) -> int:
     try:
         interrupt.check()
         given = sys.argv[1:] if arguments is None else list(arguments)
+        for each in given:
+            _require_unicode(each)
         _commands(given)
         status = app.meta(given, result_action="return_value", exit_on_error=False)
         sys.stdout.flush()
@@ -108,3 +110,16 @@ def _status(arguments: Sequence[str] | None) -> int:
     except OSError as error:  # a full disk, a folder that may not be written
         print(f"hapticlink: {error}", file=sys.stderr)
         return 1
+    except Exception as error:
+        print(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)
+        return 1
+
+
+def _require_unicode(argument: str) -> None:
+    try:
+        argument.encode()
+    except UnicodeEncodeError:
+        raise InputFault(
+            f"argument {argument[:100]!a}: no text in this terminal's encoding; name "
+            "files and write values in UTF-8"
+        ) from None

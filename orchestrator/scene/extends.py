@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -12,7 +11,11 @@ from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.scene import families
 from hapticlink.orchestrator.scene.find import find, folder_of
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import Path, Place, flatten, key_lines, place_of, whole
+
+LONGEST = 20
+"""Scenes that extend one another."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,8 +40,8 @@ def document(
     TOML, a base that cannot be read, and scenes that extend each other in a circle.
     """
     try:
-        data = tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
+        data = loads(text)
+    except ValueError as error:
         raise SceneFault(name, [Finding("", f"not TOML: {error}", file=file)]) from error
     flatten(data)
     places = {whole(path): (file, line) for path, line in key_lines(text).items()}
@@ -63,6 +66,8 @@ def document(
         _, found = find(base, folder)
     except InputFault as fault:
         raise refuse(f"{fault}; a path is relative to this file") from None
+    if len(above) >= LONGEST:
+        raise refuse(f"the last of {LONGEST} scenes, each over the next: put some into one")
     where = folder_of(base, folder)
     base = str(where / FilePath(base).name) if where else base
     so_far = (*(above or (name,)), str(FilePath(base).resolve()) if where else base)

@@ -6,7 +6,9 @@ import importlib.resources
 from pathlib import Path as FilePath
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import InputFault, near
+from hapticlink.orchestrator.base import text_files
+from hapticlink.orchestrator.base.faults import InputFault, near, shortened
+from hapticlink.orchestrator.scene.toml import LARGEST
 
 
 def shipped() -> dict[str, Any]:
@@ -20,17 +22,16 @@ def find(scene: str, folder: FilePath | None = None) -> tuple[str, str]:
     """Name and text of a scene: a path relative to `folder`, or the name of a shipped one. Raises
     InputFault where there is none, or where it cannot be read as text."""
     path, known = (folder or FilePath()) / scene, shipped()
-    if path.is_file():
-        try:
-            return path.stem, path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputFault(f"{scene}: cannot be read as text: {error}") from error
+    if text_files.exists(path):
+        return path.stem, text_files.read(path, "a scene", LARGEST)
     if scene in known:
         return scene, known[scene].read_text(encoding="utf-8")
-    raise InputFault(f"{scene}: neither a file nor a shipped scene; {near(scene, known)}")
+    raise InputFault(
+        f"{shortened(scene)}: neither a file nor a shipped scene; {near(scene, known)}"
+    )
 
 
 def folder_of(scene: str, folder: FilePath | None = None) -> FilePath | None:
     """The folder of a scene's file, relative paths starting at `folder`; None for a shipped one."""
     path = (folder or FilePath()) / scene
-    return path.parent if path.is_file() else None
+    return path.parent if text_files.exists(path) else None

@@ -11,8 +11,11 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.faults import InputFault
 
+LARGEST = 2**24
+"""Bytes: some 10^6 frames, 4 h of them at 60 Hz."""
 LONGEST = Decimal("1e12")
 """Largest time stamp (s); seconds since 1970 are about 2e9."""
 
@@ -29,10 +32,7 @@ class Trace:
 def frame_times(path: Path) -> list[float]:
     """The ends of the frames (s), counted from the first stamp. Raises InputFault, with the line,
     for a file that is no trace."""
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputFault(f"{path}: cannot be read as a trace of frames: {error}") from error
+    lines = text_files.read(path, "a trace of frames", LARGEST).splitlines()
     stamps: list[Decimal] = []
     for number, line in enumerate(lines, start=1):
         field = line.partition("#")[0].split(",")[0].strip()
@@ -45,9 +45,9 @@ def frame_times(path: Path) -> list[float]:
         except InvalidOperation:  # not a number, or a comparison with "nan"
             if number == 1:
                 continue
-            raise InputFault(f"{path}: line {number}: {field!r} is no time in s") from None
+            raise InputFault(f"{path}: line {number}: {field[:100]!r} is no time in s") from None
         if stamps and not stamp > stamps[-1]:
-            raise InputFault(f"{path}: line {number}: {field} s does not come after {stamps[-1]} s")
+            raise InputFault(f"{path}: line {number}: {field[:100]} s is not after {stamps[-1]} s")
         stamps.append(stamp)
     if len(stamps) < 2:
         raise InputFault(f"{path}: {len(stamps)} time stamps; a trace of frames has at least 2")

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path as FilePath
 
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.faults import COUNTED, InputFault, SceneFault
 from hapticlink.orchestrator.scene import checks, families, overrides, read_parts
+from hapticlink.orchestrator.scene.bounds import unsound
 from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
 from hapticlink.orchestrator.scene.frame_trace import frame_times
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.source import Origin, Source
-from hapticlink.orchestrator.scene.toml_keys import Path, flat, flatten
+from hapticlink.orchestrator.scene.toml_keys import flat, flatten
 from hapticlink.orchestrator.scene.validation_errors import beyond, problems
 
 
@@ -39,8 +41,10 @@ def from_source(source: Source) -> Scene:
     set_by = {**source.set_by, **{overrides.apply(data, option): option for option in of_family}}
     data = with_family(data, name, source.places, set_by)
     set_by |= {overrides.apply(data, o): o for o in options if o not in of_family}
+    if wrong := [*islice(unsound(data), COUNTED)]:
+        origin = Origin(source, data, set_by)
+        raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
     flatten(data)
-    wrong: list[tuple[Path, str]] = []
     for path, recorded in traced(data):
         try:
             recorded["rate"] = frame_times(FilePath(recorded["rate"]["trace"]))
@@ -61,7 +65,7 @@ def from_source(source: Source) -> Scene:
     except pydantic.ValidationError as error:
         wrong += problems(error.errors(include_url=False), data)
     if wrong:
-        wrong += beyond(wrong, data)
+        wrong += beyond(wrong, data)[: COUNTED - len(wrong)]
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
     if wrong := checks.check(found):
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])

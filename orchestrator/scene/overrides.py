@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import tomllib
+import re
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from pathlib import PurePath
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.faults import InputFault, shortened, unknown
+from hapticlink.orchestrator.scene.toml import DEEPEST, loads
 from hapticlink.orchestrator.scene.toml_keys import ASSIGNMENT, Path, parts, whole
 
 Options = Mapping[str, Any] | Sequence[str]
@@ -31,8 +32,8 @@ def text(value: Any, key: str) -> str:
     InputFault for a value that TOML cannot write."""
     if isinstance(value, str):
         try:
-            tomllib.loads(f"value = {value}")
-        except tomllib.TOMLDecodeError:
+            loads(f"value = {value}")
+        except ValueError:
             if value == value.strip():
                 return value
     return _toml(value, key)
@@ -63,10 +64,14 @@ def parse(option: str) -> tuple[tuple[str, ...], Any]:
     """
     names, equals, text = _key(option)
     if not equals or not all(names):
-        raise InputFault(f"--set {option}: write key=value, e.g. --set graphics.rate=10")
+        said = f"--set {shortened(option)}"
+        raise InputFault(f"{said}: write key=value, e.g. --set graphics.rate=10")
+    if len(names) > DEEPEST:
+        said = f"--set {shortened(option)}"
+        raise InputFault(f"{said}: a key of {len(names)} names; none has more than {DEEPEST}")
     try:
-        return names, tomllib.loads(f"value = {text}")["value"]
-    except ValueError:  # TOMLDecodeError, or a whole number of thousands of digits
+        return names, loads(f"value = {text}")["value"]
+    except ValueError:
         return names, text.strip()
 
 
@@ -75,7 +80,7 @@ def _key(option: str) -> tuple[tuple[str, ...], str, str]:
     if match := ASSIGNMENT.match(option):
         try:
             return parts(match[1].strip()), "=", option[match.end() :]
-        except tomllib.TOMLDecodeError:
+        except ValueError:
             pass  # a key that TOML does not allow, such as `fmu.plant.start.x[1]`
     key, equals, text = option.partition("=")
     return tuple(name.strip() for name in key.split(".")), equals, text
@@ -98,7 +103,8 @@ def apply(data: dict[str, Any], option: str) -> Path:
         if isinstance(node, list):
             place = _entry(node, name, option)
         elif not isinstance(node, dict):
-            raise InputFault(f"--set {option}: {'.'.join(map(str, path))} is {node!r}, not a table")
+            what = f"{'.'.join(map(str, path))} is {shortened(repr(node))}, not a table"
+            raise InputFault(f"--set {shortened(option)}: {what}")
         path = (*path, place)
         if following is None:
             node[place] = value
@@ -113,9 +119,9 @@ def _entry(entries: list[Any], name: str, option: str) -> int:
     if name == "+":
         entries.append({})
         return len(entries) - 1
-    if name.isdigit() and int(name) < len(entries):
+    if re.fullmatch(r"[0-9]{1,9}", name) and int(name) < len(entries):
         return int(name)
     known = [str(e.get("name", i)) for i, e in enumerate(entries) if isinstance(e, dict)]
     if name in known:
         return known.index(name)
-    raise InputFault(f"--set {option}: {unknown('entry', name, known)}")
+    raise InputFault(f"--set {shortened(option)}: {unknown('entry', name, known)}")

@@ -49,9 +49,11 @@ def _of_a_force(path: Path, table: Any, names: set[Any]) -> Iterator[Problem]:
         yield (*path, "type"), "is missing: which force is it?"
     elif table["type"] not in tuple(FORCES):
         yield (*path, "type"), FORCES.unknown(str(table["type"]))
-    if (name := table.get("name")) in tuple(names):
+    name = str(table.get("name"))
+    if name in names:
         yield (*path, "name"), f"{name!r} is taken: name each force once"
-    names.add(str(name))
+    if "name" in table:
+        names.add(name)
 
 
 @cache

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import fields
 from typing import Any
 
 from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.toml import TOKEN, loads
 
 Path = tuple[str | int, ...]
 Problem = tuple[Path, str]
@@ -16,35 +16,27 @@ Problem = tuple[Path, str]
 Place = tuple[str, int]
 """File ("" for the scene itself) and line."""
 
-_TOKEN = re.compile(
-    r'"""(?:\\.|[^\\])*?"""(?:"{0,2})'  # multi-line strings may hold anything
-    r"|'''.*?'''(?:'{0,2})"
-    r'|"(?:\\.|[^"\\\n])*"'
-    r"|'[^'\n]*'"
-    r"|#[^\n]*"
-    r"|[\[\]{}\n]",
-    re.DOTALL,
-)
-ASSIGNMENT = re.compile(r"""\s*((?:[\w-]|"(?:\\.|[^"\\])*"|'[^']*'|\s*\.\s*)+)\s*=""")
+_NAME = r"""(?:[\w-]++|"(?:\\.|[^"\\\n])*+"|'[^'\n]*+')"""
+ASSIGNMENT = re.compile(rf"\s*+({_NAME}(?:\s*+\.\s*+{_NAME})*+)\s*+=")
 
 
-def _statements(text: str) -> list[tuple[int, str]]:
+def _statements(text: str) -> Iterator[tuple[int, str]]:
     """Line number and text of each table header or assignment, which may span several lines."""
-    found, start, depth = [], 0, 0
-    for token in _TOKEN.finditer(text + "\n"):
+    start, line, depth = 0, 1, 0
+    for token in TOKEN.finditer(text + "\n"):
         if token[0] in "[{":
             depth += 1
         elif token[0] in "]}":
             depth -= 1
         elif token[0] == "\n" and depth <= 0:
-            found.append((text.count("\n", 0, start) + 1, text[start : token.start()]))
+            yield line, text[start : token.start()]
+            line += text.count("\n", start, token.end())
             start, depth = token.end(), 0
-    return found
 
 
 def parts(dotted: str) -> tuple[str, ...]:
-    """The names of a dotted key, quoted ones too. Raises tomllib.TOMLDecodeError."""
-    node = tomllib.loads(f"{dotted} = 0")
+    """The names of a dotted key, quoted ones too. Raises ValueError."""
+    node = loads(f"{dotted} = 0")
     names = []
     while isinstance(node, dict):
         name, node = next(iter(node.items()))

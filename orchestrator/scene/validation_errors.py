@@ -5,28 +5,30 @@ from __future__ import annotations
 import copy
 import typing
 from collections.abc import Sequence
+from itertools import islice
 from typing import Any
 
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator.base.faults import near, unknown
+from hapticlink.orchestrator.base.faults import COUNTED, near, shortened, unknown
 from hapticlink.orchestrator.scene import checks, key_descriptions, schema
 from hapticlink.orchestrator.scene.scene import adapter
 from hapticlink.orchestrator.scene.toml_keys import Path, value
 
 
 def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
-    """pydantic's errors as (path in the file, message), with one for all branches of a union."""
+    """pydantic's errors as (path in the file, message), with one for all branches of a union; up to
+    COUNTED of them."""
     by_path: dict[Path, list[Any]] = {}
     for error in errors:
         path = _path(error, data)
         if path is not None:
             by_path.setdefault(path, []).append(error)
     found: list[tuple[Path, str]] = []
-    for at, group in by_path.items():
-        deeper = any(len(other) > len(at) and other[: len(at)] == at for other in by_path)
-        if deeper and all(e["type"].endswith(("_type", "literal_error")) for e in group):
+    above = {path[:i] for path in by_path for i in range(len(path))}
+    for at, group in islice(by_path.items(), COUNTED):
+        if at in above and all(e["type"].endswith(("_type", "literal_error")) for e in group):
             continue  # branches of a union that do not apply; the one that does has deeper errors
         limited = [e for e in group if e["type"] in _RANGE]
         messages = {_message(e, at, data) for e in limited or group}
@@ -135,8 +137,7 @@ def _message(error: Any, path: Path, data: Any) -> str:
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 100 else f"{text[:97]}..."
+    return shortened(repr(value))
 
 
 def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from itertools import product
 from pathlib import Path
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base import text_files
+from hapticlink.orchestrator.base.faults import InputFault, shortened
+from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import flat
 
 Point = dict[str, str]
@@ -23,7 +25,11 @@ Point = dict[str, str]
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?:\.\.({_NUMBER})|:(\d+))?")
 MOST = 100_000
-"""Values of one axis; more are a slip of the pen."""
+"""Values of one axis, and runs; more are a slip of the pen."""
+LONGEST = 15
+"""Digits of the ends of a range on either side of the point: their differences are exact."""
+LARGEST = 2**24
+"""Bytes of a list of runs."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,7 @@ def parse(text: str) -> Axis:
     key = key.strip()
     if not equals or not key:
         raise InputFault(f"--vary {text}: write key=values, e.g. --vary graphics.rate=10..60..10")
-    found = [value for item in _items(values) for value in _values(item, text)]
+    found = [value for item in _items(values) for value in _values(item, shortened(text))]
     if not found:
         raise InputFault(f"--vary {text}: no value; give some, e.g. {key}=1,2,3")
     return Axis(key, tuple(dict.fromkeys(found)))
@@ -56,16 +62,15 @@ def grid(axes: Sequence[Axis]) -> list[Point]:
     twice = next((k for k in keys if keys.count(k) > 1), None)
     if twice:
         raise InputFault(f"--vary {twice}: given twice; write all its values with commas")
+    if (count := math.prod(len(a.values) for a in axes)) > MOST:
+        raise InputFault(f"--vary: {count} runs; at most {MOST} are made: take fewer values")
     return [dict(zip(keys, values, strict=True)) for values in product(*(a.values for a in axes))]
 
 
 def listed(path: Path) -> list[Point]:
     """The runs of a file: a CSV with a column a key (an empty cell leaves the scene's own), or a
     TOML of [[run]] tables. Raises InputFault."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputFault(f"--runs {path}: cannot be read as text: {error}") from error
+    text = text_files.read(path, "a list of runs", LARGEST, "utf-8-sig")
     points = list(_toml(path, text) if path.suffix == ".toml" else _csv(path, text))
     if not points:
         form = "[[run]] table" if path.suffix == ".toml" else "row under its header"
@@ -96,12 +101,15 @@ def _values(item: str, option: str) -> Iterable[str]:
     if not match:
         return [item] if item else []
     first, last = Decimal(match[1]), Decimal(match[2])
+    numbers = [first, last, Decimal(match[3] or 1)]
+    if any(not n.is_zero() and not -LONGEST < n.adjusted() < LONGEST for n in numbers):
+        raise InputFault(f"--vary {option}: {item} has numbers beyond 1e{LONGEST}; list the values")
     if last < first:
         raise InputFault(f"--vary {option}: {item} ends below its start; write {last}..{first}")
     if match[4]:
-        count = int(match[4])
+        count = int(match[4][:9])
         if not 2 <= count <= MOST:
-            raise InputFault(f"--vary {option}: {item} has {count} points; give 2 to {MOST}")
+            raise InputFault(f"--vary {option}: {item} has {match[4]} points; give 2 to {MOST}")
         return [f"{first + (last - first) * i / (count - 1):.6g}" for i in range(count)]
     step = Decimal(match[3]) if match[3] else Decimal(1)
     if not match[3] and (first % 1 or last % 1):
@@ -129,14 +137,14 @@ def _csv(path: Path, text: str) -> Iterator[Point]:
 
 def _toml(path: Path, text: str) -> Iterator[Point]:
     try:
-        runs = tomllib.loads(text).get("run", [])
-    except tomllib.TOMLDecodeError as error:
+        runs = loads(text).get("run", [])
+    except ValueError as error:
         raise InputFault(f"--runs {path}: not TOML: {error}") from error
     if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
         raise InputFault(f"--runs {path}: `run` is no array of tables; write [[run]]")
     for run in runs:
         said = {key: value for key, value in flat(run) if value != {}}
-        yield {k: v if isinstance(v, str) else json.dumps(v) for k, v in said.items()}
+        yield {k: v if isinstance(v, str) else json.dumps(v, default=str) for k, v in said.items()}
 
 
 def number(text: str) -> float | None:

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator import api as api  # casadi and all: once, not in every process
 from hapticlink.orchestrator import commands
+from hapticlink.orchestrator.base import internal_error
 
 ENOUGH = 0.5
 """Seconds from a run's first row on after which it is ended."""
@@ -32,6 +33,7 @@ PATIENCE = 120.0
 """Seconds after which it is hung, on a machine that is busy with other things."""
 MEMORY = 6 << 30
 """Bytes of address space."""
+CRASHED = ("Traceback", "Fatal Python error", internal_error.TOLD)
 MESSAGE = 20_000
 """Characters of a message that somebody may read."""
 
@@ -53,8 +55,8 @@ class Place:
         status, said = self._forked(arguments)
         if status is None or -status in (signal.SIGXCPU, signal.SIGKILL):
             return "hung", said[-500:]
-        if status not in (0, 1, 2) or "Traceback" in said or "Fatal" in said:
-            return "crashed", f"status {status}: {said[-1500:]}"
+        if status not in (0, 1, 2) or any(mark in said for mark in CRASHED):
+            return "crashed", f"status {status}: {said[-300:]}{self._reports()}"
         if status and "hapticlink: " not in said and "╭" not in said:
             return "crashed", f"status {status} without a word: {said[-500:]}"
         if len(said) > MESSAGE:
@@ -63,6 +65,14 @@ class Place:
             return "lost", f"status {status}: {'; '.join(wrong)}: {said[-500:]}"
         ended = status == 0 or "interrupted" in said
         return ("done" if ended else "told" if status == 1 else "refused"), ""
+
+    def _reports(self) -> str:
+        """The ends of the reports of errors of ours."""
+        found = ""
+        for path in self._temporary.glob("hapticlink-error-*"):
+            found += path.read_text("utf-8")[-700:]
+            path.unlink()
+        return found
 
     def _lost(self, status: int) -> Iterator[str]:
         story = self.out / "run.json"
@@ -114,7 +124,8 @@ def _child(call: Callable[[], object], told: Path, temporary: Path) -> None:
         said = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         for stream in (1, 2):
             os.dup2(said, stream)
-        sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)  # noqa: SIM115
+        sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
+        sys.stderr = open(2, "w", closefd=False, errors="backslashreplace")  # noqa: SIM115
         resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_TIME, PROCESSOR_TIME + 5))
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

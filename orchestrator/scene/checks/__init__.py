@@ -4,7 +4,10 @@ need each other. Each check yields (path in the file, message with remedy)."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import chain, islice
 
+from hapticlink.orchestrator.base.faults import COUNTED
 from hapticlink.orchestrator.scene.checks import (
     blocks,
     contacts,
@@ -20,21 +23,27 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 
 
 def check(scene: Scene) -> list[Problem]:
-    """Every problem found."""
-    found = [
-        *_condition(scene),
-        *rates.check(scene),
-        *coupling.delays(scene),
-        *blocks.missing(scene),
-    ]
-    found += fmus.check(scene)
-    if scene.linkage:
-        found += linkage.check(scene.linkage)
-    found += contacts.check(scene)
-    found += device.check(scene)
-    found += coupling.check(scene)
-    found += blocks.check(scene)
-    return found
+    """Every problem found, up to COUNTED: each may search for a similar name."""
+    shapes = list(islice(chain(_linkage(scene), contacts.check(scene)), COUNTED))
+    if shapes and scene.contacts:
+        # The broad phase needs a valid tree and valid polygons.
+        scene = replace(scene, contacts=replace(scene.contacts, broad_phase=False))
+    rest = chain(
+        _condition(scene),
+        rates.check(scene),
+        coupling.delays(scene),
+        blocks.missing(scene),
+        fmus.check(scene),
+        shapes,
+        device.check(scene),
+        coupling.check(scene),
+        blocks.check(scene),
+    )
+    return list(islice(rest, COUNTED))
+
+
+def _linkage(scene: Scene) -> Iterator[Problem]:
+    return linkage.check(scene.linkage) if scene.linkage else iter(())
 
 
 def _condition(scene: Scene) -> Iterator[Problem]:

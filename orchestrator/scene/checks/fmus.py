@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator
-from pathlib import Path as FilePath
 
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.faults import unknown
 from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
 from hapticlink.orchestrator.scene.records import ForeignFmu
@@ -16,14 +16,14 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 def check(scene: Scene) -> Iterator[Problem]:
     """Every problem found, in the order of the file."""
-    taken = [b.name for b in loop_blocks(scene)]
+    taken = dict.fromkeys(b.name for b in loop_blocks(scene))
     for i, fmu in enumerate(scene.fmu):
         path: Path = ("fmu", i)
         if not re.fullmatch(r"\w+", fmu.name):
             yield (*path, "name"), f"{fmu.name!r}: letters, digits and _ only; others write name.y"
         elif fmu.name in taken:
             yield (*path, "name"), f"{fmu.name!r} is taken: give every FMU and block its own name"
-        taken.append(fmu.name)
+        taken[fmu.name] = None
         yield from _source(path, fmu)
         if fmu.replaces is not None:
             yield from _replacement(path, fmu, loop_names(scene))
@@ -42,7 +42,7 @@ def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
     """Problems unless the FMU is either a file or a block to build."""
     if fmu.path is None and fmu.block is None:
         yield (*path, "block"), "is missing, and so is path: give a block to build or an FMU's file"
-    if fmu.path is not None and not FilePath(fmu.path).is_file():
+    if fmu.path is not None and not text_files.exists(fmu.path):
         yield (*path, "path"), f"there is no file {fmu.path}"
     for key in ("block", "settings"):
         if fmu.path is not None and getattr(fmu, key):

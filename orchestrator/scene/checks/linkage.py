@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.faults import unknown
@@ -12,19 +12,21 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 def check(linkage: Linkage) -> Iterator[Problem]:
     here: Path = ("linkage",)
-    bodies = [b.name for b in linkage.body]
-    frames = ["ground", *bodies]
+    frames = {"ground": -1}
     for i, body in enumerate(linkage.body):
-        path: Path = (*here, "body", i)
-        if body.name in frames[: i + 1]:
-            yield (*path, "name"), f"{body.name!r} is taken: name each body once, none 'ground'"
+        if body.name in frames:
+            path: Path = (*here, "body", i, "name")
+            yield path, f"{body.name!r} is taken: name each body once, none 'ground'"
+        frames.setdefault(body.name, i)
+    bodies = [name for name in frames if name != "ground"]
     yield from _tree(linkage, frames)
-    for i, loop in enumerate(linkage.loop):
-        for k, name in enumerate(loop.bodies):
-            if name not in frames:
-                yield (*here, "loop", i, "bodies", k), unknown("body", name, frames)
-        if loop.bodies[0] == loop.bodies[1]:
-            yield (*here, "loop", i, "bodies"), "a loop joins two different bodies"
+    for kind in ("loop", "spring"):
+        for i, pair in enumerate(getattr(linkage, kind)):
+            for k, name in enumerate(pair.bodies):
+                if name not in frames:
+                    yield (*here, kind, i, "bodies", k), unknown("body", name, frames)
+            if kind == "loop" and pair.bodies[0] == pair.bodies[1]:
+                yield (*here, kind, i, "bodies"), "a loop joins two different bodies"
     if linkage.operational_point.body not in bodies:
         message = unknown("body", linkage.operational_point.body, bodies)
         yield (*here, "operational_point", "body"), message
@@ -38,7 +40,7 @@ def check(linkage: Linkage) -> Iterator[Problem]:
                 yield (*here, table, name), f"{value!r}: a {types[name]} joint takes {wanted}"
 
 
-def _tree(linkage: Linkage, frames: list[str]) -> Iterator[Problem]:
+def _tree(linkage: Linkage, frames: Mapping[str, int]) -> Iterator[Problem]:
     """Problems unless the joints form a tree: each body is the child of exactly one joint, and is
     connected to ground."""
     parents: dict[str, str] = {}
@@ -63,22 +65,23 @@ def _tree(linkage: Linkage, frames: list[str]) -> Iterator[Problem]:
             parents[joint.child] = joint.parent
         if joint.type == "prismatic" and joint.axis is None:
             yield (*path, "axis"), "a prismatic joint needs its direction (rad)"
-    for i, name in enumerate(frames[1:]):
-        seen: set[str] = set()
-        at = name
-        while at in parents and at not in seen:
-            seen.add(at)
-            at = parents[at]
-        if name not in parents:
-            yield ("linkage", "body", i), "no joint holds this body: give it one as child"
-        elif at in seen:
+    held = {"ground"}
+    for name, i in frames.items():
+        way: dict[str, None] = {}
+        while name in parents and name not in held and name not in way:
+            way[name] = None
+            name = parents[name]
+        if name in way:
             yield ("linkage", "body", i), "its joints run in a circle: start the tree at 'ground'"
+        elif not way and name not in held:
+            yield ("linkage", "body", i), "no joint holds this body: give it one as child"
+        held |= way.keys()  # told once
 
 
 def points(scene: Scene) -> Iterator[Problem]:
     """Problems of [[linkage.point]] and of the hands at these points."""
     points = scene.linkage.point if scene.linkage else ()
-    bodies = [b.name for b in scene.linkage.body] if scene.linkage else []
+    bodies = {b.name for b in scene.linkage.body} if scene.linkage else set()
     names: set[str] = {"operational_point"}
     for i, point in enumerate(points):
         path: Path = ("linkage", "point", i)
@@ -88,11 +91,8 @@ def points(scene: Scene) -> Iterator[Problem]:
             yield (*path, "name"), f"{point.name!r}: a name of letters, digits and _"
         names.add(point.name)
         if point.body not in bodies:
-            yield (*path, "body"), f"no body {point.body!r}; there are {', '.join(bodies)}"
+            yield (*path, "body"), unknown("body", point.body, sorted(bodies))
+    named = dict.fromkeys(sorted(names - {"operational_point"}))
     for name in scene.hands:
-        if name not in names - {"operational_point"}:
-            known = ", ".join(sorted(names - {"operational_point"})) or "none"
-            yield (
-                ("hands", name),
-                f"no point {name!r}; there are {known}: add it as [[linkage.point]]",
-            )
+        if name not in named:
+            yield ("hands", name), f"{unknown('point', name, named)}: add it as [[linkage.point]]"

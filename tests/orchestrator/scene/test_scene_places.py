@@ -201,7 +201,7 @@ def test_what_replaces_an_array_of_the_base_stands_in_the_file_itself(tmp_path: 
 
 @pytest.mark.parametrize(
     ("trace", "message"),
-    [(None, "cannot be read"), ("t\n0.1\n0.2\n0.1\n", "line 4: 0.1 s does not come after")],
+    [(None, "cannot be read"), ("t\n0.1\n0.2\n0.1\n", "line 4: 0.1 s is not after")],
 )
 def test_a_bad_trace_is_told_beside_other_faults(
     tmp_path: Path, trace: str | None, message: str

@@ -1,0 +1,202 @@
+"""Scenes and options from anywhere: refused with a place, in time that grows with their size."""
+
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.scene import load, overrides
+from hapticlink.orchestrator.sweep import grid
+from tests.orchestrator.scene.test_scene import GOOD, findings
+
+
+def refused(scene: object, *options: str) -> str:
+    with pytest.raises(InputFault) as fault:
+        open_scene.load(str(scene), options)
+    return str(fault.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x = " + "[" * 300 + "]" * 300,
+        "x = " + "{a = " * 300 + "1" + "}" * 300,
+        "a." * 20_000 + "a = 1",
+        "[holds]\n" + '"a".' * 300 + "a = 'zoh'",
+        "[" + "a." * 300 + "a]\nx = 1",
+        "[[" + "[" * 100_000,
+        "x = " + "[" * 20 + "{" + "a." * 20 + "b = 1}" + "]" * 20,
+    ],
+)
+def test_what_is_too_deep_is_told_before_it_is_parsed(text: str) -> None:
+    with pytest.raises(SceneFault, match=r"more than 32 names or brackets deep \(at line [12]\)"):
+        load.read(text)
+
+
+def test_a_key_of_too_many_names_is_no_option() -> None:
+    assert "a key of 301 names" in refused("four-bar", "a." * 300 + "a=1")
+    assert len(refused("four-bar", "a=" + "[" * 60_000)) < 1000
+    assert "write it flatter" in refused("four-bar", "linkage.start.x=" + "[" * 31 + "]" * 31)
+
+
+def test_dots_without_an_equals_sign_take_no_time() -> None:
+    assert "write key=value" in refused("four-bar", " . " * 40_000)
+    assert overrides.parse(' a . "b.c" = 1')[0] == ("a", "b.c")
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("linkage.gravity=[0.0, 1" + "0" * 400 + "]", "a whole number of more than 64 bits"),
+        ("duration=1" + "0" * 5000, "should be a valid number"),
+        ("duration=2020-01-01", "2020-01-01 should be a number"),
+        ("duration=\udcff", r"'\udcff' is no Unicode text"),
+        ("\udcff=1", "is no Unicode text"),
+        ("linkage.body.².mass=1", "no entry '²'"),
+        ("linkage.body." + "9" * 5000 + ".mass=1", "no entry '999"),
+    ],
+)
+def test_values_that_no_scene_can_hold(option: str, message: str) -> None:
+    said = refused("four-bar", option)
+    assert message in said
+    assert len(said) < 1000
+
+
+@pytest.mark.parametrize("value", ["1e308", "'1e99999999'", "nan", "'1/0'", "1e400", "0"])
+@pytest.mark.parametrize("key", ["haptics.rate", "graphics.rate", "duration", "graphics.phase"])
+def test_rates_and_times_out_of_any_range(key: str, value: str) -> None:
+    assert f"--set {key}={value}: {key}: " in refused("closed-loop", f"{key}={value}")
+
+
+def test_a_rate_whose_period_outlasts_the_run() -> None:
+    assert "less than a haptic period" in refused("closed-loop", "haptics.rate=5e-324")
+
+
+def test_names_that_no_file_can_have() -> None:
+    for name in ("a" * 300, "." * 300, "./" * 300, "a\0b"):
+        assert "neither a file nor a shipped scene" in refused(name)
+    text = GOOD + "[[fmu]]\nname = 'x'\npath = '" + "a" * 300 + "'"
+    assert "there is no file" in findings(text)["fmu[0] (x).path"][1]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="has no such files")
+def test_only_files_of_bounded_size_are_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "long.toml").write_text(GOOD + "#" * 2**20)
+    assert "more than 1048576 bytes" in refused(tmp_path / "long.toml")
+    assert "neither a file" in refused(tmp_path / "fifo")
+    for trace in ("/dev/zero", "fifo", "a" * 300, "a\\u0000b"):
+        (tmp_path / "scene.toml").write_text(
+            GOOD.replace("rate = 30", f'rate = {{ trace = "{trace}" }}')
+        )
+        assert "it is no file" in refused(tmp_path / "scene.toml")
+    with pytest.raises(InputFault, match="it is no file"):
+        grid.listed(tmp_path / "fifo")
+
+
+@pytest.mark.parametrize(
+    "values",
+    ["1e400..1e401", "1..1e99999999", "0..1e-400..1e-401", "1..2:" + "9" * 5000, "1..2..1e-300"],
+)
+def test_ranges_without_end(values: str) -> None:
+    with pytest.raises(InputFault, match="--vary x="):
+        grid.parse(f"x={values}")
+
+
+def test_grids_without_end() -> None:
+    with pytest.raises(InputFault, match="10000000000 runs"):
+        grid.grid([grid.parse("x=1..100000"), grid.parse("y=1..100000")])
+
+
+def test_findings_are_shown_to_the_twentieth() -> None:
+    with pytest.raises(SceneFault) as fault:
+        load.read(GOOD + "[holds]\n" + "".join(f"a{i}.b = 'zoo'\n" for i in range(70)))
+    assert len(fault.value.findings) == 70
+    lines = str(fault.value).splitlines()
+    assert len(lines) == 22
+    assert lines[-1] == "  and 50 more, left out here"
+
+
+def test_scenes_extend_one_another_to_the_twentieth(tmp_path: Path) -> None:
+    for i in range(300):
+        (tmp_path / f"{i}.toml").write_text(f"extends = '{i + 1}.toml'\n")
+    assert "the last of 20 scenes" in refused(tmp_path / "0.toml")
+
+
+def _chain(n: int) -> str:
+    bodies = (f"[[linkage.body]]\nname = 'b{i}'\nmass = 1.0\ninertia = 1.0\n" for i in range(n))
+    joints = (
+        f"[[linkage.joint]]\nname = 'j{i}'\nchild = 'b{i}'\n"
+        + (f"parent = 'b{i - 1}'\n" if i else "")
+        for i in range(n)
+    )
+    head = "title = 'a'\nduration = 1.0\n[linkage]\noperational_point = { body = 'b0' }\n"
+    return head + "".join(bodies) + "".join(joints)
+
+
+def _lines(function: Callable[[], object]) -> int:
+    """How many lines of this project run in a call."""
+    count = 0
+
+    def trace(frame: object, event: str, _: object) -> object:
+        nonlocal count
+        count += event == "line"
+        return trace
+
+    sys.settrace(trace)  # type: ignore[arg-type]
+    try:
+        function()
+    finally:
+        sys.settrace(None)
+    return count
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        _chain,
+        lambda n: _chain(n).replace("child = 'b", "child = 'c"),
+        lambda n: _chain(1) + "".join(f"unknown{i} = 1\n" for i in range(n)),
+        lambda n: "# remark\n" * n + _chain(1),
+    ],
+    ids=["bodies", "faults", "unknown keys", "remarks"],
+)
+def test_time_grows_with_the_size_of_a_file(text: Callable[[int], str]) -> None:
+    def read(n: int) -> Callable[[], object]:
+        def reads() -> None:
+            with suppress(SceneFault):
+                load.read(text(n))
+
+        return reads
+
+    read(3)()  # what is made once
+    small, large = _lines(read(120)), _lines(read(240))  # of more names than are searched
+    assert large < 2.2 * small
+
+
+def test_bodies_that_hold_one_another_are_told_once() -> None:
+    text = _chain(5).replace("parent = 'b0'", "parent = 'b4'")
+    found = findings(text)
+    assert [k for k, (_, m) in found.items() if "circle" in m] == ["linkage.body[1] (b1)"]
+
+
+def test_a_spring_on_a_body_that_is_not_there() -> None:
+    spring = "[[linkage.spring]]\nbodies = ['bra', 'ground']\nat = [[0.0, 0.0], [0.0, 0.0]]\n"
+    found = findings(GOOD + spring)
+    message = "no body 'bra'; did you mean 'bar'?"
+    assert found["linkage.spring[0].bodies[0]"] == (29, message)
+
+
+@pytest.mark.parametrize(
+    "corners",
+    ["[[0, 0], [1, 0], [1, 0], [0, 1]]", "[[0, 0]]", "[]", "[[0, 0], [0, 0], [0, 0]]"],
+)
+def test_polygons_that_are_none(corners: str) -> None:
+    for key in ("contacts.polygon.0.corners", "contacts.enclosure"):
+        scene = "obstacles" if "polygon" in key else "enclosure"
+        assert "contacts" in refused(scene, f"{key}={corners}")
