@@ -69,10 +69,10 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
     about = _about(component)
     content = {**files, "slave": slave, "about": json.dumps(about).encode(), "xml": describe("")}
     whole = digest(content)
-    module = f"hapticlink_{whole[:16]}"
+    module, guid = f"hapticlink_{whole[:16]}", f"{{{uuid.UUID(whole[:32])}}}"
     files |= {
-        "modelDescription.xml": describe(f"{{{uuid.UUID(whole[:32])}}}"),
-        "resources/component.json": json.dumps(about | {"digest": whole}).encode(),
+        "modelDescription.xml": describe(guid),
+        "resources/component.json": json.dumps(about | {"digest": whole, "guid": guid}).encode(),
         f"resources/{module}.py": slave,
         "resources/slavemodule.txt": f"{module}\n".encode(),
     }

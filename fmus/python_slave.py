@@ -14,6 +14,8 @@ All reals stand in one array [inputs | parameters | outputs]; a place is a value
 
 Up to the end of initialisation mode both kinds answer a get with y = output(x0, u, p, t),
 x0 = initialize(u, p), of the values set so far.
+
+A call out of order (FMI 2.0.5 section 4.2.4) and a time that is not finite are refused.
 """
 
 from __future__ import annotations
@@ -29,6 +31,9 @@ import sys
 import typing
 
 from pythonfmu import Fmi2Slave, enums
+
+MODES = ("instantiated", "in initialisation mode", "initialised", "terminated")
+INSTANTIATED, INITIALIZATION, STEP, TERMINATED = MODES
 
 
 def _surviving(method: typing.Callable) -> typing.Callable:
@@ -63,23 +68,34 @@ class HapticlinkSlave(Fmi2Slave):
         self._release_at_exit()
         with open(os.path.join(self.resources, "component.json"), encoding="utf-8") as file:
             self._about = about = json.load(file)
+        self._require_own_description()
         n_u, n_p, n_y, n_x = (about[k] for k in ("n_inputs", "n_parameters", "n_outputs", "n_x"))
         self._settable, self._n_inputs = n_u + n_p, n_u
         self._fixed = frozenset(about["fixed"])
         self._sampled, self._substeps = about["timing"] == "sampled", about["substeps"]
         # due: to be computed before it is read
-        self._initialized, self._start_due, self._output_due = False, True, True
+        self._mode, self._start_due, self._output_due = INSTANTIATED, True, True
         t, h = _doubles([0.0]), _doubles([0.0])
         x, trial, after = (_doubles([0.0] * n_x) for _ in range(3))
+        self._before = _doubles([0.0] * n_y)  # a sampled block's outputs before its step
         values = _doubles(about["starts"] + [0.0] * n_y)
         u, p, y = values[:n_u], values[n_u : n_u + n_p], values[n_u + n_p :]
-        self._time, self._substep, self._values = t, h, values
+        self._time, self._substep, self._values, self._outputs = t, h, values, y
         self._state, self._trial, self._after = x, trial, after
         self._buffers: list = []
         self._blocks: dict = {}
         self._evaluate_x0 = self._bind("initialize", (u, p), x)
         self._evaluate_y = self._bind("output", (x, u, p, t), y)
         self._evaluate_step = self._bind("step", (trial, u, p, t, h), after)
+
+    def _require_own_description(self) -> None:
+        """pythonfmu passes on no GUID; importers take the one that stands in the FMU's folder."""
+        path = os.path.join(os.path.dirname(self.resources), "modelDescription.xml")
+        guid = self._about["guid"]
+        if os.path.exists(path):
+            with open(path, encoding="utf-8") as file:
+                if f'guid="{guid}"' not in file.read():
+                    raise ValueError(f"the guid of {path} is not that of this FMU, {guid}")
 
     def _release_at_exit(self) -> None:
         """Have pythonfmu's library let go of its interpreter before its own destructors run.
@@ -142,17 +158,36 @@ class HapticlinkSlave(Fmi2Slave):
 
     # --- FMI ----------------------------------------------------------------------------
 
+    def _require(self, call: str, *allowed: str) -> None:
+        if self._mode not in allowed:
+            raise ValueError(f"{call} may not be called: the FMU is {self._mode}")
+
+    @_surviving
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
+        self._require("fmi2SetupExperiment", INSTANTIATED)
+        if not math.isfinite(start_time):
+            raise ValueError(f"the start time is {start_time}")
         self._time[0] = start_time
 
     @_surviving
+    def enter_initialization_mode(self) -> None:
+        self._require("fmi2EnterInitializationMode", INSTANTIATED)
+        self._mode = INITIALIZATION
+
+    @_surviving
     def exit_initialization_mode(self) -> None:
+        self._require("fmi2ExitInitializationMode", INITIALIZATION)
         self._refresh()
         if not all(map(math.isfinite, self._state)):
             raise ValueError(self._not_finite(self._state, self._time[0]))
-        self._initialized = True
+        self._mode = STEP
+
+    @_surviving
+    def terminate(self) -> None:
+        self._require("fmi2Terminate", STEP)
+        self._mode = TERMINATED
 
     @_surviving
     def get_real(self, vrs: list) -> list:
@@ -164,6 +199,8 @@ class HapticlinkSlave(Fmi2Slave):
 
     @_surviving
     def set_real(self, vrs: list, values: list) -> None:
+        if self._mode == TERMINATED:
+            self._require("fmi2SetReal", STEP)
         block, last = self._block(vrs)
         if last >= self._n_inputs:
             self._refuse_unsettable(vrs)
@@ -172,9 +209,9 @@ class HapticlinkSlave(Fmi2Slave):
         else:
             for vr, value in zip(vrs, values):  # noqa: B905 - pythonfmu sends pairs
                 self._values[vr] = value
-        if not self._initialized:
+        if self._mode != STEP:
             self._start_due = True
-        if not self._initialized or not self._sampled:
+        if self._mode != STEP or not self._sampled:
             self._output_due = True
 
     def _block(self, vrs: list) -> tuple:
@@ -197,7 +234,7 @@ class HapticlinkSlave(Fmi2Slave):
             name = self._about["names"][vr]
             if vr >= self._settable:
                 raise ValueError(f"{name} is an output; it cannot be set")
-            if self._initialized and vr in self._fixed:
+            if self._mode == STEP and vr in self._fixed:
                 raise ValueError(
                     f"parameter {name} is fixed; set it before the end of initialisation mode"
                 )
@@ -212,7 +249,8 @@ class HapticlinkSlave(Fmi2Slave):
             self._output_due = False
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """True is fmi2OK, False fmi2Discard; nothing is raised. The state moves on success."""
+        """True is fmi2OK, False fmi2Discard; nothing is raised. State and outputs move on
+        success."""
         try:
             return self._advance(current_time, step_size)
         except Exception as error:
@@ -220,6 +258,9 @@ class HapticlinkSlave(Fmi2Slave):
             return False
 
     def _advance(self, start: float, step_size: float) -> bool:
+        self._require("fmi2DoStep", STEP)
+        if not math.isfinite(start + step_size):
+            raise ValueError(f"a step from t = {start!r} by {step_size!r} s has no end")
         time, x, trial, after = self._time, self._state, self._trial, self._after
         if self._start_due:
             self._refresh()
@@ -237,29 +278,39 @@ class HapticlinkSlave(Fmi2Slave):
             return False
         if self._sampled:
             time[0] = start
+            self._before[:] = self._outputs
             self._evaluate_y()
+            if not all(map(math.isfinite, self._outputs)):
+                message = self._not_finite(self._outputs, start, outputs=True)
+                self._outputs[:] = self._before
+                said = f"{message}; state and outputs stay as before the step"
+                self.log(said, enums.Fmi2Status.error)
+                return False
         x[:] = trial
         time[0] = start + step_size
         self._output_due = not self._sampled
         return True
 
-    def _not_finite(self, state: memoryview, time: float) -> str:
-        """Which state is not finite, and the likely cause."""
+    def _not_finite(self, found: memoryview, time: float, outputs: bool = False) -> str:
+        """Which of the states, or of the outputs, is not finite, and the likely cause."""
         about = self._about
-        i = next(i for i, value in enumerate(state) if not math.isfinite(value))
+        names = about["names"][self._settable :] if outputs else about["states"]
+        i = next(i for i, value in enumerate(found) if not math.isfinite(value))
         known = zip(about["names"], self._values[: self._settable])  # noqa: B905 - outputs left out
         bad = [f"{name} = {value}" for name, value in known if not math.isfinite(value)]
         cause = (
             f"not finite before: {', '.join(bad[:3])}; look at what sets it"
             if bad
+            else "inputs and parameters are finite; look for an input that is 0 and divides"
+            if outputs
             else "inputs and parameters are finite; take a smaller step or more substeps"
         )
-        return f"{about['states'][i]} became {state[i]} at t = {time!r}; {cause}"
+        return f"{names[i]} became {found[i]} at t = {time!r}; {cause}"
 
     # --- FMU state: bytes, so that saving and serialising are the same, bit for bit -------
 
     def _get_fmu_state(self) -> bytes:
-        flags = bytes((self._initialized, self._start_due, self._output_due))
+        flags = bytes((MODES.index(self._mode), self._start_due, self._output_due))
         parts = (self._time, self._values, self._state)
         return self._about["digest"].encode() + flags + b"".join(p.tobytes() for p in parts)
 
@@ -270,7 +321,9 @@ class HapticlinkSlave(Fmi2Slave):
         if not state.startswith(digest) or len(state) != offset + sum(p.nbytes for p in parts):
             raise ValueError("this FMU state was not saved by this FMU")
         flags = state[len(digest) : offset]
-        self._initialized, self._start_due, self._output_due = map(bool, flags)
+        if flags[0] >= len(MODES):
+            raise ValueError("this FMU state is damaged")
+        self._mode, self._start_due, self._output_due = MODES[flags[0]], *map(bool, flags[1:])
         for part in parts:
             end = offset + 8 * len(part)
             part[:] = array.array("d", state[offset:end])

@@ -11,7 +11,10 @@
 
    Up to the end of initialisation mode both kinds answer a get with y = output(x0, u, p, t) of the
    values set so far. The Python FMU (python_slave.py) does the same operations in the same order.
-   Nothing is shared between instances: the tables are constant, the rest stands in a Model. */
+   Nothing is shared between instances: the tables are constant, the rest stands in a Model.
+
+   A call out of order (section 4.2.4), a null pointer and a time that is not finite are errors that
+   change nothing. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -25,18 +28,19 @@
 typedef const fmi2ValueReference *References;
 
 enum { SETTABLE = N_U + N_P, REALS = N_U + N_P + N_Y };
+enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8 }; /* modes */
 
 typedef struct { /* what fmi2GetFMUstate saves and serialises; without padding */
     char guid[40];
     double time;
-    long long initialized, start_due, output_due; /* due: to be computed before it is read */
+    long long mode, start_due, output_due; /* due: to be computed before it is read */
     double reals[REALS], x[N_X];
 } State;
 
 typedef struct {
     State now;
     fmi2CallbackFunctions callbacks;
-    double trial[N_X], after[N_X];
+    double trial[N_X], after[N_X], sample[N_Y];
     char name[];
 } Model;
 
@@ -45,11 +49,15 @@ typedef struct {
 static fmi2Status fail(const Model *m, fmi2Status status, const char *format, ...) {
     static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
                                              "logStatusError", "logStatusFatal"};
-    char text[1024];
+    if (!m) return fmi2Error; /* without an instance there is nobody to tell */
+    char said[1024], text[2 * sizeof said], *to_text = text;
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    vsnprintf(said, sizeof said, format, arguments);
     va_end(arguments);
+    for (const char *c = said; *c; *to_text++ = *c++)
+        if (*c == '%') *to_text++ = '%'; /* the logger takes a message for a format (2.1.5) */
+    *to_text = 0;
     const fmi2CallbackFunctions *to = &m->callbacks;
     to->logger(to->componentEnvironment, m->name, status, categories[status], text);
     return status;
@@ -68,25 +76,45 @@ static Number number(double value) {
     return n;
 }
 
+/* Whether `call` may not be made: without an instance, or in another mode than `allowed`. */
+static int out_of_order(const Model *m, const char *call, int allowed) {
+    const long long mode = m ? m->now.mode : 0;
+    if (mode & allowed) return 0;
+    fail(m, fmi2Error, "%s may not be called: the FMU is %s", call,
+         mode == INSTANTIATED ? "instantiated" : mode == INITIALIZATION ? "in initialisation mode"
+         : mode == STEP ? "initialised" : "terminated");
+    return 1;
+}
+
+/* Whether `call` got no instance, or a null pointer for one of two arrays of n entries. */
+static int is_null(const Model *m, const char *call, size_t n, const void *a, const void *b) {
+    if (m && (!n || (a && b))) return 0;
+    fail(m, fmi2Error, "%s got a null pointer for %zu entries", call, n);
+    return 1;
+}
+
 static int first_not_finite(const double *values, int n) {
     for (int i = 0; i < n; i++) if (!isfinite(values[i])) return i;
     return -1;
 }
 
-/* Which state is not finite, the likely cause, and what becomes of it. */
-static fmi2Status not_finite(const Model *m, fmi2Status status, const double *x, double time,
-                             const char *result) {
-    char cause[512] = "inputs and parameters are finite; take a smaller step or more substeps";
+/* Which state or output is not finite, the likely cause, and what becomes of it. */
+static fmi2Status not_finite(const Model *m, fmi2Status status, const char *name, double value,
+                             double time, const char *remedy, const char *result) {
+    char cause[512] = "inputs and parameters are finite; ";
+    strcat(cause, remedy);
     for (int i = 0, shown = 0; i < SETTABLE && shown < 3; i++) {
         if (isfinite(m->now.reals[i])) continue;
         size_t used = shown ? strlen(cause) : 0;
         snprintf(cause + used, sizeof cause - used, "%s%s = %s",
                  shown++ ? ", " : "not finite before: ", names[i], number(m->now.reals[i]).text);
     }
-    int i = first_not_finite(x, N_X);
-    return fail(m, status, "%s became %s at t = %s; %s; %s", state_names[i], number(x[i]).text,
+    return fail(m, status, "%s became %s at t = %s; %s; %s", name, number(value).text,
                 number(time).text, cause, result);
 }
+
+#define SMALLER "take a smaller step or more substeps"
+#define DIVISION "look for an input that is 0 and divides"
 
 /* --- the component's functions -------------------------------------------------------------- */
 
@@ -95,9 +123,9 @@ typedef struct { /* room in which a function calls the look-ups of tables */
     double w[N_W + 1];
 } Room;
 
-static void evaluate_output(Model *m, double time) {
+static void evaluate_output(Model *m, double time, double *y) {
     const double *arguments[N_ARG] = {m->now.x, m->now.reals, m->now.reals + N_U, &time};
-    double *results[N_RES] = {m->now.reals + SETTABLE};
+    double *results[N_RES] = {y};
     Room room;
     output(arguments, results, room.iw, room.w, 0);
 }
@@ -112,7 +140,7 @@ static void refresh(Model *m) {
         m->now.start_due = 0;
     }
     if (m->now.output_due) {
-        evaluate_output(m, m->now.time);
+        evaluate_output(m, m->now.time, m->now.reals + SETTABLE);
         m->now.output_due = 0;
     }
 }
@@ -121,6 +149,7 @@ static void restart(Model *m) {
     memset(&m->now, 0, sizeof m->now);
     memcpy(m->now.guid, GUID, sizeof GUID);
     memcpy(m->now.reals, starts, SETTABLE * sizeof(double));
+    m->now.mode = INSTANTIATED;
     m->now.start_due = m->now.output_due = 1;
 }
 
@@ -149,29 +178,46 @@ void fmi2FreeInstance(fmi2Component c) { free(c); }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
                                const fmi2String categories[]) {
-    return fmi2OK; /* failures are always logged, and there is nothing else to say */
+    return c ? fmi2OK : fmi2Error; /* failures are always logged; there is nothing else to say */
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
                                fmi2Real start, fmi2Boolean has_stop, fmi2Real stop) {
-    ((Model *)c)->now.time = start;
+    Model *m = c;
+    if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
+    if (!isfinite(start)) return fail(m, fmi2Error, "the start time is %s", number(start).text);
+    m->now.time = start;
     return fmi2OK;
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    Model *m = c;
+    if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
+    m->now.mode = INITIALIZATION;
+    return fmi2OK;
+}
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Model *m = c;
+    if (out_of_order(m, __func__, INITIALIZATION)) return fmi2Error;
     refresh(m);
-    if (first_not_finite(m->now.x, N_X) >= 0)
-        return not_finite(m, fmi2Error, m->now.x, m->now.time, "initialisation goes on");
-    m->now.initialized = 1;
+    int i = first_not_finite(m->now.x, N_X);
+    if (i >= 0)
+        return not_finite(m, fmi2Error, state_names[i], m->now.x[i], m->now.time, SMALLER,
+                          "initialisation goes on");
+    m->now.mode = STEP;
     return fmi2OK;
 }
 
-fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) {
+    Model *m = c;
+    if (out_of_order(m, __func__, STEP)) return fmi2Error;
+    m->now.mode = TERMINATED;
+    return fmi2OK;
+}
 
 fmi2Status fmi2Reset(fmi2Component c) {
+    if (!c) return fmi2Error;
     restart(c);
     return fmi2OK;
 }
@@ -180,6 +226,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 fmi2Status fmi2GetReal(fmi2Component c, References vr, size_t n, fmi2Real value[]) {
     Model *m = c;
+    if (is_null(m, __func__, n, vr, value)) return fmi2Error;
     for (size_t i = 0; i < n; i++) {
         if (vr[i] >= REALS)
             return fail(m, fmi2Error, "unknown value reference %u; %d are known", vr[i], REALS);
@@ -191,24 +238,27 @@ fmi2Status fmi2GetReal(fmi2Component c, References vr, size_t n, fmi2Real value[
 
 fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real value[]) {
     Model *m = c;
+    if (out_of_order(m, __func__, INSTANTIATED | INITIALIZATION | STEP)) return fmi2Error;
+    if (is_null(m, __func__, n, vr, value)) return fmi2Error;
+    const int initialized = m->now.mode == STEP;
     for (size_t i = 0; i < n; i++) { /* all are looked at before any is set */
         if (vr[i] >= REALS)
             return fail(m, fmi2Error, "unknown value reference %u; %d are known", vr[i], REALS);
         if (vr[i] >= SETTABLE)
             return fail(m, fmi2Error, "%s is an output; it cannot be set", names[vr[i]]);
-        if (m->now.initialized && is_fixed[vr[i]])
+        if (initialized && is_fixed[vr[i]])
             return fail(m, fmi2Error, "parameter %s is fixed; set it before the end of "
                         "initialisation mode", names[vr[i]]);
     }
     for (size_t i = 0; i < n; i++) m->now.reals[vr[i]] = value[i];
-    if (!m->now.initialized) m->now.start_due = 1;
-    if (!m->now.initialized || !SAMPLED) m->now.output_due = 1;
+    if (!initialized) m->now.start_due = 1;
+    if (!initialized || !SAMPLED) m->now.output_due = 1;
     return fmi2OK;
 }
 
 #define HAS_NO(verb, kind, type)                                                                \
     fmi2Status fmi2##verb##kind(fmi2Component c, References vr, size_t n, type value[]) {       \
-        return n ? fail(c, fmi2Error, "no variable is of type " #kind) : fmi2OK;                \
+        return c && !n ? fmi2OK : fail(c, fmi2Error, "no variable is of type " #kind);          \
     }
 HAS_NO(Get, Integer, fmi2Integer)
 HAS_NO(Get, Boolean, fmi2Boolean)
@@ -221,6 +271,10 @@ HAS_NO(Set, String, const fmi2String)
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolean no_way_back) {
     Model *m = c;
+    if (out_of_order(m, __func__, STEP)) return fmi2Error;
+    if (!isfinite(start + size))
+        return fail(m, fmi2Error, "a step from t = %s by %s s has no end", number(start).text,
+                    number(size).text);
     double time, h = size / SUBSTEPS;
     const double *arguments[N_ARG] = {m->trial, m->now.reals, m->now.reals + N_U, &time, &h};
     double *results[N_RES] = {m->after};
@@ -232,12 +286,21 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
         step(arguments, results, room.iw, room.w, 0);
         memcpy(m->trial, m->after, sizeof m->trial);
     }
-    if (first_not_finite(m->trial, N_X) >= 0) {
+    int i = first_not_finite(m->trial, N_X);
+    if (i >= 0) {
         m->now.time = start;
-        return not_finite(m, fmi2Discard, m->trial, start + size,
+        return not_finite(m, fmi2Discard, state_names[i], m->trial[i], start + size, SMALLER,
                           "the state stays as before the step");
     }
-    if (SAMPLED) evaluate_output(m, start);
+    if (SAMPLED) {
+        evaluate_output(m, start, m->sample);
+        if ((i = first_not_finite(m->sample, N_Y)) >= 0) {
+            m->now.time = start;
+            return not_finite(m, fmi2Discard, names[SETTABLE + i], m->sample[i], start, DIVISION,
+                              "state and outputs stay as before the step");
+        }
+        memcpy(m->now.reals + SETTABLE, m->sample, sizeof m->sample);
+    }
     memcpy(m->now.x, m->trial, sizeof m->trial);
     m->now.time = start + size;
     m->now.output_due = !SAMPLED;
@@ -249,12 +312,14 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    if (!c || !value) return fmi2Error;
     if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
     *value = ((Model *)c)->now.time;
     return fmi2OK;
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    if (!c || !value) return fmi2Error;
     if (kind != fmi2Terminated) return fmi2Discard;
     *value = fmi2False;
     return fmi2OK;
@@ -288,21 +353,29 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, References unknown, siz
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     Model *m = c;
+    if (is_null(m, __func__, 1, state, state)) return fmi2Error;
     if (!*state) *state = malloc(sizeof(State));
     if (!*state) return fail(m, fmi2Error, "no memory for an FMU state");
     memcpy(*state, &m->now, sizeof(State));
     return fmi2OK;
 }
 
+/* Whether the bytes of a state are those of this FMU. */
+static int is_ours(const Model *m, const void *bytes) {
+    if (m && bytes && !memcmp(bytes, GUID, sizeof GUID)) return 1;
+    fail(m, fmi2Error, "this FMU state was not saved by this FMU");
+    return 0;
+}
+
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     Model *m = c;
-    if (!state || memcmp(state, GUID, sizeof GUID))
-        return fail(m, fmi2Error, "this FMU state was not saved by this FMU");
+    if (!is_ours(m, state)) return fmi2Error;
     memcpy(&m->now, state, sizeof(State));
     return fmi2OK;
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    if (!c) return fmi2Error;
     if (state) {
         free(*state);
         *state = NULL;
@@ -311,23 +384,28 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
+    Model *m = c;
+    if (is_null(m, __func__, 1, state, size)) return fmi2Error;
     *size = sizeof(State);
     return fmi2OK;
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[],
                                  size_t size) {
-    if (size < sizeof(State)) return fail(c, fmi2Error, "too few bytes for the FMU state");
+    Model *m = c;
+    if (is_null(m, __func__, 1, state, bytes)) return fmi2Error;
+    if (size < sizeof(State)) return fail(m, fmi2Error, "too few bytes for the FMU state");
     memcpy(bytes, state, sizeof(State));
     return fmi2OK;
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                    fmi2FMUstate *state) {
-    if (size != sizeof(State) || memcmp(bytes, GUID, sizeof GUID))
-        return fail(c, fmi2Error, "this FMU state was not saved by this FMU");
+    Model *m = c;
+    if (is_null(m, __func__, 1, bytes, state)) return fmi2Error;
+    if (!is_ours(m, size == sizeof(State) ? bytes : NULL)) return fmi2Error;
     if (!*state) *state = malloc(sizeof(State));
-    if (!*state) return fail(c, fmi2Error, "no memory for an FMU state");
+    if (!*state) return fail(m, fmi2Error, "no memory for an FMU state");
     memcpy(*state, bytes, sizeof(State));
     return fmi2OK;
 }

@@ -48,6 +48,7 @@ from tests.fmus.named_fmu import Named
 OPTIONS = ("sensing=encoders", "controller.bias=full", "mechanism.directions=true")
 NAMES = ("hand", "controller", "haptic_device", "virtual_mechanism", "virtual_environment")
 H = 1 / 512
+ERROR = 3
 
 
 @pytest.fixture(scope="module")
@@ -242,13 +243,42 @@ def test_an_unknown_reference_is_an_error_that_leaves_the_instance_whole(native_
         assert fmu.get("a") == [-4.0]
 
 
-def test_another_guid_is_refused(native_fmus):
+def test_another_guid_is_refused_and_is_no_format(native_fmus):
     with session(native_fmus["spring"]) as at:
-        at.description.guid = "{another}"
+        at.description.guid = "{another %n}"
         with pytest.raises(Exception, match="Failed to instantiate"):
             at.instance()
-        assert any("the guid {another} is not that of this binary" in m for m in at.messages)
+        assert any("the guid {another %%n} is not that of this binary" in m for m in at.messages)
         at._instances.clear()
+
+
+def test_null_pointers_are_refused(native_fmus):
+    one = (ctypes.c_uint64 * 1)(0)
+    with session(native_fmus["spring"]) as at:
+        fmu = Named(at).start()
+        own = ctypes.c_void_p(fmu.slave.component)
+        for name, *arguments in (
+            ("GetReal", own, None, 1, one),
+            ("GetReal", own, one, 1, None),
+            ("SetReal", own, None, 1, one),
+            ("SetReal", own, one, 1, None),
+            ("GetRealStatus", own, 2, None),
+            ("GetFMUstate", own, None),
+            ("SetFMUstate", own, None),
+            ("SerializedFMUstateSize", own, None, one),
+            ("DeSerializeFMUstate", own, None, 8, one),
+            ("GetReal", None, one, 1, one),
+            ("GetInteger", None, one, 0, one),
+            ("GetFMUstate", None, one),
+            ("CancelStep", None),
+            ("ExitInitializationMode", None),
+            ("Reset", None),
+            ("Terminate", None),
+        ):
+            assert fmu.slave.dll[f"fmi2{name}"](*arguments) == ERROR, (name, arguments)
+        assert fmu.slave.dll["fmi2GetReal"](own, None, 0, None) == 0
+        assert "fmi2GetReal got a null pointer for 1 entries" in at.messages
+        assert fmu.get("a") == [-4.0]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -369,4 +399,4 @@ def test_start_values_and_names_stand_in_the_c_text(value, percent):
     literal = text.split("starts[] = {")[1].split(",")[0]
     known = literal.replace("NAN", "nan").replace("INFINITY", "inf")
     assert array("d", [float(known)]).tobytes() == array("d", [value]).tobytes() or value != value
-    assert ('"load%%"' in text) is percent
+    assert ('"load%"' in text) is percent

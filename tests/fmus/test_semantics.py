@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
+import casadi as ca
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
+from hapticlink.components.component import Block, Variable
 from hapticlink.fmus import build, build_native, check_fmu
+from hapticlink.fmus.archive import write
 from hapticlink.fmus.check import Session, session
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
@@ -19,6 +23,7 @@ BUILD = {"python": build, "native": build_native}
 DISCARD, ERROR, FATAL = 2, 3, 4
 # pythonfmu has no other answer to an exception.
 REFUSED = {"python": FATAL, "native": ERROR}
+OUT_OF_STEP = {"python": DISCARD, "native": ERROR}
 
 
 @pytest.fixture(params=BUILD)
@@ -219,3 +224,104 @@ def test_fmus_of_one_process_each_run_their_own_functions(tmp_path, packaging):
             fmu.start()
             fmu.step(0.0, 0.1)
             assert fmu.get("y") == [5.0 * factor]
+
+
+SETUP = ("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0)
+ENTER, EXIT = ("fmi2EnterInitializationMode",), ("fmi2ExitInitializationMode",)
+STEP, TERMINATE = ("fmi2DoStep", 0.0, 0.1, 1), ("fmi2Terminate",)
+START = (SETUP, ENTER, EXIT)
+
+
+@pytest.mark.parametrize(
+    ("before", "call", "mode"),
+    [
+        ((), STEP, "instantiated"),
+        ((), EXIT, "instantiated"),
+        ((), TERMINATE, "instantiated"),
+        ((SETUP, ENTER), STEP, "in initialisation mode"),
+        ((SETUP, ENTER), ENTER, "in initialisation mode"),
+        ((SETUP, ENTER), TERMINATE, "in initialisation mode"),
+        (START, SETUP, "initialised"),
+        (START, ENTER, "initialised"),
+        (START, EXIT, "initialised"),
+        ((*START, STEP, TERMINATE), STEP, "terminated"),
+        ((*START, STEP, TERMINATE), TERMINATE, "terminated"),
+    ],
+)
+def test_calls_out_of_order_are_refused_and_change_nothing(opened, packaging, before, call, mode):
+    """FMI 2.0.5 section 4.2.4."""
+    at = opened("spring")
+    fmu = Named(at)
+    for name, *arguments in before:
+        getattr(fmu.slave, name)(fmu.slave.component, *arguments)
+    found = fmu.get("x[1]", "x[2]", "a", "time")
+    with pytest.raises(FMICallException) as raised:
+        getattr(fmu.slave, call[0])(fmu.slave.component, *call[1:])
+    assert raised.value.status == (OUT_OF_STEP if call == STEP else REFUSED)[packaging]
+    assert f"{call[0]} may not be called: the FMU is {mode}" in " ".join(at.messages)
+    assert fmu.get("x[1]", "x[2]", "a", "time") == found
+
+
+def test_nothing_is_set_after_the_end_and_reset_begins_again(opened):
+    fmu = Named(opened("spring")).start()
+    fmu.slave.terminate()
+    with pytest.raises(FMICallException):
+        fmu.set(F=1.0)
+    fmu.slave.reset()
+    fmu.set(F=8.0)
+    fmu.start().step(0.0, 0.1)
+    assert fmu.get("F") == [8.0]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_times_that_are_not_finite_are_refused(opened, value):
+    fmu = Named(opened("spring"))
+    with pytest.raises(FMICallException):
+        fmu.slave.setupExperiment(startTime=value)
+    fmu.start()
+    before = fmu.get("x[1]", "x[2]", "time")
+    for time, size in ((value, 0.1), (0.0, value), (1e308, 1e308)):
+        with pytest.raises(FMICallException):
+            fmu.step(time, size)
+    assert "has no end" in " ".join(fmu.at.messages)
+    assert fmu.get("x[1]", "x[2]", "time") == before
+
+
+def test_a_sampled_output_that_is_not_finite_fails_the_step(tmp_path, packaging):
+    b = Block(inputs=[Variable("M", start=2.0)], states=[Variable("n")], outputs=[Variable("F")])
+    made = b.component(
+        "divides", "", "sampled", initial={"n": ca.SX(0)}, step={"n": b.x["n"] + 1},
+        output={"F": 1 / b.u["M"] + b.x["n"]},
+    )  # fmt: skip
+    with session(BUILD[packaging](made, tmp_path)) as at:
+        fmu = Named(at).start()
+        fmu.step(0.0, 0.1)
+        fmu.set(M=0.0)
+        with pytest.raises(FMICallException) as raised:
+            fmu.step(0.1, 0.1)
+        assert raised.value.status == DISCARD
+        assert "F became inf at t = 0.1; inputs and parameters are finite; look for an input " in (
+            " ".join(at.messages)
+        )
+        assert fmu.get("F") == [0.5]
+        fmu.set(M=4.0)
+        fmu.step(0.1, 0.1)
+        assert fmu.get("F") == [1.25]
+
+
+def test_another_guid_is_refused(files, tmp_path):
+    """That of an FMU whose description is another's."""
+    with zipfile.ZipFile(files["spring"]) as archive:
+        entries = {n: archive.read(n) for n in archive.namelist()}
+    with session(files["gain"]) as other:
+        guid = other.description.guid.encode()
+    with session(files["spring"]) as at:
+        own = at.description.guid.encode()
+    entries["modelDescription.xml"] = entries["modelDescription.xml"].replace(own, guid)
+    with (tmp_path / "spring.fmu").open("wb") as file:
+        write(entries, file)
+    with session(tmp_path / "spring.fmu") as at:
+        with pytest.raises(Exception, match="Failed to instantiate"):
+            at.instance()
+        assert own.decode() in " ".join(at.messages)
+        at._instances.clear()
