@@ -8,8 +8,6 @@ behind. Only a signal that comes before Python has read the first line of this p
 
 from __future__ import annotations
 
-import argparse
-import csv
 import json
 import os
 import random
@@ -19,12 +17,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
+from tests.attack.cases import Made, command
 
 MARK = "HAPTICLINK_ATTACK"
 COMMAND = [sys.executable, "-m", "hapticlink.orchestrator", "run", "closed-loop"]
@@ -164,34 +162,13 @@ def _marked(mark: str) -> list[str]:
     return found
 
 
-def attack(number: int, seed: int, duration: float = 0.2) -> dict[str, Counter[str]]:
-    """Outcomes by kind; what was wrong goes to stderr."""
-    counts: dict[str, Counter[str]] = {}
+def attack(number: int, seed: int, duration: float = 0.2) -> Iterator[Made]:
+    """Each case that is made."""
     with tempfile.TemporaryDirectory(prefix="attack-") as folder:
         made = Attack(Path(folder), duration)
-        for i, case in enumerate(cases(number, seed, made.lasts)):
-            outcome, wrong = made.made(case)
-            counts.setdefault(case.kind, Counter())[outcome] += 1
-            if wrong:
-                print(f"case {i}, {case}: {outcome}: {wrong}", file=sys.stderr, flush=True)
-    return counts
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Ctrl-C at random instants of a run.")
-    parser.add_argument("--cases", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("results/faults/signals.csv"))
-    given = parser.parse_args()
-    counts = attack(given.cases, given.seed)
-    given.out.parent.mkdir(parents=True, exist_ok=True)
-    with given.out.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["run", "cases", *OUTCOMES])
-        for kind, found in counts.items():
-            writer.writerow([kind, found.total(), *(found[o] for o in OUTCOMES)])
-    print(given.out)
+        for case in cases(number, seed, made.lasts):
+            yield Made(case.kind, str(case.instants), *made.made(case))
 
 
 if __name__ == "__main__":
-    main()
+    command("signals", "Ctrl-C at random instants of a run.", attack, 300, OUTCOMES)

@@ -1,0 +1,78 @@
+"""What attacks share: what may become of a case, the count of each, the table, the command line."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+OUTCOMES = ("done", "refused", "told", "lost", "crashed", "hung")
+"""done: accepted and run; refused: status 2 and a message; told: status 1 and a message, results up
+to then kept; lost: results of an earlier run are gone, or something stays behind; crashed: a
+signal, a traceback, an error of ours; hung: beyond a stated bound."""
+BAD = ("lost", "crashed", "hung")
+FOLDER = Path("results/faults")
+
+
+@dataclass(frozen=True)
+class Made:
+    """A case that was made: a row of the table, what it was, one of the outcomes and, where that
+    is a bad one, what was wrong."""
+
+    kind: str
+    case: str
+    outcome: str
+    wrong: str = ""
+
+
+def counted(made: Iterable[Made]) -> dict[str, Counter[str]]:
+    """Outcomes by kind; what was wrong goes to stderr."""
+    counts: dict[str, Counter[str]] = {}
+    for i, each in enumerate(made):
+        counts.setdefault(each.kind, Counter())[each.outcome] += 1
+        if each.wrong:
+            line = f"case {i}, {each.kind}: {each.case}: {each.outcome}: {each.wrong}"
+            print(line, file=sys.stderr, flush=True)
+    return counts
+
+
+def bad(counts: Mapping[str, Counter[str]]) -> dict[str, int]:
+    """How many cases were lost, crashed or hung; empty where none was."""
+    found = sum(counts.values(), Counter())
+    return {outcome: found[outcome] for outcome in BAD if found[outcome]}
+
+
+def write(
+    path: Path, counts: Mapping[str, Counter[str]], outcomes: Sequence[str] = OUTCOMES
+) -> None:
+    """A row a kind: `attack,cases,` and a column an outcome."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["attack", "cases", *outcomes])
+        for kind, found in counts.items():
+            writer.writerow([kind, found.total(), *(found[o] for o in outcomes)])
+
+
+def command(
+    name: str,
+    about: str,
+    attack: Callable[[int, int], Iterable[Made]],
+    number: int,
+    outcomes: Sequence[str] = OUTCOMES,
+) -> None:
+    """`python -m tests.attack.<name> [--cases N] [--seed N] [--out CSV]`: `attack(cases, seed)`
+    makes its cases; the table goes to results/faults/<name>.csv. Status 1 where any was bad."""
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("--cases", type=int, default=number)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=FOLDER / f"{name}.csv")
+    given = parser.parse_args()
+    counts = counted(attack(given.cases, given.seed))
+    write(given.out, counts, outcomes)
+    print(given.out)
+    sys.exit(1 if bad(counts) else 0)

@@ -1,0 +1,132 @@
+"""One `hapticlink` command in a process of its own, and what became of it.
+
+The process is forked from this one, which has its imports, and has bounds: of processor time, of
+time, of memory. A run that has rows and goes on is ended by one SIGINT, as somebody at the terminal
+would; what gets no row and no end is hung.
+"""
+
+from __future__ import annotations
+
+import filecmp
+import json
+import math
+import os
+import resource
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from hapticlink.orchestrator import api as api  # casadi and all: once, not in every process
+from hapticlink.orchestrator import commands
+
+ENOUGH = 0.5
+"""Seconds from a run's first row on after which it is ended."""
+PROCESSOR_TIME = 30
+"""Seconds of a processor after which a command is hung."""
+PATIENCE = 120.0
+"""Seconds after which it is hung, on a machine that is busy with other things."""
+MEMORY = 6 << 30
+"""Bytes of address space."""
+MESSAGE = 20_000
+"""Characters of a message that somebody may read."""
+
+
+class Place:
+    """A folder for the cases: an earlier run's results in `out`, a temporary folder of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.out = folder, folder / "out"
+        self._earlier, self._temporary = folder / "earlier", folder / "temporary"
+        self._temporary.mkdir()
+        status, said = self._forked(["run", "pendulum", "--out", str(self._earlier)])
+        assert status == 0, said
+
+    def made(self, arguments: Sequence[str]) -> tuple[str, str]:
+        """One of OUTCOMES, and what was wrong; the command may write to `out`."""
+        shutil.rmtree(self.out, ignore_errors=True)
+        shutil.copytree(self._earlier, self.out)
+        status, said = self._forked(arguments)
+        if status is None or -status in (signal.SIGXCPU, signal.SIGKILL):
+            return "hung", said[-500:]
+        if status not in (0, 1, 2) or "Traceback" in said or "Fatal" in said:
+            return "crashed", f"status {status}: {said[-1500:]}"
+        if status and "hapticlink: " not in said and "╭" not in said:
+            return "crashed", f"status {status} without a word: {said[-500:]}"
+        if len(said) > MESSAGE:
+            return "crashed", f"a message of {len(said)} characters: {said[:500]}"
+        if wrong := [*self._lost(status)]:
+            return "lost", f"status {status}: {'; '.join(wrong)}: {said[-500:]}"
+        ended = status == 0 or "interrupted" in said
+        return ("done" if ended else "told" if status == 1 else "refused"), ""
+
+    def _lost(self, status: int) -> Iterator[str]:
+        story = self.out / "run.json"
+        if status == 2 or not story.exists() or _same(story, self._earlier / "run.json"):
+            for path in self._earlier.iterdir():
+                if not (self.out / path.name).exists() or not _same(path, self.out / path.name):
+                    yield f"{path.name} of the earlier run has changed or is gone"
+        elif json.loads(story.read_text("utf-8"))["end"].get("reason") in (None, "running"):
+            yield "run.json has no end"
+        if hidden := [p.name for p in self.out.glob(".*")]:
+            yield f"files {', '.join(hidden)}"
+        if left := [p.name for p in self._temporary.iterdir()]:
+            yield f"temporary {', '.join(left)}"
+            shutil.rmtree(self._temporary)
+            self._temporary.mkdir()
+
+    def _forked(self, arguments: Sequence[str]) -> tuple[int | None, str]:
+        """Status (negative: the signal; None: no end within PATIENCE) and what it said."""
+        told, rows = self.folder / "told.txt", self.out / "run.json"
+        earlier = rows.stat().st_ino if rows.exists() else None
+        process = os.fork()
+        if process == 0:
+            _child(lambda: commands.main(arguments), told, self._temporary)
+        begin, began = time.monotonic(), None
+        while not (found := os.waitpid(process, os.WNOHANG))[0]:
+            now = time.monotonic()
+            if began is None and earlier and rows.exists() and rows.stat().st_ino != earlier:
+                began = now
+            if began is not None and now > began + ENOUGH:
+                os.kill(process, signal.SIGINT)
+                began = math.inf
+            if now > begin + PATIENCE:
+                os.killpg(process, signal.SIGKILL)
+                os.waitpid(process, 0)
+                return None, told.read_text("utf-8", errors="replace")
+            time.sleep(0.002)
+        return os.waitstatus_to_exitcode(found[1]), told.read_text("utf-8", errors="replace")
+
+
+def _same(a: Path, b: Path) -> bool:
+    return filecmp.cmp(a, b, shallow=False)
+
+
+def _child(call: Callable[[], object], told: Path, temporary: Path) -> None:
+    """Never returns."""
+    status = 70
+    try:
+        os.setsid()
+        said = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        for stream in (1, 2):
+            os.dup2(said, stream)
+        sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)  # noqa: SIM115
+        resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_TIME, PROCESSOR_TIME + 5))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.default_int_handler)
+        call()
+    except SystemExit as ended:
+        status = ended.code if isinstance(ended.code, int) else 70
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
