@@ -60,8 +60,6 @@ def build_block(
             return build(made, folder, **experiment)
         return build_native(made, folder, platforms=platforms, **experiment)
 
-    if cache.folder() is None:
-        return make(room)
     material: dict[str, Any] = {
         "block": name,
         "settings": {k: asdict(v) if is_dataclass(v) else v for k, v in settings.items()},  # type: ignore[arg-type]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import shutil
 import sys
 import tempfile
 import time
+import uuid
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -22,10 +24,9 @@ from typing import Any
 import hapticlink.components
 import hapticlink.fmus
 from hapticlink.components import registry
-from hapticlink.fmus.atomic_file import atomic_file
 
 LONGEST = 3600.0
-"""Seconds that no build takes."""
+"""Seconds that no copy takes."""
 VERSIONS = ("hapticlink", "casadi", "pythonfmu")
 
 
@@ -81,44 +82,57 @@ def source(module: str) -> str:
 
 
 def cached(
-    key_material: Mapping[str, Any],
-    build_function: Callable[[Path], Path],
-    room: Path | None = None,
+    key_material: Mapping[str, Any], build_function: Callable[[Path], Path], room: Path
 ) -> Path:
     """The FMU for `key_material`, made by `build_function(folder) -> path` if it is not there.
 
     Runs that race build each their own, and the last rename wins: the bytes are the same. A
     cached file that is damaged is built again. It is built in `room`, which is the caller's to
-    remove, beside its final place where there is none. With the cache off, the FMU lands in a new
-    temporary folder, which is the caller's to remove.
+    remove, and stays there where the cache is off or cannot be written, which is told.
     """
     root = folder()
-    if root is None:
-        return build_function(Path(tempfile.mkdtemp(prefix="hapticlink-")))
-    place = root / key(key_material)
-    for path in place.glob("[!.]*.fmu"):
-        if _is_whole(path):
-            return path
-    place.mkdir(parents=True, exist_ok=True)
-    _clear(place)
-    room = room or place
+    if root is not None:
+        place = root / key(key_material)
+        for path in place.glob("[!.]*.fmu"):
+            if _is_whole(path):
+                return path
     room.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=room, prefix=".") as making:
-        built = build_function(Path(making))
-        with atomic_file(place / built.name) as beside:
-            shutil.copyfile(built, beside)
+    making = Path(tempfile.mkdtemp(dir=room))
+    built = build_function(making)
+    if root is None:
+        return built
+    try:
+        kept = _kept(built, root, place)
+    except OSError as error:
+        logging.getLogger(__name__).warning(
+            "the cache %s cannot be written (%s): %s is not kept; name another by HAPTICLINK_CACHE",
+            root, error.strerror or error, built.name,
+        )  # fmt: skip
+        return built
+    shutil.rmtree(making, ignore_errors=True)
+    return kept
+
+
+def _kept(built: Path, root: Path, place: Path) -> Path:
+    """A copy of `built` in `place`: from its first instant there it is whole."""
+    root.mkdir(parents=True, exist_ok=True)
+    _clear(root)
+    beside = root / f".{uuid.uuid4().hex}"
+    try:
+        shutil.copyfile(built, beside)
+        place.mkdir(exist_ok=True)
+        os.replace(beside, place / built.name)
+    finally:
+        beside.unlink(missing_ok=True)
     return place / built.name
 
 
-def _clear(place: Path) -> None:
-    """Remove what a build left that was killed, on whichever machine that shares the cache."""
-    for left in place.glob(".*"):
-        with suppress(OSError):  # another build removes its own
-            if time.time() - left.stat().st_mtime < LONGEST:
-                continue
-            if left.is_dir():
-                shutil.rmtree(left, ignore_errors=True)
-            else:
+def _clear(root: Path) -> None:
+    """Remove what was left of a copy by a process that was killed, on whichever machine that shares
+    the cache."""
+    for left in root.glob(".*"):
+        with suppress(OSError):  # another process removes its own
+            if time.time() - left.stat().st_mtime > LONGEST:
                 left.unlink()
 
 

@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.tables import Results, Table, load
+from hapticlink.orchestrator.results.tables import Results, Table, load, size
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.event_loop import Outcome, Progress, run
 from hapticlink.orchestrator.run.open_fmus import isolated
@@ -38,6 +38,10 @@ class Experiment:
     outcome: Outcome
     folder: Path
     run: dict[str, Any]
+
+    def too_large(self, most: int) -> bool:
+        """Whether the tables in `folder` have more than `most` bytes."""
+        return self.outcome.published and size(self.folder, self.run) > most
 
     @property
     def results(self) -> Results:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.native import PLATFORMS
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
@@ -44,9 +45,10 @@ def build(
     with temporary_folders.room() as room:
         platforms = PLATFORMS if all_platforms else ()
         files = fmu_files(read, timeline(read), room, platforms, starts)
-        return {
-            name: Path(shutil.copy(path, folder / f"{name}.fmu")) for name, path in files.items()
-        }
+        for name, path in files.items():
+            with atomic_file(folder / f"{name}.fmu") as unfinished:
+                shutil.copyfile(path, unfinished)
+    return {name: folder / f"{name}.fmu" for name in files}
 
 
 def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,9 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import figures, folders, tables
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
+
+MOST = 2**30
+"""Bytes of tables that a run in a folder reads back; as numbers they take half of that."""
 
 
 class RunInterrupted(Interrupted):
@@ -39,7 +43,8 @@ def run(
 
     Raises InputFault before anything runs. A fault of the run itself is no exception: look at
     `fault` of what is returned, whose results go as far as the run did. Ctrl-C raises
-    RunInterrupted, with the results so far as its `run`.
+    RunInterrupted, with the results so far as its `run`. Tables of more than 1 GiB in `out` are not
+    read back: `load` does.
     """
     with interrupt.held():
         if out is None:
@@ -60,6 +65,10 @@ def _in_folder(
     progress: Callable[[float], None] | None,
 ) -> Run:
     ended = simulate(scene, folder, options, progress)
+    if ended.too_large(MOST):
+        said = "%s: tables of more than %d bytes are not read back and drawn; load them yourself"
+        logging.getLogger(__name__).warning(said, folder, MOST)
+        return Run(folder, ended.run, {})
     found = ended.results
     run = found.run
     if not ended.outcome.published:

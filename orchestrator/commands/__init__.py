@@ -12,6 +12,7 @@ from cyclopts import App, CycloptsError, Parameter
 from hapticlink.components.registry import Registry
 from hapticlink.orchestrator.base import internal_error, interrupt, plugins, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.base.say import say
 
 app = App(
     name="hapticlink",
@@ -102,16 +103,16 @@ def _status(arguments: Sequence[str] | None) -> int:
     except CycloptsError:  # cyclopts has printed it
         return 2
     except Fault as fault:
-        print(f"hapticlink: {fault}", file=sys.stderr)
+        say(f"hapticlink: {fault}", file=sys.stderr)
         return fault.exit_status
     except BrokenPipeError:  # whoever reads has enough, as `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a full disk, a folder that may not be written
-        print(f"hapticlink: {error}", file=sys.stderr)
+        say(f"hapticlink: {error}", file=sys.stderr)
         return 1
     except Exception as error:
-        print(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)
+        say(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)
         return 1
 
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from hapticlink.orchestrator.base.say import say
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
 
 AllPlatforms = Annotated[
@@ -22,5 +23,5 @@ def build(
 
     folder = out or default_folder("fmus", scene)
     made = api.build(scene, set or (), out=folder, all_platforms=all_platforms)
-    print(*made.values(), sep="\n")
+    say(*made.values(), sep="\n")
     return 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hapticlink.orchestrator.base.say import say
 from hapticlink.orchestrator.commands.options import Out, Scene, Set
 
 
@@ -12,5 +13,5 @@ def export(scene: Scene, /, *, out: Out = None, set: Set = None) -> int:
     `hapticlink run` reads it back, rates and holds included."""
     from hapticlink.orchestrator import api
 
-    print(api.export(scene, set or (), out=(out or Path("ssp")) / f"{Path(scene).stem}.ssp"))
+    say(api.export(scene, set or (), out=(out or Path("ssp")) / f"{Path(scene).stem}.ssp"))
     return 0

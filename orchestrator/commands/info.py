@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base.say import say
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, options
 from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.results.summary import MECHANISM
@@ -32,21 +33,21 @@ def info(
 
     if scene is None:
         for name, title in api.shipped().items():
-            print(f"{name}: {title}")
+            say(f"{name}: {title}")
         return 0
     read = api.scene(scene, options(set, swap))
     with built(read) as made:
         time = made.timeline
         start = at_start(made) if read.linkage and (read.linkage.loop or read.device) else {}
-    print(f"{read.title}\n{read.description.strip()}".strip())
-    print(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
+    say(f"{read.title}\n{read.description.strip()}".strip())
+    say(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
     if read.linkage and start:
         for line in summary.moved(asdict(read.linkage), coordinates(start)):
-            print(f"  {line}")
+            say(f"  {line}")
     for fmu in made.fmus:
         timing = fmu.description.timing
-        print(f"  {fmu.name}: {timing}, at {fmu.clock}, {len(fmu.description.outputs)} outputs")
-    print("\nconnections (age of the newest sample when it is used, ms)")
+        say(f"  {fmu.name}: {timing}, at {fmu.clock}, {len(fmu.description.outputs)} outputs")
+    say("\nconnections (age of the newest sample when it is used, ms)")
     ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(made)).items()}
     for connection in made.connections:
         if connection.initial:
@@ -55,9 +56,9 @@ def info(
             note = f"{age['least'] * 1e3:.3g} to {age['most'] * 1e3:.3g}"
         else:
             note = "at the start only"
-        print(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
+        say(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
     for line in summary.replaced({n: asdict(r) for n, r in made.replacements.items()}):
-        print(f"  {line}")
+        say(f"  {line}")
     if read.device:
         _workspace(read, [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)], out)
     _needs(read, time)
@@ -67,15 +68,15 @@ def info(
 def _workspace(scene: Any, start: list[float], out: Path | None) -> None:
     from hapticlink.orchestrator.results import folders, workspace
 
-    print("\ndevice's workspace")
+    say("\ndevice's workspace")
     for line in workspace.lines(scene.device, start):
-        print(f"  {line}")
+        say(f"  {line}")
     if out:
         path = folders.made(out) / "workspace.png"
         title = f"Device and its workspace: {scene.title}"
         figure = workspace.draw(scene.device, start, title)
         figure.savefig(path, dpi=150, metadata={"Software": None})  # the same bytes every time
-        print(f"  {path}")
+        say(f"  {path}")
 
 
 def _needs(scene: Any, time: Timeline) -> None:
@@ -84,23 +85,23 @@ def _needs(scene: Any, time: Timeline) -> None:
 
     found = list(requirements.needs(scene))
     for title, needed in (("needed", True), ("left out", False)):
-        print(f"\n{title}")
+        say(f"\n{title}")
         for need in found:
             if need.needed == needed:
-                print(f"  {need.part}: {need.why}")
-    print("\noperations of a step and of its outputs, signals in and out")
+                say(f"  {need.part}: {need.why}")
+    say("\noperations of a step and of its outputs, signals in and out")
     rows = {}
     for title, skip in (("as it is", True), ("nothing left out", False)):
         rows[title] = costs.costs(scene, time, skip=skip)
-        print(f"  {title}")
+        say(f"  {title}")
         for row in rows[title]:
             ports = sum(row.cost.inputs.values()), sum(row.cost.outputs.values())
-            print(
+            say(
                 f"    {row.name}: {row.cost.step} + {row.cost.output} operations, "
                 f"{ports[0]} + {ports[1]} signals"
             )
         operations, signals = (sum(getattr(r, k) for r in rows[title]) for k in _PER_TICK)
-        print(f"    a haptic tick: {operations:.0f} operations, {signals:.0f} signals")
+        say(f"    a haptic tick: {operations:.0f} operations, {signals:.0f} signals")
 
 
 _PER_TICK = ("operations", "signals")

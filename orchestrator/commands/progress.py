@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from hapticlink.orchestrator.base.say import printable
+
 
 @contextmanager
 def counted(title: str) -> Iterator[Callable[[int, int], None]]:
@@ -31,9 +33,10 @@ def _bar(title: str) -> Iterator[Callable[[float, float, str], None] | None]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[at]}"))
+    said = TextColumn("{task.description}", markup=False)
+    columns = (said, BarColumn(), TextColumn("{task.fields[at]}"))
     with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        task = bar.add_task(title, total=None, at="building")
+        task = bar.add_task(printable(title), total=None, at="building")
 
         def show(completed: float, total: float, at: str) -> None:
             bar.update(task, completed=completed, total=total, at=at)

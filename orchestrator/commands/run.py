@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base.say import say
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, default_folder, options
 from hapticlink.orchestrator.commands.progress import progress
 
@@ -30,7 +31,7 @@ def run(
     from hapticlink.orchestrator.results import summary
 
     if explain:
-        print(*api.explain(scene, options(set, swap)), sep="\n")
+        say(*api.explain(scene, options(set, swap)), sep="\n")
         return 0
     folder = out or default_folder("runs", scene)
     try:
@@ -40,17 +41,17 @@ def run(
     except api.RunInterrupted as ended:
         made = ended.run
     if made.fault:
-        print(f"hapticlink: {made.fault}", file=sys.stderr)
-    print(f"{default_folder('runs', scene).name}: {summary.ending(made)}")
+        say(f"hapticlink: {made.fault}", file=sys.stderr)
+    say(f"{default_folder('runs', scene).name}: {summary.ending(made)}")
     for line in summary.lines(made):
-        print(f"  {line}")
+        say(f"  {line}")
     wall_time = made.run["timings"]["run"]
     speed = made.run["end"]["time"] / wall_time
-    print(f"  {wall_time:.2f} s of run time, {speed:.1f} times real time")
-    tables = (f"{rate}.csv" for rate in made.tables)
+    say(f"  {wall_time:.2f} s of run time, {speed:.1f} times real time")
+    tables = (f"{rate}.csv" for rate in made.run["rates"])
     others = (name for name in made.run["files"] if not name.endswith(".csv"))
     if made.folder:
-        print(f"  {folder}/: {', '.join([*tables, *others])}")
+        say(f"  {folder}/: {', '.join([*tables, *others])}")
     else:
-        print(f"  {folder}/ is as it was: the run has no row")
+        say(f"  {folder}/ is as it was: the run has no row")
     return Fault.exit_status if made.fault else 0

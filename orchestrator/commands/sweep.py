@@ -8,6 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from hapticlink.orchestrator.base.say import say
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
 from hapticlink.orchestrator.commands.progress import counted
 
@@ -66,10 +67,10 @@ def sweep(
         )  # fmt: skip
     for each in made.failed[:10]:
         what = ", ".join(f"{k}={v}" for k, v in each.items() if k in made.keys)
-        print(f"hapticlink: {what}: {each['end']}: {each['message']}", file=sys.stderr)
+        say(f"hapticlink: {what}: {each['end']}: {each['message']}", file=sys.stderr)
     runs_made, failed = len(made.rows), len(made.failed)
-    print(f"{default_folder('sweeps', scene).name}: {runs_made} runs, {failed} of them failed")
-    print(f"  {folder}/: {', '.join(made.files)}")
+    say(f"{default_folder('sweeps', scene).name}: {runs_made} runs, {failed} of them failed")
+    say(f"  {folder}/: {', '.join(made.files)}")
     if failed < runs_made:
         return 0
     return InputFault.exit_status if all(r["end"] == REFUSED for r in made.rows) else 1

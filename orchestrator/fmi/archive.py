@@ -15,19 +15,29 @@ from hapticlink.orchestrator.base.faults import InputFault
 
 MOST_XML = 256 * 2**20
 """Bytes of one XML entry; the largest FMUs (10^5 variables) have some 50 MB."""
+MOST = 2**30
+"""Bytes of an archive once it is unpacked."""
+MOST_ENTRIES = 10_000
 
 
 @contextmanager
 def opened(path: Path, kind: str) -> Iterator[zipfile.ZipFile]:
-    """The archive at `path`, a `kind` ("FMU"). Raises InputFault where it is missing, damaged, or
-    holds an entry that would land outside the folder that it is unpacked to."""
+    """The archive at `path`, a `kind` ("FMU"). Raises InputFault where it is missing, damaged,
+    larger than MOST or MOST_ENTRIES, or holds an entry that would land outside the folder that it
+    is unpacked to."""
     try:
         with zipfile.ZipFile(path) as archive:
-            for entry in archive.infolist():
+            entries = archive.infolist()
+            for entry in entries:
                 if fault := _outside(entry):
                     raise InputFault(
                         f"{path}: entry {entry.filename!r} {fault}; take no {kind} from there"
                     )
+            if fault := _too_large(entries):
+                raise InputFault(
+                    f"{path}: {fault} are unpacked; take out what no run needs: sources, "
+                    "documentation, binaries of other platforms"
+                )
             yield archive
     except FileNotFoundError:
         raise InputFault(f"{path}: there is no such file; give the path of an {kind}") from None
@@ -40,12 +50,22 @@ def opened(path: Path, kind: str) -> Iterator[zipfile.ZipFile]:
 def _outside(entry: zipfile.ZipInfo) -> str:
     """Why an entry is refused, "" where it is not."""
     name = entry.orig_filename
-    if "\\" in name or ":" in name.split("/")[0] or "\0" in name:
+    if "\\" in name or ":" in name or "\0" in name:
         return "is not a path with forward slashes"
     if name.startswith("/") or ".." in PurePosixPath(name).parts:
         return "points outside the archive"
     if stat.S_ISLNK(entry.external_attr >> 16):
         return "is a symbolic link"
+    return ""
+
+
+def _too_large(entries: list[zipfile.ZipInfo]) -> str:
+    """By how much an archive is, "" where it is not. What it says of its entries' sizes holds: more
+    than that is not read of one."""
+    if (size := sum(entry.file_size for entry in entries)) > MOST:
+        return f"it has {size} bytes unpacked; at most {MOST}"
+    if len(entries) > MOST_ENTRIES:
+        return f"it has {len(entries)} entries; at most {MOST_ENTRIES}"
     return ""
 
 

@@ -1,19 +1,23 @@
-"""What FMUs log, kept by the key of their instance."""
+"""What FMUs log, the newest of it kept by the key of their instance."""
 
 from __future__ import annotations
 
+from collections import deque
 from itertools import count
 
 from fmpy import fmi2
 
-_messages: dict[int, list[str]] = {}
+KEPT, LONGEST = 5, 2000
+"""Messages of an instance, and characters of one."""
+
+_messages: dict[int, deque[str]] = {}
 _keys = count(1)
 
 
 def opened() -> int:
     """The key of a new instance, whose messages are kept from now on."""
     key = next(_keys)
-    _messages[key] = []
+    _messages[key] = deque(maxlen=KEPT)
     return key
 
 
@@ -21,11 +25,11 @@ def keep(key: int, status: int, message: bytes) -> None:
     """Keep what the FMU of instance `key` says; it is shown when a call fails."""
     said = _messages.get(key)
     if said is not None and status > 0:
-        said.append((message or b"").decode("utf-8", "replace").strip())
+        said.append((message or b"")[: 4 * LONGEST].decode("utf-8", "replace").strip()[:LONGEST])
 
 
 def newest(key: int) -> list[str]:
-    return _messages.get(key, [])[-5:]
+    return [*_messages.get(key, ())]
 
 
 def closed(key: int) -> None:

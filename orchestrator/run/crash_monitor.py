@@ -17,14 +17,18 @@ from hapticlink.orchestrator.base import interrupt, temporary_folders
 
 @contextmanager
 def beside(folder: Path) -> Iterator[None]:
-    """Context in which a crash of this process is recorded in `folder`/run.json."""
+    """Context in which a crash of this process is recorded in `folder`/run.json, and in which
+    Python code that ends the process (os._exit) does not end it with 0, which is a good end."""
     command = [sys.executable, "-P", "-m", __name__, str(folder.resolve()), str(os.getpid())]
     # A session of its own: Ctrl-C is for the run. Its input ends when this process does.
     with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
         interrupt.add(process.kill)
+        leave = os._exit
+        os._exit = lambda status: leave(status or 1)
         try:
             yield
         finally:
+            os._exit = leave
             interrupt.remove(process.kill)
             process.kill()
 

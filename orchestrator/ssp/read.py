@@ -15,11 +15,13 @@ import re
 import shutil
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
 from hapticlink.fmus import cache
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
@@ -42,11 +44,12 @@ def tables(path: Path) -> dict[str, Any]:
         assert element is not None  # the schema says so
         system, defined = tree(path, element), units(root)
         names = _names(part.place for part in system if part.source is not None)
-        files = {
-            part.place: _fmu(path, archive, part, names[part.place])
-            for part in system
-            if part.source is not None
-        }
+        with _room() as room:
+            files = {
+                part.place: _fmu(path, archive, part, names[part.place], room)
+                for part in system
+                if part.source is not None
+            }
         described = {place: describe(file) for place, file in files.items()}
         wires = Wires(path, system, described, defined)
         starts = Parameters(path, archive, wires).starts()
@@ -67,6 +70,18 @@ def tables(path: Path) -> dict[str, Any]:
     ] + rest.get("connection", [])
     _experiment(path, found, root, described.values())
     return found
+
+
+@contextmanager
+def _room() -> Iterator[Path]:
+    """Where FMUs land with the cache off, to the end of this process, which may run the scene."""
+    room = Path(temporary_folders.new())
+    atexit.register(shutil.rmtree, room, ignore_errors=True)
+    try:
+        yield room
+    finally:
+        with suppress(OSError):  # there is something in it
+            room.rmdir()
 
 
 def _experiment(
@@ -97,22 +112,22 @@ def _names(places: Iterable[Place]) -> dict[Place, str]:
     return found
 
 
-def _fmu(path: Path, archive: zipfile.ZipFile, part: Part, name: str) -> Path:
-    """The FMU of a component, unpacked into the cache."""
+def _fmu(path: Path, archive: zipfile.ZipFile, part: Part, name: str, room: Path) -> Path:
+    """The FMU of a component, unpacked into the cache, or `room` where that is off."""
     if part.source not in archive.NameToInfo:
         held = ", ".join(n for n in archive.namelist() if n.endswith(".fmu")) or "none"
         where = f"{path}: {dotted(part.place)}"
         raise InputFault(f"{where}: there is no {part.source!r} in it; FMUs in it: {held}")
-    content, file = archive.read(part.source), f"{name}.fmu"
+    file = f"{name}.fmu"
+    with archive.open(part.source) as content:
+        digest = hashlib.file_digest(content, "sha256").hexdigest()  # type: ignore[arg-type]
 
-    def unpack(room: Path) -> Path:
-        (room / file).write_bytes(content)
-        return room / file
+    def unpack(folder: Path) -> Path:
+        with archive.open(part.source or "") as content, (folder / file).open("wb") as unpacked:
+            shutil.copyfileobj(content, unpacked)
+        return folder / file
 
-    kept = cache.cached({"ssp": hashlib.sha256(content).hexdigest(), "file": file}, unpack)
-    if cache.folder() is None:
-        atexit.register(shutil.rmtree, kept.parent, ignore_errors=True)
-    return kept
+    return cache.cached({"ssp": digest, "file": file}, unpack, room)
 
 
 def _grouped(rows: list[Row], described: Mapping[Place, Description]) -> Iterator[Row]:

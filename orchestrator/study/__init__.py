@@ -14,8 +14,8 @@ from hapticlink.orchestrator.sweep.job import Job
 def study(jobs: Sequence[Job], folder: Path, room: Path, processes: int, tell: Tell) -> Path:
     """Make the runs that `room` does not hold yet, and write table, figures and README.md into
     `folder`; `tell` hears how many are done."""
+    folders.made(folder)
     rows = sweep(jobs, room, processes, tell=tell, measure=errors.measure)
     found = errors.compared(rows)
-    folders.made(folder)
     table.write(folder / "table.csv", [errors.rounded(row) for row in found])
     return page.write(folder, found)

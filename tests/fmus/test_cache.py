@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.fmus import build, cache, cached
+from hapticlink.fmus import build, cache, cached, check_fmu
 from tests.fmus import sample_components
 
 MATERIAL = {"scene": {"mass": 1.0, "rates": [512, 30]}}
@@ -18,6 +18,11 @@ MATERIAL = {"scene": {"mass": 1.0, "rates": [512, 30]}}
 def place(tmp_path, monkeypatch) -> Path:
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
+
+
+@pytest.fixture
+def room(tmp_path) -> Path:
+    return tmp_path / "room"
 
 
 class Builder:
@@ -35,9 +40,9 @@ def files(place: Path) -> list[str]:
     return [p.name for p in place.rglob("*") if p.is_file() or p.name.startswith(".")]
 
 
-def test_built_once(place):
+def test_built_once(place, room):
     builder = Builder()
-    first, second = cached(MATERIAL, builder), cached(MATERIAL, builder)
+    first, second = cached(MATERIAL, builder, room), cached(MATERIAL, builder, room)
     assert builder.calls == 1
     assert first == second
     assert first.is_relative_to(place)
@@ -63,52 +68,60 @@ def test_sources_are_part_of_the_key(monkeypatch):
 
 
 @pytest.mark.parametrize("damage", [b"", b"not a zip", None])
-def test_a_damaged_file_is_built_again(place, damage):
+def test_a_damaged_file_is_built_again(place, room, damage):
     builder = Builder()
-    path = cached(MATERIAL, builder)
+    path = cached(MATERIAL, builder, room)
     whole = path.read_bytes()
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 0xFF
     path.write_bytes(bytes(flipped) if damage is None else damage)
-    assert cached(MATERIAL, builder).read_bytes() == whole
+    assert cached(MATERIAL, builder, room).read_bytes() == whole
     assert builder.calls == 2
 
 
-def test_a_failed_build_leaves_nothing(place):
+def test_a_failed_build_leaves_nothing(place, room):
     def fail(folder: Path) -> Path:
         (folder / "half.fmu").write_bytes(b"half")
         raise RuntimeError("no")
 
     with pytest.raises(RuntimeError, match="no"):
-        cached(MATERIAL, fail)
+        cached(MATERIAL, fail, room)
     assert files(place) == []
 
 
-def test_what_a_killed_build_has_left_goes_with_the_next(place):
-    """Not what another machine may still be at."""
-    room = place / cache.key(MATERIAL)
-    (room / ".dead").mkdir(parents=True)
-    (room / ".dead" / "half.fmu").write_bytes(b"half")
-    (room / ".half.fmu").write_bytes(b"half")
-    for old in (room / ".dead", room / ".half.fmu"):
-        os.utime(old, (0, 0))
-    (room / ".fresh").mkdir()
-    path = cached(MATERIAL, Builder())
-    assert {p.name for p in room.iterdir()} == {path.name, ".fresh"}
+def test_what_a_killed_copy_has_left_goes_with_the_next_build(place, room):
+    """Of another FMU too; not what another machine may still be at."""
+    place.mkdir()
+    for name in (".half", ".fresh"):
+        (place / name).write_bytes(b"half")
+    os.utime(place / ".half", (0, 0))
+    cached(MATERIAL, Builder(), room)
+    assert sorted(files(place)) == [".fresh", "gain.fmu"]
 
 
-def test_it_is_built_in_the_room_given(place, tmp_path):
-    rooms = []
+def test_a_killed_build_leaves_nothing_in_the_cache(place, room):
+    """It is built elsewhere, and copied before it has its place."""
+    seen = []
 
     def builder(folder: Path) -> Path:
-        rooms.append(folder.parent)
+        seen.append(folder.parent)
+        assert not place.exists()
         return build(sample_components.stateless(), folder)
 
-    assert cached(MATERIAL, builder, tmp_path / "room").parent == place / cache.key(MATERIAL)
-    assert rooms == [tmp_path / "room"]
+    assert cached(MATERIAL, builder, room).parent == place / cache.key(MATERIAL)
+    assert seen == [room]
+    assert list(room.iterdir()) == []
 
 
-def test_races_end_with_one_whole_file(place):
+def test_a_cache_that_cannot_be_written_is_told_and_done_without(place, room, caplog):
+    place.write_text("a file where the cache should be")
+    path = cached(MATERIAL, Builder(), room)
+    assert path.is_relative_to(room)
+    assert check_fmu(path) == []
+    assert f"the cache {place} cannot be written" in caplog.text
+
+
+def test_races_end_with_one_whole_file(place, room):
     paths, together = [], threading.Barrier(4)
 
     def race() -> None:
@@ -116,7 +129,7 @@ def test_races_end_with_one_whole_file(place):
             together.wait(timeout=30)  # all found the cache empty
             return build(sample_components.stateless(), folder)
 
-        paths.append(cached(MATERIAL, builder))
+        paths.append(cached(MATERIAL, builder, room))
 
     threads = [threading.Thread(target=race) for _ in range(4)]
     for thread in threads:
@@ -127,11 +140,10 @@ def test_races_end_with_one_whole_file(place):
     assert files(place) == ["gain.fmu"]
 
 
-def test_off_builds_every_time_and_keeps_nothing(monkeypatch, tmp_path):
+def test_off_builds_every_time_and_keeps_nothing(monkeypatch, room):
     monkeypatch.setenv("HAPTICLINK_CACHE", "off")
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     builder = Builder()
-    assert cached(MATERIAL, builder) != cached(MATERIAL, builder)
+    assert cached(MATERIAL, builder, room) != cached(MATERIAL, builder, room)
     assert builder.calls == 2
     assert cache.folder() is None
 

@@ -18,6 +18,21 @@ def test_build_gives_the_file_of_each_block(bar: Path, tmp_path: Path) -> None:
         hl.build(bar, out=tmp_path, all_platforms=True)
 
 
+def test_a_full_disk_leaves_no_part_of_an_fmu(bar: Path, tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    earlier = hl.build(bar, out=tmp_path)["virtual_mechanism"]  # it is in the cache from now on
+    content = earlier.read_bytes()
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(content) // 2, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            hl.build(bar, out=tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert earlier.read_bytes() == content
+    assert {p.name for p in tmp_path.iterdir()} == {bar.name, earlier.name}
+
+
 def test_an_exported_scene_explains_itself_as_the_scene_does(bar: Path, tmp_path: Path) -> None:
     path = hl.export(hl.scene(bar), {"haptics.rate": 100}, out=tmp_path / "bar.ssp")
     assert path == tmp_path / "bar.ssp"

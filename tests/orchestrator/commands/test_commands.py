@@ -1,5 +1,6 @@
 """The commands from outside: files, messages and exit statuses."""
 
+import io
 import json
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from hapticlink.orchestrator.commands.progress import progress
 from hapticlink.orchestrator.results import tables
 from tests.orchestrator.conftest import status
 
@@ -32,6 +34,27 @@ def test_a_mechanism_alone_runs_at_the_haptic_rate(
 def test_build_writes_one_fmu_a_block(bar: Path, tmp_path: Path) -> None:
     assert status("build", str(bar), "--out", str(tmp_path / "fmus")) == 0
     assert [p.name for p in (tmp_path / "fmus").iterdir()] == ["virtual_mechanism.fmu"]
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_nothing_acts_on_the_terminal_but_the_bar(
+    bar: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Escape codes in a title, a name, an option; and what a bar takes for its own codes."""
+    bar.write_text(bar.read_text().replace("A bar", r"A bar [/b] \u001b[2J \u009b31m"))
+    assert status("info", bar) == 0
+    assert capsys.readouterr().out.startswith(r"A bar [/b] \x1b[2J \x9b31m at 0.5 m/s")
+    assert status("run", bar, "--set", "du\x1b[31mration=1") == 2
+    assert r"du\x1b[31mration: unknown key" in capsys.readouterr().err
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    with progress("[/b] \x1b[2J", 1.0) as told:
+        assert told
+        told(0.5)
+    assert r"[/b] \x1b[2J" in terminal.getvalue()
 
 
 def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) -> None:

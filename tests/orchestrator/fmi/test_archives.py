@@ -52,6 +52,7 @@ def link(path: Path) -> Path:
         (lambda p: fmu(p, **{"a/../../evil": "x"}), "points outside the archive"),
         (lambda p: fmu(p, **{"/etc/evil": "x"}), "points outside the archive"),
         (lambda p: fmu(p, **{"C:/evil": "x"}), "not a path with forward slashes"),
+        (lambda p: fmu(p, **{"a/C:evil": "x"}), "not a path with forward slashes"),
         (link, "is a symbolic link"),
         (lambda p: fmu(p), "no binary for this platform .* only for none"),
         (lambda p: fmu(p, **{"binaries/win95/faults.dll": "x"}), "only for win95"),
@@ -86,6 +87,25 @@ def test_xml_of_any_size_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
         pytest.raises(InputFault, match="bytes; at most 100 are read"),
     ):
         read_xml(found, "modelDescription.xml")
+
+
+def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    """A gigabyte of zeros in a megabyte."""
+    path = fmu(tmp_path / "model.fmu")
+    with (
+        zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as made,
+        made.open("resources/zeros", "w", force_zip64=True) as entry,
+    ):
+        for _ in range(33):
+            entry.write(bytes(2**25))
+    with pytest.raises(InputFault, match=r"it has \d+ bytes unpacked; at most 1073741824 are"):
+        describe(path)
+
+
+def test_an_archive_of_very_many_files_is_refused(tmp_path: Path) -> None:
+    path = fmu(tmp_path / "model.fmu", **{f"resources/{i}": "" for i in range(10_000)})
+    with pytest.raises(InputFault, match="10001 entries; at most 10000 are unpacked; take out"):
+        describe(path)
 
 
 SSD = """<?xml version="1.0" encoding="UTF-8"?>

@@ -10,6 +10,7 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.study import cases, errors, figures, page
 from hapticlink.orchestrator.study.grids import COLUMNS, best, grid, lasting, short
 from hapticlink.orchestrator.sweep.row import Row
+from tests.orchestrator.conftest import status
 
 
 def test_every_case_is_a_scene_and_every_hold_a_case(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,3 +129,11 @@ def test_the_page_names_the_hold_of_the_least_error(
         assert (tmp_path / f"{name}.png").is_file()
         assert cells[f"{name}.png"]["foh, mean"] == [value] * len(COLUMNS)
         assert cells[f"{name}.png"]["second-order"] == ["1.2 s"] * len(COLUMNS)  # when it was lost
+
+
+def test_a_folder_that_cannot_be_is_told_before_any_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hapticlink.orchestrator.study.sweep", lambda *_, **__: pytest.fail("runs"))
+    (tmp_path / "file").write_text("")
+    assert status("study", "--out", tmp_path / "file") == 2

@@ -1,0 +1,16 @@
+"""What FMUs say is kept, but not all of it."""
+
+from hapticlink.orchestrator.fmi import messages
+
+
+def test_the_newest_messages_are_kept_and_no_novel() -> None:
+    key = messages.opened()
+    for i in range(20_000):
+        messages.keep(key, 2, b"%d " % i + b"x" * 10_000)
+    messages.keep(key, 0, b"all is well")
+    kept = messages.newest(key)
+    messages.closed(key)
+    assert [said.split()[0] for said in kept] == [str(i) for i in range(19_995, 20_000)]
+    assert {len(said) for said in kept} == {messages.LONGEST}
+    messages.keep(key, 3, b"after the end")
+    assert messages.newest(key) == []
