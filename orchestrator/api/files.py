@@ -35,7 +35,7 @@ def build(
         raise InputFault("--all-platforms compiles: add --set packaging=native")
     if not blocks(read):
         raise InputFault(f"{read.title}: nothing to build: its FMUs are given as files")
-    folder = folders.made(out)
+    folder = folders.ensure(out)
     with temporary_folders.room() as room:
         files = fmu_files(read, timeline(read), room, PLATFORMS if all_platforms else ())
         return {
