@@ -88,7 +88,7 @@ def _simulated(
         story = _story(read, plan)
         alone = isolated(system.fmus)
         risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
-        with RunFolder(folders.made(folder), story) as results:
+        with RunFolder(folders.ensure(folder), story) as results:
             with crash_monitor.beside(folder) if risky else nullcontext():
                 outcome = run(plan, results, progress)
             ending = _ending(system, outcome, build_time)

@@ -1,4 +1,4 @@
-"""What run.json says of rates, holds, links and energies."""
+"""The contents of run.json: scene, versions, rates, holds, links, energies and the end of a run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hapticlink.orchestrator.system.system import System
 
 
 def clocks(timeline: Timeline) -> dict[str, Any]:
-    """By clock, in s: its first step, and the shortest and longest after it."""
+    """For each clock, its first step and the shortest and longest after it (s)."""
     seconds = timeline.seconds
     return {
         c.name: {
@@ -37,7 +37,8 @@ def clocks(timeline: Timeline) -> dict[str, Any]:
 
 
 def holds(system: System) -> dict[str, Any]:
-    """Every choice on a connection, and how plants take what varies within a step."""
+    """Holds, kinds, latencies and substeps by connection or FMU, and how plants take held inputs
+    that vary within a step."""
     held = [c for c in system.connections if c.hold]
     return {
         "holds": {c.name: c.hold for c in held},
@@ -54,7 +55,7 @@ def holds(system: System) -> dict[str, Any]:
 
 
 def within_a_step(system: System) -> dict[str, str]:
-    """By connection, what a plant makes of a hold that varies within its step."""
+    """For each hold that varies within a step, how its plant takes it."""
     return {
         c.name: _taken(held_polynomials.order(system, c), system.substeps.get(c.target, 1))
         for c in system.connections
@@ -72,7 +73,7 @@ def _taken(order: int, substeps: int) -> str:
 
 
 def power_across_rates(system: System) -> list[str]:
-    """The connections that cross rates and carry power, by name."""
+    """Names of the connections that carry power across rates."""
     return [
         c.name
         for c in system.connections
@@ -82,8 +83,8 @@ def power_across_rates(system: System) -> list[str]:
 
 
 def energies(system: System, booked: Mapping[str, Energy]) -> dict[str, Any]:
-    """In J: `energies` of connections across rates, "none" where none carries power, and those of
-    connections within a rate, whose values stand over the target's step all the same."""
+    """Energies (J) of connections across rates, "none" where none carries power, and of connections
+    within a rate, whose inputs are held over the target's step, too."""
     across = set(power_across_rates(system))
     return {
         "energies": {n: asdict(e) for n, e in booked.items() if n in across} or "none",

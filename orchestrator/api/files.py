@@ -40,7 +40,7 @@ def build(
         raise InputFault("--all-platforms compiles: add --set packaging=native")
     if not blocks(read):
         raise InputFault(f"{read.title}: nothing to build: its FMUs are given as files")
-    folder = folders.made(out)
+    folder = folders.ensure(out)
     starts = _starts(read)
     with temporary_folders.room() as room:
         platforms = PLATFORMS if all_platforms else ()

@@ -119,7 +119,7 @@ def sweep(
             except Unfinished as left:
                 advice = "with a folder `out` they are kept, and the same call does the rest"
                 raise Fault(f"interrupted: {left.done} of {left.of} runs; {advice}") from None
-    folder = folders.made(out)
+    folder = folders.ensure(out)
     found = Sweep(into(folder), keys, folder, ("table.csv",))
     if drawn := found.figure(metric):
         figure.save(drawn, folder / "sweep.png")

@@ -53,7 +53,7 @@ def info(
         if connection.initial:
             note = "once, at the start"
         elif age := ages.get(connection.name):
-            note = f"{age['least'] * 1e3:.3g} to {age['most'] * 1e3:.3g}"
+            note = f"{age['min'] * 1e3:.3g} to {age['max'] * 1e3:.3g}"
         else:
             note = "at the start only"
         say(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
@@ -72,7 +72,7 @@ def _workspace(scene: Any, start: list[float], out: Path | None) -> None:
     for line in workspace.lines(scene.device, start):
         say(f"  {line}")
     if out:
-        path = folders.made(out) / "workspace.png"
+        path = folders.ensure(out) / "workspace.png"
         title = f"Device and its workspace: {scene.title}"
         figure = workspace.draw(scene.device, start, title)
         figure.savefig(path, dpi=150, metadata={"Software": None})  # the same bytes every time

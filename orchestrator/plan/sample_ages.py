@@ -1,4 +1,4 @@
-"""How old samples are when they are used, read off a plan."""
+"""Ages of samples when they are used, and causality, derived from a plan."""
 
 from __future__ import annotations
 
@@ -16,31 +16,33 @@ from hapticlink.orchestrator.system.system import System
 
 @dataclass(frozen=True)
 class Delay:
-    """How old (s) the newest sample is that an input is made from when it is set."""
+    """Age (s) of the newest sample that an input is computed from, at the time when it is set."""
 
-    least: float
-    most: float
+    min: float
+    max: float
     mean: float
 
 
 def causal(ages: Mapping[str, Delay]) -> bool:
-    """Whether nobody reads a value stamped later than the start of its step."""
-    return all(age.least >= 0 for age in ages.values())
+    """Whether no FMU reads a sample that is stamped later than the start of its step."""
+    return all(age.min >= 0 for age in ages.values())
 
 
 class Ages:
-    """How old samples are when they are used, counted while a run goes on, until it comes round.
-    The hold of an input until its next set comes on top. The first event is left out: there
-    everything is of t = 0."""
+    """Collects the ages of samples event by event, until the pattern of events repeats.
+
+    An input is held until it is set again, which adds to the age. The first event is left out,
+    since all its samples are of t = 0.
+    """
 
     def __init__(self, plan: Plan) -> None:
         self._seconds = plan.system.timeline.seconds
         self._last = comes_round(plan.system)
-        self._found: dict[str, list[int]] = {}  # least, most, sum, number
+        self._found: dict[str, list[int]] = {}  # min, max, sum, number
         self._stamps = Stamps(plan, self._count)
 
     def event(self, tick: int, event: Event) -> bool:
-        """Go through an event; they come in time. Whether there is more to count."""
+        """Process an event, in the order of time; returns whether further events are needed."""
         if tick <= self._last:
             self._stamps.event(tick, event)
         return tick < self._last

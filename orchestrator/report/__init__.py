@@ -1,4 +1,5 @@
-"""The report's figures from runs of the FMUs, and a page that sets found beside stated."""
+"""Reproduces the report's figures from runs of the FMUs, and compares what the report states with
+what was found."""
 
 from __future__ import annotations
 
@@ -21,8 +22,9 @@ CHAPTERS = (chapter1, chapter3, chapter6, graphics_copy, section_b6)
 
 
 def reproduce(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Path:
-    """Write figures and README.md into `folder`; `tell` hears what is being made."""
-    folders.made(folder)
+    """Write figures and README.md to `folder`; `tell` is called with messages on the progress.
+    Returns the page's path; raises InputFault if `folder` cannot be written to."""
+    folders.ensure(folder)
     entries: list[Entry] = []
     with temporary_folders.room() as room:
         runs = Runs(room, tell)

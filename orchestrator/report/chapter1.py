@@ -27,7 +27,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
 
 
 def images(rule: str, poles: np.ndarray) -> np.ndarray:
-    """z of each pole s (with T = 1 s), by one step of the FMU from x = 1."""
+    """The discrete pole z of each pole s (T = 1 s), from one step of the FMU from x = 1."""
     settings = {"rule": rule}
     with temporary_folders.room() as room:
         path = build_block("discrete_equivalent", settings, room, stop_time=1.0, step_size=1.0)
@@ -94,8 +94,8 @@ def _figure_1_5(runs: Runs, folder: Path) -> Entry:
     axes[0].legend()
     axes[1].plot(time, energy - energy[0], color=draw.BLUE, label="energy of mass and spring")
     axes[1].plot(time, gained, "--", color=draw.ORANGE, label="1/2 K sum dx^2")
-    title = f"The hold makes {energy[-1] - energy[0]:.2g} J in {time[-1]:g} s"
-    axes[1].set(xlabel="time (s)", ylabel="energy gained (J)", title=title)
+    title = f"The hold generates {energy[-1] - energy[0]:.2g} J in {time[-1]:g} s"
+    axes[1].set(xlabel="time (s)", ylabel="energy generated (J)", title=title)
     axes[1].legend()
     error = np.abs(energy - energy[0] - gained).max() / gained[-1]
     return Entry(

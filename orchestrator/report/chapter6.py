@@ -134,14 +134,14 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
         ("Jacobi, B_pc,theta = 0.2", runs("closed-loop", *ON, jacobi, weaker), draw.GREEN),
     )
     figure, axes = draw.panels(2)
-    swing = []
+    jumps = []
     for label, results, colour in cases:
         time, gap = tracking(results)
         torque = results.haptics["controller.F_drift"][:, 2]
-        swing.append(float(np.abs(np.diff(torque)).max()))
+        jumps.append(float(np.abs(np.diff(torque)).max()))
         axes[0].semilogy(time, np.maximum(gap, 1e-3), color=colour, label=label)
         axes[1].semilogy(time[1:], np.maximum(np.abs(np.diff(torque)), 1e-7), color=colour)
-    title = "One sample of delay breaks the printed gains"
+    title = "One sample of delay destabilises the printed gains"
     axes[0].set(xlabel="time (s)", ylabel="distance |x_S - x_D| (mm)", title=title)
     axes[0].legend(fontsize="small")
     title = "The drift torque chatters from tick to tick"
@@ -151,10 +151,11 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
         "Order of calls: Jacobi against Gauss-Seidel",
         draw.save(figure, folder, "order_of_calls.png"),
         "not discussed; the report's loop has its own computing delay",
-        "plain Jacobi (get all, set all, step all) hands the controller's wrenches over one "
-        f"sample late. Then B_pc,theta is stable below about 1/(2 T lambda_max(Lambda^-1)), and "
-        f"the printed 0.375 is not with Table 6.1: the drift torque jumps by up to "
-        f"{swing[1]:.2g} N.m a tick ({swing[0]:.1e} under Gauss-Seidel, {swing[2]:.1e} with "
+        "plain Jacobi (get all, set all, step all) delays the controller's wrenches by one "
+        f"sample. The loop is then stable for B_pc,theta below about "
+        f"1/(2 T lambda_max(Lambda^-1)), which the printed 0.375 exceeds with Table 6.1: the drift "
+        f"torque jumps by up to "
+        f"{jumps[1]:.2g} N.m a tick ({jumps[0]:.1e} under Gauss-Seidel, {jumps[2]:.1e} with "
         f"0.2). Only the motors' torque limit of 0.5 N.m bounds it: with 500 N.m the run "
         f"diverges at {unlimited['time']:.2f} s",
         command("closed-loop", jacobi),

@@ -1,4 +1,4 @@
-"""The look that all figures of the report share."""
+"""Layout and colours that all figures of the report share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#777777"
 
 
 def panels(count: int, *, width: float = 4.6, height: float = 3.8, **options: Any) -> Any:
-    """(figure, axes) side by side."""
+    """A figure and its `count` axes side by side; `width` of each and `height` in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -22,6 +22,7 @@ def panels(count: int, *, width: float = 4.6, height: float = 3.8, **options: An
 
 
 def save(figure: Any, folder: Path, name: str) -> str:
+    """Write a figure as `name` in `folder`; returns the name."""
     # Without the software's version and date the same run gives the same bytes.
     figure.savefig(folder / name, dpi=130, metadata={"Software": None})
     return name

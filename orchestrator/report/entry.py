@@ -1,4 +1,4 @@
-"""What a chapter gives to the page, and the runs that chapters share."""
+"""An entry of the page, and the runs that its chapters share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from hapticlink.orchestrator.results.tables import Results
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure of the report: what the report states of it, and what was found."""
+    """A figure of the report: what the report states about it, what was found, and the command that
+    runs it."""
 
     title: str
     figure: str
@@ -24,7 +25,7 @@ class Entry:
 
 @dataclass
 class Runs:
-    """Runs by scene and options, each made once, in a folder that goes with them."""
+    """Runs by scene and options, each run only once, with results in the folder `room`."""
 
     room: Path
     tell: Callable[[str], None]
@@ -41,5 +42,5 @@ class Runs:
 
 
 def command(scene: str, *options: str) -> str:
-    """What a user types for that run."""
+    """The command line of a run."""
     return " ".join(["hapticlink run", scene, *(f"--set {o}" for o in options)])

@@ -1,4 +1,5 @@
-"""Section 4.2.2: the graphics copy pulled at the operational point, and one that cannot fold."""
+"""Section 4.2.2: the graphics copy pulled at its operational point, compared with the exact copy,
+which cannot fold."""
 
 from __future__ import annotations
 
@@ -33,7 +34,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
         title = f"bias = {bias}: folded in {count} of {of} frames"
         axis.set(xlabel="time (s)", ylabel="distance |x_S - x_D| (mm)", title=title)
     axes[0].legend(fontsize="small")
-    told = [
+    counts = [
         f"bias {bias}: {count} of {of} frames folded and {gap:.2g} mm pulled, "
         f"{found[bias, 'exact'][0]} folded and {found[bias, 'exact'][2]:.2g} mm exact"
         for (bias, label), (count, of, gap) in found.items()
@@ -43,8 +44,8 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
         "Section 4.2.2, synchronisation of the graphics block",
         draw.save(figure, folder, "graphics_copy.png"),
         "a PD controller on the operational point keeps the graphics copy with the mechanism",
-        "not its links 3 and 4, which the operational point does not see: the copy folds to the "
-        "other assembly and hands Lambda^-1 and the constrained directions of that to the device. "
-        f"{'; '.join(told)}. All other figures here are made with the exact copy",
+        "not for links 3 and 4, which the pose of the operational point does not determine: the "
+        "copy folds to the other assembly, and the device gets Lambda^-1 and the constrained "
+        f"directions of that one. {'; '.join(counts)}. All other figures use the exact copy",
         command("closed-loop", PULLED),
     )

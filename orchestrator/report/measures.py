@@ -1,4 +1,4 @@
-"""Numbers that the page gives of a haptic run."""
+"""Measures of a haptic run for the page."""
 
 from __future__ import annotations
 
@@ -10,19 +10,22 @@ from hapticlink.orchestrator.results.tables import Results, Vector
 
 
 def held(results: Results, signal: str) -> Vector:
-    """A graphics-rate signal at the haptic samples, zero-order held."""
+    """A graphics-rate signal at the haptic samples by a zero-order hold, (rows, ...)."""
     times = results.graphics["time"]
     frame = np.searchsorted(times, results.haptics["time"] + 1e-12, side="right") - 1
     return np.asarray(results.graphics[signal][frame])
 
 
 def rms(values: Vector) -> Vector:
+    """Root mean square over the rows."""
     return np.asarray(np.sqrt(np.mean(np.square(values), axis=0)))
 
 
 @dataclass(frozen=True)
 class Neglected:
-    """RMS of what (B.7) calls negligible: translation (m/s2), rotation (rad/s2), and F_drift."""
+    """Terms that (B.7) calls negligible, against those that it keeps: RMS of a_bias and of
+    Lambda^-1 (F_h + F_drift), translation (m/s2) and rotation (rad/s2); F_drift, RMS and largest,
+    and F_h (N)."""
 
     bias: tuple[float, float]
     rendered: tuple[float, float]
@@ -32,6 +35,7 @@ class Neglected:
 
 
 def neglected(results: Results) -> Neglected:
+    """The neglected terms of a run of the scene closed-loop."""
     haptics = results.haptics
     bias = haptics["virtual_mechanism.a_bias"]
     wrench = haptics["hand.F"]
@@ -52,7 +56,7 @@ def neglected(results: Results) -> Neglected:
 
 
 def episodes(time: Vector, count: Vector) -> list[tuple[float, float]]:
-    """(begin, end) in s of each stretch with two constrained directions."""
+    """Begin and end (s) of each interval with two or more constrained directions."""
     two = np.r_[False, count >= 2, False]
     edges = np.flatnonzero(np.diff(two.astype(int)))
     last = len(time) - 1
@@ -61,16 +65,19 @@ def episodes(time: Vector, count: Vector) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Count:
-    """How the frames' number of constrained directions agrees with the mechanism's own."""
+    """The number of constrained directions in the graphics frames against the mechanism's own:
+    frames, frames with another number, intervals with two directions, and those of them that no
+    frame shows."""
 
     frames: int
     wrong: int
     episodes: tuple[tuple[float, float], ...]
     unseen: int
-    fold: float  # rad, largest angle between links 3 and 4 while two directions are resisted
+    fold: float  # rad, largest angle between links 3 and 4 with two constrained directions
 
 
 def count(results: Results) -> Count:
+    """Compares the graphics frames of a run with its mechanism."""
     haptics, graphics = results.haptics, results.graphics
     own = haptics["virtual_mechanism.n_constraints"]
     seen = graphics["virtual_environment.n_constraints"]
@@ -84,12 +91,12 @@ def count(results: Results) -> Count:
 
 
 def folding(q4: Vector) -> Vector:
-    """Angle (rad) between links 3 and 4, 0 where they line up."""
+    """Angle (rad) between links 3 and 4, 0 where they are collinear."""
     return np.asarray(np.abs(np.arctan2(np.sin(2 * q4), np.cos(2 * q4))) / 2)
 
 
 def acceleration_error(results: Results) -> float:
-    """Device acceleration at t = 0 against Lambda^-1 F_h, relative."""
+    """Relative error of the device's acceleration at t = 0 against Lambda^-1 F_h."""
     haptics = results.haptics
     wrench = haptics["hand.F"][0]
     force = haptics["controller.F_motor"][0] + wrench - haptics["haptic_device.c"][0]

@@ -1,4 +1,4 @@
-"""Result files while they are written: rows of a rate, JSON that is whole or not there."""
+"""Writes result files: the rows of a clock as CSV, and JSON atomically."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from hapticlink.orchestrator.results.tables import Vector
 
 
 class Recorder:
-    """Rows of one CSV: `time` and the values of a view, as the shortest text that reads back
-    to the same float. A context manager. Each row is on its way to the disk when `row` returns, so
-    that a crash loses none; chunks would save no time, which goes into the digits. `last` is the
-    time of the last whole row, None before the first.
+    """Writes one CSV: `time` and the values of a view, as the shortest text that reads back to the
+    same float. A context manager.
 
-    The file is in its place from `publish` on, which `first` is to see to: it is called when the
-    first row is written."""
+    Each row has been passed to the operating system when `row` returns, so that a crash loses none;
+    buffering would save no time, which is spent on formatting. `last` is the time (s) of the last
+    complete row, None before the first. `first` is called after the first row and has to call
+    `publish`, which moves the file to its place.
+    """
 
     def __init__(
         self, path: Path, columns: Sequence[str], view: Vector, first: Callable[[], object]
@@ -38,6 +39,7 @@ class Recorder:
             raise
 
     def row(self, time: float) -> None:
+        """Write a row at `time` (s). Raises OSError, as on a full disk."""
         # pydantic's JSON writes floats ten times faster than repr, and round-trips too.
         text = to_json([time, *self._view.tolist()], inf_nan_mode="constants")
         self._write(text[1:-1] + b"\n")
@@ -46,20 +48,20 @@ class Recorder:
             self._first()
 
     def publish(self) -> None:
-        """Put the file in the place of an earlier one."""
+        """Replace the file of an earlier run by this one."""
         self._file.close()  # Windows moves no open file
         os.replace(self._unfinished, self.path)
         self._file = self.path.open("ab", buffering=0)
 
     def _write(self, text: bytes) -> None:
-        """All of `text`; or nothing, where the disk is full."""
+        """Write all of `text`; or nothing, raising OSError, where the disk is full."""
         whole = self._file.tell()
         try:
             left = memoryview(text)
             while left:
                 left = left[self._file.write(left) :]
         except OSError:
-            with suppress(OSError):  # what is no file, as /dev/full, has no length
+            with suppress(OSError):  # a device, such as /dev/full, has no length
                 self._file.truncate(whole)
             raise
 
@@ -72,19 +74,19 @@ class Recorder:
 
 
 def _quoted(name: str) -> str:
-    """Names of matrix entries hold a comma."""
+    """A column name in CSV: quoted where it contains a comma, as those of matrix entries."""
     return f'"{name}"' if "," in name else name
 
 
 def write_json(path: Path, content: Mapping[str, Any], room: int = 0) -> None:
-    """Write whole or not at all; `room` bytes of spaces after it are for `write_over`."""
+    """Write a JSON file atomically, padded by `room` spaces that `write_over` can use."""
     with atomic_file(path) as unfinished:
         unfinished.write_bytes(_text(content) + b" " * room)
 
 
 def write_over(path: Path, *contents: Mapping[str, Any]) -> None:
-    """Write the first of `contents` that fits over what is in the file, which asks no more room of
-    a full disk; nothing where none fits."""
+    """Overwrite the file with the first of `contents` that fits into its present size, which works
+    on a full disk, too; nothing if none fits."""
     with path.open("r+b", buffering=0) as file:
         room = os.fstat(file.fileno()).st_size
         fitting = (text for text in map(_text, contents) if len(text) <= room)

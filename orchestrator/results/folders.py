@@ -1,4 +1,4 @@
-"""The folder that a command writes to."""
+"""The output folder of a command."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.files import write_json
 
 
-def made(folder: Path | str) -> Path:
-    """The folder, made where there is none. Raises InputFault where it cannot be written to."""
+def ensure(folder: Path | str) -> Path:
+    """The folder, created if it does not exist. Raises InputFault if it cannot be created or
+    written to."""
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         why = "is a file"
     except OSError as error:
-        why = f"cannot be made ({error.strerror})"
+        why = f"cannot be created ({error.strerror})"
     else:
         if os.access(folder, os.W_OK | os.X_OK):
             return folder
@@ -29,7 +30,7 @@ def made(folder: Path | str) -> Path:
 
 
 def add(folder: Path, names: Iterable[str]) -> dict[str, Any]:
-    """List more files of a run in its run.json, and give that."""
+    """Adds files of a run to the list in its run.json; returns the new content."""
     run: dict[str, Any] = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     run["files"] = list(dict.fromkeys([*run["files"], *names]))
     write_json(folder / "run.json", run)

@@ -1,5 +1,5 @@
-"""The folder of a run while it goes on. Rows of an earlier run go when the first ones of this run
-are on the disk, not before."""
+"""The result folder during a run. Results of an earlier run are kept until the first rows of this
+one are on the disk."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ from hapticlink.orchestrator.results.files import Recorder, write_json, write_ov
 from hapticlink.orchestrator.results.tables import Vector
 
 ROOM = 1 << 14
-"""Bytes that run.json keeps for its end, so that a disk which fills up meanwhile has them."""
+"""Bytes reserved in run.json for how the run ends, in case the disk is full by then."""
 RUN = "run.json"
 
 
 class RunFolder:
-    """`story` is what run.json says from the first row on; without it there is no run.json.
+    """The folder of a run. `story` is the content of run.json from the first row on; without it no
+    run.json is written.
 
-    A context manager, out of which no run goes untold: not by a second signal, which ends the
-    process at once, and by no error. `published`: the results there are this run's.
+    A context manager that records how the run ended in run.json even when an exception or a second
+    signal, which ends the process at once, breaks it off. `published`: the folder has the results
+    of this run.
     """
 
     def __init__(self, folder: Path, story: dict[str, Any] | None = None) -> None:
@@ -46,7 +48,7 @@ class RunFolder:
                 self._broken_off("fault", error)
 
     def recorder(self, clock: str, columns: Sequence[str], view: Vector) -> Recorder:
-        """The rows of a clock. All are made before the first row of one."""
+        """The recorder of a clock. All recorders have to be created before the first row."""
         path = self.folder / f"{clock}.csv"
         self._recorders.append(Recorder(path, columns, view, self._publish))
         return self._recorders[-1]
@@ -57,7 +59,8 @@ class RunFolder:
         return self._recorders[0].last or 0.0 if self._recorders else 0.0
 
     def _publish(self) -> None:
-        """A recorder has its first row: with the last of them, files take their places."""
+        """Called by each recorder after its first row; once all have one, replaces the results of
+        an earlier run."""
         if any(recorder.last is None for recorder in self._recorders):
             return
         earlier = _listed(self.folder)
@@ -71,8 +74,9 @@ class RunFolder:
         self.published = True
 
     def end(self, ending: dict[str, Any], columns: Mapping[str, Sequence[str]]) -> None:
-        """run.json tells how the run ended; one without rows, with tables of these `columns` by
-        clock, only where no other has rows. Raises OSError where the disk is too full for that."""
+        """Record how the run ended in run.json. A run without rows, for which empty tables with
+        these `columns` by clock are written, does so only if no earlier run has rows there. Raises
+        OSError if the disk is full."""
         if not self.published and not _has_rows(self.folder):
             for clock, names in columns.items():
                 with self.recorder(clock, names, np.zeros(0)) as empty:
@@ -82,29 +86,29 @@ class RunFolder:
             write_json(self.folder / RUN, self._story | ending)
 
     def end_in_place(self, ending: dict[str, Any]) -> None:
-        """The same on a full disk, in the room that was kept: all, or how it ended, or nothing
-        where the disk does not write in place."""
+        """As `end`, on a full disk, in the bytes reserved: everything, or only how the run ended,
+        or nothing if the disk cannot write in place."""
         if self.published and self._story is not None:
             least = {key: ending[key] for key in ("end", "fault")}
             with suppress(OSError):
                 write_over(self.folder / RUN, self._story | ending, self._story | least)
 
     def _interrupted(self) -> None:
-        for left in self.folder.glob(".run.*.json"):  # what was being written
+        for left in self.folder.glob(".run.*.json"):  # unfinished files
             left.unlink()
         self._broken_off("interrupted", Interrupted(self.last))
         for recorder in self._recorders:
             recorder.__exit__()
 
     def _broken_off(self, reason: str, error: BaseException) -> None:
-        told = {"kind": type(error).__name__, "time": self.last, "message": str(error)}
-        ending = {"end": {"reason": reason, "time": self.last}, "fault": told}
+        fault = {"kind": type(error).__name__, "time": self.last, "message": str(error)}
+        ending = {"end": {"reason": reason, "time": self.last}, "fault": fault}
         if self.published and self._story is not None:
             write_json(self.folder / RUN, self._story | ending)
 
 
 def _has_rows(folder: Path) -> bool:
-    """Whether an earlier run in `folder` has a row: a line after a table's first."""
+    """Whether an earlier run in `folder` has a row, a line after the header of a table."""
     for name in _listed(folder):
         if name.endswith(".csv"):
             with suppress(OSError), (folder / name).open("rb") as file:
@@ -114,7 +118,7 @@ def _has_rows(folder: Path) -> bool:
 
 
 def _listed(folder: Path) -> set[str]:
-    """The files that the run.json of an earlier run in `folder` lists, but for those elsewhere."""
+    """The files that the run.json of an earlier run lists, without paths outside of `folder`."""
     try:
         names = json.loads((folder / RUN).read_text(encoding="utf-8")).get("files", ())
         return {n for n in names if isinstance(n, str) and n != ".." and Path(n).name == n}

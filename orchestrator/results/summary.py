@@ -1,4 +1,4 @@
-"""What a run tells in the terminal: how it ended, and where it is not what was asked for."""
+"""The summary of a run in the terminal: how it ended, and warnings."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from hapticlink.orchestrator.results.tracking import DEVICE, folded, table_of
 
 
 def ending(results: Results) -> str:
-    """How a run ended, and when: `done at 3 s`."""
+    """How and when a run ended: `done at 3 s`."""
     run, end = results.run, results.run["end"]
     if "time" not in end:
-        return "it has not ended: it still runs, or its process was killed"
+        return "not ended: it is still running, or its process was killed"
     how = {
         "stop_when": f"ended by {run['stop_when']}",
         "terminated": f"ended: {end.get('asked')},",
@@ -26,7 +26,8 @@ def ending(results: Results) -> str:
 
 
 def lines(results: Results) -> Iterator[str]:
-    """A line for each kind of thing in run.json, and for each joint whose start was moved far."""
+    """One line for each warning: start poses, folded copy, held outputs, repeated steps,
+    convergence, lost samples, stability, and holds that did not fit."""
     run = results.run
     yield from _start(results)
     off, frames = folded(results)
@@ -39,13 +40,13 @@ def lines(results: Results) -> Iterator[str]:
     for fmu, count in run["held_outputs"].items():
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
     for fmu, count in run["smaller_steps"].items():
-        yield f"{fmu}: {count} steps were discarded and taken again in smaller ones"
+        yield f"{fmu}: {count} steps were discarded and repeated with smaller ones"
     if (found := run["iterations"]) and found["unconverged"]:
         yield f"{found['unconverged']} of {found['steps']} iterated steps did not converge"
     for clock, steps in run["controlled_steps"].items():
         if steps["forced"]:
-            few = f"{steps['forced']} of {steps['taken']} steps were taken at the least size"
-            yield f"{clock}: {few} though their error was too large"
+            few = f"{steps['forced']} of {steps['taken']} steps were accepted at the smallest size"
+            yield f"{clock}: {few} although their error was too large"
     for name, link in run["links"].items():
         if link["lost"] or link["overtaken"]:
             lost = f"{link['lost']} of {link['sent']} samples were lost"
@@ -54,9 +55,9 @@ def lines(results: Results) -> Iterator[str]:
         yield f"{why}: the loop is not passive"
     refused = sorted(run["holds_that_did_not_fit"].items(), key=lambda item: item[1]["hold"])
     for hold, group in groupby(refused, key=lambda item: item[1]["hold"]):
-        gave_way = [f"{name} ({why['reason']})" for name, why in group]
-        more = f" and {len(gave_way) - 1} more" if len(gave_way) > 1 else ""
-        yield f"hold {hold} does not fit {gave_way[0]}{more}: zoh there"
+        misfits = [f"{name} ({why['reason']})" for name, why in group]
+        more = f" and {len(misfits) - 1} more" if len(misfits) > 1 else ""
+        yield f"hold {hold} does not fit {misfits[0]}{more}: zoh there"
 
 
 def replaced(found: Mapping[str, Any]) -> Iterator[str]:
@@ -79,18 +80,19 @@ def _start(results: Results) -> Iterator[str]:
 
 
 def outside(pose: Sequence[float], margin: float) -> str:
-    """That a pose is beyond the stops of the device, where `margin` (m) is negative."""
-    told = ", ".join(f"{value:.4g}" for value in pose)
+    """The message for a start pose (m, m, rad) outside the device's workspace, by -`margin` (m)."""
+    numbers = ", ".join(f"{value:.4g}" for value in pose)
     return (
-        f"the start pose (x m, y m, theta rad) = ({told}) is outside the device's workspace by "
+        f"the start pose (x m, y m, theta rad) = ({numbers}) is outside the device's workspace by "
         f"{-margin:.3g} m (move linkage.operational_point or linkage.start, or change [device])"
     )
 
 
 def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
-    """A line where the start of joints in [linkage] is far from the assembled q."""
+    """A line if assembly moved joints far from their start in [linkage]; q are the assembled joint
+    coordinates."""
     if far := list(_far(linkage, q)):
-        yield f"the loops do not close at the start given; assembly moved {', '.join(far)}"
+        yield f"the loops do not close at the given start; assembly moved {', '.join(far)}"
 
 
 def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
@@ -102,12 +104,12 @@ def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
             continue
         given = np.atleast_1d(linkage["start"][joint["name"]]).tolist()
         for start, value, unit in zip(given, found, units, strict=True):
-            if abs(value - start) > TOLD[unit]:
+            if abs(value - start) > REPORTED[unit]:
                 yield f"{joint['name']} from {start:.6g} to {value:.6g} {unit}"
 
 
-TOLD = {"rad": 0.1, "m": 0.01}
-"""From here on a move is told."""
+REPORTED = {"rad": 0.1, "m": 0.01}
+"""Moves of a joint by more than this are reported."""
 
 
 _UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}

@@ -1,4 +1,4 @@
-"""Results on disk: one CSV per rate, streamed, and `run.json`; and reading them back."""
+"""Reads results back: one CSV per rate, and `run.json`."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ Vector = NDArray[np.float64]
 @dataclass(frozen=True, repr=False, eq=False)
 class Table(Mapping[str, Vector]):
     """The samples of one rate by name: `table["device.x"]` stacks the columns `device.x[1]`,
-    `device.x[2]`, ... into (rows, n), those of a matrix into (rows, n, m); the whole name of a
-    column gives it alone, (rows,). `others` are the tables of the same run.
+    `device.x[2]`, ... into (rows, n), those of a matrix into (rows, n, m); the full name of a
+    column gives that column, (rows,). Raises KeyError for an unknown name. `others` are the tables
+    of the same run, for that message.
     """
 
     columns: tuple[str, ...]
@@ -61,8 +62,8 @@ class Table(Mapping[str, Vector]):
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """A run read back: `run` is run.json, `tables` the CSVs by rate. Without a folder where it was
-    run in memory."""
+    """The results of a run: `run` is run.json, `tables` the CSVs by rate; `folder` is None if it
+    was run in memory."""
 
     folder: Path | None
     run: dict[str, Any]
@@ -85,7 +86,7 @@ def size(folder: Path, run: Mapping[str, Any]) -> int:
 
 
 def load(folder: Path | str) -> Results:
-    """Read a run's folder. Raises InputFault where it holds no run."""
+    """Reads a run's folder. Raises InputFault if it contains no run."""
     folder = Path(folder)
     tables: dict[str, Table] = {}
     try:
@@ -99,7 +100,7 @@ def load(folder: Path | str) -> Results:
 
 
 def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
-    """One CSV of a run, whose other tables are `others`."""
+    """Reads one CSV of a run; `others` are the run's other tables."""
     import csv
 
     with path.open(encoding="utf-8", newline="") as file:

@@ -1,5 +1,5 @@
-"""How the parts of a run follow each other: the tracking error x_S - x_D between operational point
-and handle, and the frames in which the graphics copy is folded."""
+"""Tracking error x_S - x_D between operational point and handle, and the frames in which the
+graphics copy is folded."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ class Tracking(NamedTuple):
 
 
 def table_of(results: Results, signal: str) -> Table | None:
-    """The table that holds `signal`, whose rate depends on the scene."""
+    """The table that contains `signal`, whose rate depends on the scene; None if there is none."""
     return next((t for t in results.tables.values() if signal in t), None)
 
 
 def has_tracking(results: Results) -> bool:
+    """Whether a run has both an operational point and a handle."""
     return all(table_of(results, signal) for signal in (MECHANISM, DEVICE))
 
 
 def pose_error(results: Results) -> Tracking:
-    """At the mechanism's samples up to the device's last; the device, which has a clock of its own
-    in some scenes, linear between its own. Raises KeyError where there is no such signal."""
+    """Tracking error at the mechanism's samples up to the device's last one; the handle's pose is
+    interpolated linearly where its clock differs. Raises KeyError without these signals."""
     mechanism, device = table_of(results, MECHANISM), table_of(results, DEVICE)
     if mechanism is None or device is None:
         raise KeyError(f"tracking needs the signals {MECHANISM} and {DEVICE}")
@@ -48,14 +49,15 @@ def pose_error(results: Results) -> Tracking:
 
 
 def tracking(results: Results) -> tuple[Vector, Vector]:
-    """(time s, |x_S - x_D| mm, rotation apart)."""
+    """Times (s) and distances |x_S - x_D| in the plane (mm). Raises KeyError without these
+    signals."""
     time, distance, _ = pose_error(results)
     return time, distance
 
 
 def folded(results: Results) -> tuple[int, int]:
-    """(frames in which the graphics copy is on another assembly of its loops than the mechanism,
-    all frames); (0, 0) where no copy tells."""
+    """Number of frames in which the graphics copy is on another assembly of its loops than the
+    mechanism, and number of all frames; (0, 0) if the run has no such output."""
     table = table_of(results, BRANCH)
     if table is None:
         return 0, 0

@@ -1,4 +1,4 @@
-"""The workspace of a scene's device: where it lies, in words and as a drawing."""
+"""The workspace of a scene's device, as text and as a drawing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Pose = Sequence[float]
 
 
 def lines(device: Device, start: Pose) -> Iterator[str]:
-    """Where the handle can be, and whether it can be where a scene starts."""
+    """The extent of the workspace, and whether the start pose of a scene is inside it."""
     space = workspace(device)
     for which, field in (("some", space.some), ("every", space.every)):
         extent = space.extent(field)
@@ -45,7 +45,7 @@ def _range(of: Range) -> str:
 
 
 def draw(device: Device, start: Pose, title: str) -> Figure:
-    """The device at the pose `start`, and where its handle can be."""
+    """A drawing of the device at the pose `start`, and of its workspace."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch

@@ -24,26 +24,26 @@ from hapticlink.orchestrator.system.system import Connection, System
 
 @dataclass
 class Iterations:
-    """What a run's loops did: steps that were iterated, times that their plants stepped in all,
-    rollbacks, the most iterations of a step, Jacobians made by differences and taken from the FMUs,
-    steps that did not converge."""
+    """Counts of a run's fixed-point iterations: steps that were iterated, iterations and rollbacks
+    in all, the most iterations of a step, Jacobians evaluated by differences and by directional
+    derivatives, and steps that did not converge."""
 
     steps: int = 0
     iterations: int = 0
     rollbacks: int = 0
-    most: int = 0
+    max_iterations: int = 0
     jacobians: int = 0
-    told_jacobians: int = 0
+    directional_jacobians: int = 0
     unconverged: int = 0
 
 
 def total(counts: Iterable[Iterations]) -> Iterations | None:
-    """Of all loops of a run; None where it has none."""
+    """The counts of all loops of a run together; None where it has none."""
     found = None
     for c in counts:
         found = found or Iterations()
         for name, value in vars(c).items():
-            merged = max if name == "most" else operator.add
+            merged = max if name == "max_iterations" else operator.add
             setattr(found, name, merged(getattr(found, name), value))
     return found
 
@@ -88,7 +88,7 @@ class FixedPoint:
         self._ways: list[Through] | None = None
         if isinstance(self._solver, Newton) and all(_constant(c, system) for c in connections):
             ways = jacobians.ways(system, signals, simulation.instances, connections, self._places)
-            self._ways, self._solver.given = ways, self._jacobian
+            self._ways, self._solver.supplied = ways, self._jacobian
 
     def __call__(self, tick: int) -> None:
         values, places, counts = self._signals.values, self._places, self.counts
@@ -101,7 +101,7 @@ class FixedPoint:
                 counts.rollbacks += 1
                 for call in self._again:
                     call(tick)
-                self._meters.back(mark)
+                self._meters.rollback(mark)
             began = True
             values[places] = point
             for calls in (self._guess, self._body):
@@ -111,38 +111,38 @@ class FixedPoint:
 
         for hold, sources in self._held:
             values[sources] = hold.value(tick, self._dticks)[: len(sources)]
-        mark = self._meters.mark()
+        mark = self._meters.checkpoint()
         before = counts.rollbacks
         settings = self._settings
         start = values[places]
         found = self._solver.solve(residual, start, settings.tolerance, settings.most)
         counts.steps += 1
         counts.iterations += 1 + counts.rollbacks - before
-        counts.most = max(counts.most, found.iterations)
+        counts.max_iterations = max(counts.max_iterations, found.iterations)
         if isinstance(self._solver, Newton):
             counts.jacobians += self._solver.jacobians
-            counts.told_jacobians += self._solver.told
-            self._solver.jacobians = self._solver.told = 0
+            counts.directional_jacobians += self._solver.supplied_jacobians
+            self._solver.jacobians = self._solver.supplied_jacobians = 0
         if not found.error <= settings.tolerance:
             self._unconverged(found, tick)
 
     def _jacobian(self) -> Matrix | None:
-        """Of the residual, by the FMUs' derivatives of a step by inputs held over it; what a guess
-        makes of these the holds show, which are linear in it."""
+        """Jacobian of the residual: the FMUs' directional derivatives of a step with respect to its
+        held inputs, times the derivatives of these by the guess, in which the holds are linear."""
         if self._ways is None:
             return None
         values, places = self._signals.values, self._places
         kept = values.copy()
-        shown = []
+        responses = []
         for moved in (None, *places):
             values[:] = kept
             if moved is not None:
                 values[moved] += 1.0
             for call in (*self._guess, *self._ask):
                 call(self._tick)
-            shown.append(values.copy())
+            responses.append(values.copy())
         values[:] = kept
-        tangent = np.stack(shown[1:], axis=1) - shown[0][:, None]
+        tangent = np.stack(responses[1:], axis=1) - responses[0][:, None]
         found = np.zeros((len(values), len(places)))
         for way in self._ways:
             through = way.of(tangent)
@@ -169,8 +169,8 @@ class FixedPoint:
 
 
 def _constant(c: Connection, system: System) -> bool:
-    """Whether the target takes one constant over its step, in proportion to the guess, and its
-    outputs are those of the step."""
+    """Whether the target's input is constant over its step and linear in the guess, and its outputs
+    are those after the step."""
     return (
         system.substeps.get(c.target, 1) == 1
         and held_polynomials.order(system, c) == 0
@@ -181,8 +181,8 @@ def _constant(c: Connection, system: System) -> bool:
 
 
 def _read(c: Connection, system: System, signals: SignalVector) -> list[int]:
-    """What the target of `c` is made from: the source's outputs, and where its hold wants them
-    their derivatives."""
+    """Indices of the signals that the input of `c` depends on: the source's outputs, and their
+    derivatives where its hold needs them."""
     places = signals.sources(c)
     if c.hold and HOLDS[c.hold].needs == "derivative" and (slope := derivative(c, system.fmu)):
         places = places + [signals.scalar(c.source, s.name) for s in slope]

@@ -1,8 +1,8 @@
-"""Consistent start values: inputs set and outputs read in initialisation mode until they agree.
+"""Consistent start values: inputs are set and outputs read in initialisation mode until they agree.
 
-Sweeps over all FMUs settle every chain and the feed-through loops that contract; what they do not
-settle is solved by Newton, with the values that still change as unknowns, on the directional
-derivatives of the FMUs where all give them.
+Sweeps over all FMUs converge for chains of feed-through and for contracting algebraic loops. What
+they leave is solved by Newton's method, with the values that still change as unknowns, and with the
+FMUs' directional derivatives where all of them give these.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _solve(
     first: Vector,
     sweep: Callable[[], None],
 ) -> None:
-    """Newton on the outputs that have not settled, from their first values."""
+    """Solve by Newton's method for the outputs that did not converge, from their first values."""
     values = signals.values
     sources = {p for c in system.connections for p in signals.sources(c)}
     places = sorted(p for p in sources if not settled[p])
@@ -88,7 +88,7 @@ def _solve(
         return values[places] - point
 
     newton = Newton()
-    newton.given = _jacobian(system, instances, signals, places)
+    newton.supplied = _jacobian(system, instances, signals, places)
     found = newton.solve(residual, first[places], TOLERANCE, SWEEPS)
     if not found.error <= TOLERANCE:
         agree = np.ones(len(values), bool)
@@ -101,8 +101,9 @@ def _solve(
 def _jacobian(
     system: System, instances: Mapping[str, Instance], signals: SignalVector, places: list[int]
 ) -> Callable[[], Matrix | None]:
-    """The Jacobian of a sweep's residual by the FMUs' directional derivatives, where all on the way
-    give them: the unit changes of the places, carried from FMU to FMU as the sweep goes."""
+    """A function for the Jacobian of a sweep's residual: unit changes of the signals at `places`
+    are propagated from FMU to FMU by directional derivatives. It returns None where an FMU gives
+    none."""
     moved = [c for c in system.connections if {*places} & {*signals.sources(c)}]
     found = jacobians.ways(system, signals, instances, moved, places)
     held = [(signals.hold(c.name), signals.sources(c)) for c in moved if c.hold]
@@ -131,9 +132,9 @@ def _raise_unsettled(
         span = signals.fmu(fmu.name)
         for i, scalar in enumerate(fmu.description.outputs, start=span.start):
             if not agree[i]:
-                what = f"output {scalar.name} does not settle in initialisation, nor by Newton"
-                values = f"{before[i]!s} on its way round gives {signals.values[i]!s}"
-                remedy = "its feed-through loop has no start values: take a connection out of it"
+                what = f"output {scalar.name} does not converge in initialisation, nor by Newton"
+                values = f"{before[i]!s} around its algebraic loop gives {signals.values[i]!s}"
+                remedy = "the loop has no consistent start values: take a connection out of it"
                 said = f"{what}: {values}; {remedy}"
                 raise FmuFault(fmu.name, said, 0.0, repeatable=True)
 
@@ -142,9 +143,9 @@ DEVICE = "haptic_device"
 
 
 def require_finite(instances: Mapping[str, Instance]) -> None:
-    """Raises FmuFault: of the device where its arms do not reach the handle's start pose (its
-    angles are NaN there, and all that is computed from them), else of the first output that is not
-    finite."""
+    """Raises FmuFault if an output is not finite. If the device's arms do not reach the start pose,
+    which makes its angles and all that depends on them NaN, the fault says so instead of naming the
+    first such output."""
     device = instances.get(DEVICE)
     if device is not None and not np.isfinite(device.outputs).all():
         names = (s.name for s in device.description.outputs)

@@ -27,11 +27,12 @@ class Found(NamedTuple):
 
 class Solver(Protocol):
     def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Found:
-        """From `start`, until error <= tolerance or `most` points were tried; the last value of r
-        asked for is that of the point found."""
+        """Iterate from `start` until error <= tolerance or `most` points were tried. The last
+        evaluation of r is at the point that is returned."""
 
 
 def error(residual: Vector, point: Vector) -> float:
+    """The largest |r_i| / (1 + |w_i|); infinite where it is not finite."""
     found = np.max(np.abs(residual) / (1.0 + np.abs(point)), initial=0.0)
     return float(found) if np.isfinite(found) else np.inf
 
@@ -63,21 +64,21 @@ class Aitken:
 
 
 class Newton:
-    """w <- w - J^-1 r; J by differences, one value of r a column, kept and brought up to date by
-    Broyden's rank-one change, and made anew where a step does not halve the error.
+    """w <- w - J^-1 r, with J by finite differences (one evaluation of r per column), updated by
+    Broyden's rank-one formula and evaluated anew where a step does not halve the error.
 
-    `given` may tell J at the point tried last, or None; what it tells is held to the same test, and
-    differences take its place. `jacobians` counts how often J was made by differences, `told` how
-    often it was given.
+    `supplied` may return J at the last point, or None; a supplied J that does not halve the error
+    is replaced by differences. `jacobians` counts evaluations of J by differences,
+    `supplied_jacobians` those by `supplied`.
     """
 
     STEP = 1e-6
-    """Of 1 + |w|, in a difference."""
+    """Increment of a finite difference, relative to 1 + |w|."""
 
     def __init__(self) -> None:
         self._jacobian: Matrix | None = None
-        self.given: Callable[[], Matrix | None] = lambda: None
-        self.jacobians = self.told = 0
+        self.supplied: Callable[[], Matrix | None] = lambda: None
+        self.jacobians = self.supplied_jacobians = 0
 
     def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Found:
         w, r = start, residual(start)
@@ -87,12 +88,12 @@ class Newton:
             if found.error <= tolerance or iteration == most or np.isinf(found.error):
                 break
             if self._jacobian is None:
-                self._jacobian = None if doubted else self.given()
+                self._jacobian = None if doubted else self.supplied()
                 fresh, doubted = self._jacobian is None, self._jacobian is not None
                 if self._jacobian is None:
                     self._jacobian = self._differences(residual, w, r)
                 else:
-                    self.told += 1
+                    self.supplied_jacobians += 1
             step = -np.linalg.lstsq(self._jacobian, r, rcond=None)[0]
             before, w = r, w + step
             r = residual(w)

@@ -135,10 +135,10 @@ class Advancer:
     def _save(self) -> Any:
         for instance in self._instances:
             instance.save(SLOT)
-        # What never changes of a hold, where it stands and how ticks are told, are functions: not
-        # copied. A spring's account is shared, and goes back in its place.
+        # deepcopy leaves functions as they are, so a hold's constant context is not copied. An
+        # energy tank is shared between holds and is restored as one of `_holds`.
         holds = [deepcopy(vars(hold)) for hold in self._holds]
-        return self._values.copy(), holds, self._meters.mark(deep=True)
+        return self._values.copy(), holds, self._meters.checkpoint(deep=True)
 
     def _restore(self, saved: Any) -> None:
         values, holds, mark = saved
@@ -147,7 +147,7 @@ class Advancer:
         self._values[:] = values
         for hold, kept in zip(self._holds, holds, strict=True):
             vars(hold).update(deepcopy(kept))
-        self._meters.back(mark)
+        self._meters.rollback(mark)
 
     # --- ecco -----------------------------------------------------------------------------
 

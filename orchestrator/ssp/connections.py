@@ -1,9 +1,9 @@
-"""Connections through the borders of systems, resolved to connections from FMU to FMU.
+"""Resolves connections through the connectors of nested systems to connections from FMU to FMU.
 
-A connector of a system passes on what it gets, so an input of an FMU has one chain of connections
-behind it, y_0 -> y_1 -> ... -> y_k, each with y_i = a_i C_i(y_{i-1}) + b_i, where C_i converts the
-units (SSP 1.0, section 5.4.2). The chain is one linear function of y_0. A connector that declares
-no unit has that of the connectors inside its system.
+A connector of a system passes its value on, so an input of an FMU is fed by a chain of connections,
+y_0 -> y_1 -> ... -> y_k, each with y_i = a_i C_i(y_{i-1}) + b_i, where C_i converts the units
+(SSP 1.0, section 5.4.2). The chain is one linear function of y_0. A connector without a unit has
+that of the connectors inside its system.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from hapticlink.orchestrator.ssp.tree import Line, Node, Part, Place, dotted
 
 TAKES = ("input", "parameter")
 Row = tuple[Node, Node, dict[str, Any]]
-"""From an output to an input, and the keys of the [[connection]] that say what is done between."""
+"""An output, the input that it feeds, and the keys of [[connection]] for what is done between."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """A variable that a value at a connector of a system, in `unit`, comes to as `linear` of it."""
+    """A variable of an FMU that a connector of a system feeds: it gets `linear` of the connector's
+    value in `unit`."""
 
     component: Place
     variable: str
@@ -37,11 +38,12 @@ class Reach:
 
 @dataclass
 class Wires:
-    """The connections of `root`. Raises InputFault for what joins no output to an input.
+    """The connections of `root`. Raises InputFault for connections that do not join an output to an
+    input, for inputs that are fed twice, and for circles without an FMU.
 
-    rows: from FMU to FMU, by their inputs in the order of the file, inner systems first. reach: by
-    a connector of a system, what it feeds; one that nothing feeds, as an input of the root, has
-    no row. variables: of all FMUs.
+    rows: connections from FMU to FMU, in the order of the file, inner systems first. reach: for
+    each connector of a system, the variables that it feeds; chains that begin at a connector, such
+    as an input of the root system, have no row. variables: those of all FMUs.
     """
 
     path: Path
@@ -72,27 +74,27 @@ class Wires:
                 self._follow(sink, fed)
 
     def _directed(self, system: Part, line: Line) -> tuple[Node, Node]:
-        """(the end that gives, the end that takes), as seen inside `system`."""
-        first, second = (self._gives(end, system.place) for end in line.ends)
+        """The ends of a connection as (source, target), seen from inside `system`."""
+        first, second = (self._is_source(end, system.place) for end in line.ends)
         if first == second:
-            what = "give" if first else "take"
+            what = "outputs" if first else "inputs"
             names = " and ".join(dotted(*end) for end in line.ends)
-            raise InputFault(f"{self.path}: {names} are connected, and both {what} a value")
+            raise InputFault(f"{self.path}: {names} are connected, and both are {what}")
         return line.ends if first else (line.ends[1], line.ends[0])
 
-    def _gives(self, node: Node, inside: Place) -> bool:
+    def _is_source(self, node: Node, inside: Place) -> bool:
         place, _ = node
         variable = self.variables.get(node)
         if variable and variable.type != "String":
             return variable.causality not in TAKES
         if place in self._systems and (connector := self._connectors.get(node)):
-            # A system's own input gives to what is inside it.
+            # Seen from inside, a system's own input is a source.
             return (connector.kind in TAKES) == (place == inside)
-        why = "is text, which is set at the start only" if variable else "is not there"
+        why = "is a String, set at the start only" if variable else "does not exist"
         raise InputFault(f"{self.path}: a connection names {dotted(*node)}, which {why}")
 
     def _follow(self, sink: Node, fed: Mapping[Node, tuple[Node, Line]]) -> None:
-        """Books the chain that ends at an FMU's input."""
+        """Adds the chain that ends at an FMU's input to `rows` and `reach`."""
         nodes: list[Node] = [sink]
         lines: list[Line] = []
         while nodes[0] in fed:
@@ -130,13 +132,13 @@ class Wires:
         except ValueError as error:
             names = f"{dotted(*a)} and {dotted(*b)}"
             raise InputFault(
-                f"{self.path}: the units of {names} do not fit: {error}; connect signals of one "
-                "kind, or say suppressUnitConversion"
+                f"{self.path}: the units of {names} do not fit: {error}; connect quantities of one "
+                "dimension, or set suppressUnitConversion"
             ) from None
 
     def _units_along(self, nodes: list[Node]) -> list[Unit | None]:
-        """Units along a chain; where a system's connector declares none, an output has that of its
-        source and an input that of what it feeds."""
+        """The unit of each node of a chain. A system's connector without a unit takes that of its
+        source if it is an output, and that of its target if it is an input."""
         units = [self.unit(n) for n in nodes]
         takes = [n[0] in self._systems and self._connectors[n].kind in TAKES for n in nodes]
         for i, node in enumerate(nodes):
@@ -148,7 +150,7 @@ class Wires:
         return units
 
     def unit(self, node: Node) -> Unit | None:
-        """The FMU's own unit goes before that of its connector."""
+        """The unit of a node: the FMU's own, or else that of its connector."""
         variable, connector = self.variables.get(node), self._connectors.get(node)
         if variable and variable.unit is not None:
             return self.described[node[0]].unit(variable)

@@ -1,5 +1,5 @@
-"""The words of an SSP 1.0 (System Structure and Parameterization): names, and what of a scene
-stands in the annotation, because the standard has no rates and no holds."""
+"""Names of SSP 1.0 (System Structure and Parameterization), and the keys of a scene that are kept
+in an annotation, because the standard has no rates and no holds."""
 
 from __future__ import annotations
 
@@ -19,18 +19,20 @@ NOT_IN_ANNOTATION = frozenset(
         "packaging",
     )
 )
-"""Keys of a scene that its FMUs and the structure itself say; graphics keeps its rate."""
+"""Keys of a scene that are contained in its FMUs and the structure; of graphics, the rate is in the
+annotation."""
 
 
 SCALAR = {"Boolean": "Boolean", "String": "String", "Real": "Real"}
 
 
 def is_fixed(names: tuple[str, ...]) -> bool:
-    """Whether the key of these names made the FMUs, which an option comes too late to change."""
+    """Whether a key determines the FMUs, which are built already, so that no option can change
+    it."""
     if names[0] == "graphics":
         return len(names) > 1 and names[1] not in ("rate", "align", "phase")
-    made = NOT_IN_ANNOTATION - {"fmu", "connection"} | {"hands", "local_model"}
-    return names[0] in made
+    built_in = NOT_IN_ANNOTATION - {"fmu", "connection"} | {"hands", "local_model"}
+    return names[0] in built_in
 
 
 def type_of(fmi_type: str) -> str:

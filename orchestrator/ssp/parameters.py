@@ -1,10 +1,10 @@
 """Parameter values of an SSP as start values of its FMUs (SSP 1.0, sections 5.3.3, 6 and 7).
 
-A binding applies a set of values to an element: by the names in the set behind its `prefix`, or,
-where it has a mapping, by the names that the mapping gives them. In a system, `connector` is its
-own connector and `element.name` what `name` is in that element. Later bindings go before earlier
-ones, those of a system before those of its parts. A value in a unit is converted to that of its
-target, and transformed after that.
+A binding applies a parameter set to an element, by the names in the set with its `prefix`, or by
+the names of its mapping if it has one. In a system, `connector` is its own connector, and
+`element.name` is `name` in that element. Later bindings take precedence over earlier ones, those of
+a system over those of its parts. A value is converted to the unit of its target and then
+transformed.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ SETS = ("application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"
 
 @dataclass(frozen=True)
 class Given:
-    """A value by the name that it is applied under; `linear` comes after the units, which are
-    converted where `convert`."""
+    """A parameter value and the name it is applied to: converted to the target's unit if `convert`,
+    and then transformed by `linear`."""
 
     name: str
     value: Value
@@ -57,7 +57,7 @@ class Given:
 
 @dataclass
 class Parameters:
-    """Reads the bindings of the elements of `wires`."""
+    """Reads the parameter bindings of the elements of `wires`."""
 
     path: Path
     archive: zipfile.ZipFile
@@ -65,8 +65,8 @@ class Parameters:
     unused: list[str] = field(default_factory=list)
 
     def starts(self) -> dict[Place, dict[str, Value]]:
-        """Start values by component and variable. Values whose names match nothing are passed
-        over, as SSP 1.0 says, and logged. Raises InputFault for what cannot be read."""
+        """Start values by component and variable. Values whose names match nothing are ignored, as
+        SSP 1.0 requires, and logged. Raises InputFault for what cannot be read."""
         found: dict[Place, dict[str, Value]] = {place: {} for place in self.wires.described}
         for part in self.wires.root:
             for given in self._given(part):
@@ -77,7 +77,7 @@ class Parameters:
                 if not targets:
                     self.unused.append(dotted(part.place, given.name))
         if self.unused:
-            message = "%s: parameters that match nothing are passed over: %s"
+            message = "%s: parameters that match nothing are ignored: %s"
             logging.getLogger(__name__).warning(message, self.path, ", ".join(self.unused))
         return found
 
@@ -93,12 +93,12 @@ class Parameters:
             yield from given
 
     def _content(self, element: Element, where: str, kind: str, space: str) -> Element:
-        """The set or mapping that stands in `element`, or in the file that it names."""
+        """The parameter set or mapping inside `element`, or in the file that it names."""
         if element.get("type", SETS[0]) not in SETS:
             raise InputFault(f"{self.path}: {where}: type {element.get('type')} is not read")
         if element.get("sourceBase") == "component":
             raise InputFault(
-                f"{self.path}: {where}: {element.get('source')} stands inside an FMU, where it is "
+                f"{self.path}: {where}: {element.get('source')} is inside an FMU, where it is "
                 "not read; put it beside the .ssd"
             )
         entry, schema = element.get("source"), f"SystemStructure{kind.replace('Set', 'Values')}"
@@ -136,7 +136,7 @@ class Parameters:
                 yield replace(given[source], name=target, linear=linear, convert=converts(entry))
 
     def _targets(self, part: Part, name: str) -> Iterator[Reach]:
-        """The variables that `name` is in `part`."""
+        """The variables that `name` refers to in `part`."""
         node = part.place, name
         if variable := self.wires.variables.get(node):
             yield Reach(part.place, name, self.wires.unit(node), SAME, variable.relative)

@@ -1,9 +1,10 @@
-"""An SSP as the tables of a scene: ours to the bit, anyone's with a rate.
+"""Reads an SSP as the tables of a scene. An exported scene is restored exactly; an SSP of another
+tool may need a duration and a rate.
 
-Components become [[fmu]], those of inner systems by their whole names (`outer_inner`); connections
-become [[connection]] (entries that make up whole vectors in one), parameter values `start`.
-Connections to the outside of the system have no counterpart in a scene and are left out. What
-cannot be read is refused, never ignored.
+Components become [[fmu]], those of inner systems by their full names (`outer_inner`); connections
+become [[connection]] (one for entries that form whole vectors), parameter values `start`.
+Connections to the outside of the root system have no counterpart in a scene and are left out. What
+cannot be read is an error.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ _ENTRY = re.compile(r"\[[\d, ]+\]$")
 
 
 def tables(path: Path) -> dict[str, Any]:
-    """The tables of a scene. Raises InputFault, naming file and element, for what is malformed or
-    not supported; the FMUs land in the cache."""
+    """The tables of the SSP's scene; its FMUs are unpacked into the cache. Raises InputFault, with
+    file and element, for what is malformed or not supported."""
     with opened(path, "SSP") as archive:
         text = read_xml(archive, STRUCTURE)
         root = checked(path, STRUCTURE, text, "SystemStructureDescription")
         element = root.find(f"{{{SSD}}}System")
-        assert element is not None  # the schema says so
+        assert element is not None  # required by the schema
         system, defined = tree(path, element), units(root)
         names = _names(part.place for part in system if part.source is not None)
         with _room() as room:
@@ -87,8 +88,9 @@ def _room() -> Iterator[Path]:
 def _experiment(
     path: Path, found: dict[str, Any], root: Element, described: Iterable[Description]
 ) -> None:
-    """Duration and rate where there is no annotation: those of the default experiments, the rate
-    of the FMU with the shortest step. Where they don't say, `scene_file` asks for them."""
+    """Adds duration and rate where there is no annotation: the SSP's default experiment, and the
+    shortest step size of the FMUs' default experiments. `open_scene` reports those that remain
+    missing."""
     experiment = root.find(f"{{{SSD}}}DefaultExperiment")
     if "duration" not in found and experiment is not None and experiment.get("stopTime"):
         if float(experiment.get("startTime", "0")):
@@ -100,7 +102,7 @@ def _experiment(
 
 
 def _names(places: Iterable[Place]) -> dict[Place, str]:
-    """A name for [[fmu]] of each component, which is its own where it is the only one."""
+    """The name of each component in [[fmu]]: its own, numbered where it is not unique."""
     found: dict[Place, str] = {}
     for place in places:
         name = wanted = re.sub(r"\W", "_", "_".join(place))
@@ -131,7 +133,7 @@ def _fmu(path: Path, archive: zipfile.ZipFile, part: Part, name: str, room: Path
 
 
 def _grouped(rows: list[Row], described: Mapping[Place, Description]) -> Iterator[Row]:
-    """Rows that join two vectors entry by entry, in order, as one."""
+    """Rows, with those that connect two whole vectors entry by entry replaced by one."""
     i = 0
     while i < len(rows):
         (a, p), (b, q), how = rows[i]

@@ -1,5 +1,5 @@
-"""The elements of a SystemStructure.ssd as records: systems in systems, components, connectors and
-connections (SSP 1.0, chapter 5). What is not read is refused here, never ignored."""
+"""The elements of a SystemStructure.ssd as records: nested systems, components, connectors and
+connections (SSP 1.0, chapter 5). Unsupported elements are errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
 from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD
 
 Place = tuple[str, ...]
-"""The names of the elements on the way down from the root system, which is ()."""
+"""The names of the elements from the root system, (), down to this one."""
 Node = tuple[Place, str]
 """A connector or variable: its element, and its name there."""
 
@@ -33,8 +33,8 @@ class Connector:
 
 @dataclass(frozen=True)
 class Line:
-    """A connection as it is written, which does not say the end that gives. The end that takes
-    gets `linear` of the value, whose unit is converted before where `convert`."""
+    """A connection as it is written, in either direction. The value is converted to the target's
+    unit if `convert`, and then transformed by `linear`."""
 
     ends: tuple[Node, Node]
     linear: Linear
@@ -43,8 +43,8 @@ class Line:
 
 @dataclass(frozen=True)
 class Part:
-    """A component, whose `source` is the entry of its FMU in the archive, or a system, which has
-    none but `parts` and `lines` between its own connectors and those of its parts."""
+    """A component, with `source` its FMU's entry in the archive; or a system, with `parts` and with
+    `lines`, the connections between its own connectors and those of its parts."""
 
     place: Place
     connectors: Mapping[str, Connector]
@@ -54,24 +54,24 @@ class Part:
     lines: tuple[Line, ...] = ()
 
     def __iter__(self) -> Iterator[Part]:
-        """All parts, each after those inside it; this one comes last."""
+        """All parts, each after the parts inside it, and finally this one."""
         for part in self.parts:
             yield from part
         yield self
 
 
 def dotted(place: Place, *names: str) -> str:
-    """The hierarchical name, as SSP 1.0 forms it for parameters."""
+    """The hierarchical name in the notation of SSP 1.0 parameters."""
     return ".".join((*place, *names)) or "the root system"
 
 
 def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
-    """The tree of `text`, which follows one of the schemas of SSP 1.0. Raises InputFault."""
+    """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 1.0."""
     try:
         validate_tree(etree.fromstring(text), f"{schema}.xsd")
     except Exception as error:  # FMPy raises bare Exception
-        said = str(error).removeprefix("Failed to validate SystemStructure.ssd:").strip()
-        raise InputFault(f"{path}: {entry} is no SSP 1.0 ({schema}): {said}") from error
+        what = str(error).removeprefix("Failed to validate SystemStructure.ssd:").strip()
+        raise InputFault(f"{path}: {entry} is no SSP 1.0 ({schema}): {what}") from error
     return fromstring(text)
 
 
@@ -80,7 +80,7 @@ def units(root: Element, space: str = SSD) -> dict[str, Unit]:
     found = {}
     for unit in root.iterfind(f"{{{space}}}Units/{{{SSC}}}Unit"):
         base = unit.find(f"{{{SSC}}}BaseUnit")
-        assert base is not None  # the schema says so
+        assert base is not None  # required by the schema
         powers = tuple(int(base.get(b, "0")) for b in BASES)
         factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
         found[unit.get("name", "")] = Unit(unit.get("name", ""), powers, factor, offset)
@@ -88,7 +88,8 @@ def units(root: Element, space: str = SSD) -> dict[str, Unit]:
 
 
 def tree(path: Path, element: Element, place: Place = ()) -> Part:
-    """The part of a System or Component element and all that is inside it. Raises InputFault."""
+    """The part of a System or Component element, with all parts inside it. Raises InputFault for
+    elements that are not supported and for names that are not unique."""
     kind, where = element.tag.removeprefix(f"{{{SSD}}}"), dotted(place)
     connectors = {
         c.get("name", ""): _connector(path, place, c)
@@ -103,7 +104,7 @@ def tree(path: Path, element: Element, place: Place = ()) -> Part:
         kind += " for model exchange" if type_ == FMU else f" of type {type_}"
     if kind != "System":
         raise InputFault(
-            f"{path}: {where} is a {kind}; read are systems, and components that are FMUs for "
+            f"{path}: {where} is a {kind}; supported are systems, and components that are FMUs for "
             "co-simulation: put the system of another file into this one, and connect signals one "
             "by one"
         )
@@ -140,7 +141,8 @@ def _line(path: Path, place: Place, element: Element) -> Line:
 
 
 def transformation(path: Path, where: str, element: Element) -> Linear:
-    """What a connection or mapping does to a value. Raises InputFault for tables of values."""
+    """The linear transformation of a connection or mapping. Raises InputFault for mapping
+    transformations, which are tables of values."""
     for child in element:
         if child.tag == f"{{{SSC}}}LinearTransformation":
             return Linear(float(child.get("factor", "1")), float(child.get("offset", "0")))
@@ -151,5 +153,5 @@ def transformation(path: Path, where: str, element: Element) -> Linear:
 
 
 def converts(element: Element) -> bool:
-    """Whether the units of a connection or mapping are converted."""
+    """Whether a connection or mapping converts units."""
     return element.get("suppressUnitConversion") not in ("true", "1")

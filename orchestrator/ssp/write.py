@@ -1,7 +1,7 @@
-"""A scene as an SSP: SystemStructure.ssd and the FMUs, for this and other tools.
+"""Writes a scene as an SSP, SystemStructure.ssd and the FMUs, for this and other tools.
 
-Connections stand one by one, scalar to scalar. Rates, holds and connections to parameters, which
-the standard does not know, stand in an annotation as JSON with the keys of a scene.
+Each connection is from scalar to scalar. Rates, holds and connections to parameters, which the
+standard does not have, are in an annotation, as JSON with the keys of a scene.
 """
 
 from __future__ import annotations
@@ -52,8 +52,9 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
 def write(scene: Scene, system: System, target: Path) -> Path:
-    """Write `target`, whole or not at all; the same scene gives the same bytes."""
-    folders.made(target.parent)
+    """Write the SSP `target` atomically; the same scene gives the same bytes. Raises InputFault if
+    its folder cannot be written to."""
+    folders.ensure(target.parent)
     with atomic_file(target) as unfinished, zipfile.ZipFile(unfinished, "w") as archive:
         _add(archive, STRUCTURE, structure(scene, system, re.sub(r"\W|^(?=\d)", "_", target.stem)))
         for unit in system.fmus:
@@ -120,8 +121,8 @@ def _component(elements: Element, unit: Fmu) -> Element:
         bindings = SubElement(component, f"{{{SSD}}}ParameterBindings")
         binding = SubElement(bindings, f"{{{SSD}}}ParameterBinding")
         values = SubElement(binding, f"{{{SSD}}}ParameterValues")
-        made = SubElement(values, f"{{{SSV}}}ParameterSet", version="1.0", name="start")
-        parameters = SubElement(made, f"{{{SSV}}}Parameters")
+        set_ = SubElement(values, f"{{{SSV}}}ParameterSet", version="1.0", name="start")
+        parameters = SubElement(set_, f"{{{SSV}}}Parameters")
         for scalar, value in unit.starts:
             parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=scalar.name)
             SubElement(parameter, f"{{{SSV}}}{type_of(scalar.type)}", value=_text(scalar, value))
@@ -135,8 +136,8 @@ def _text(scalar: Scalar, value: bool | int | float | str) -> str:
 
 
 def _units(root: Element, system: System) -> None:
-    """The units that connectors name; a name that two FMUs define otherwise stays with the first:
-    each FMU keeps its own definitions."""
+    """The units of the connectors, by name. Where FMUs define one name differently, one definition
+    is written; each FMU uses its own."""
     named = {u.name: u for unit in system.fmus for u in unit.description.units.values()}
     if not named:
         return
@@ -152,7 +153,7 @@ def _units(root: Element, system: System) -> None:
 
 
 def _rest(scene: Scene, system: System) -> dict[str, Any]:
-    """What the annotation holds, by the keys of a scene."""
+    """The content of the annotation, with the keys of a scene."""
     keys = {f.name for f in fields(Scene)} - NOT_IN_ANNOTATION
     found = pydantic.TypeAdapter(Scene).dump_python(
         scene, mode="json", by_alias=True, exclude_none=True, include=keys
@@ -180,7 +181,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
 
 
 def _row(c: Connection, wire: Wire | None) -> dict[str, Any]:
-    """As a [[connection]]; its own hold is among [holds]."""
+    """A connection as a row of [[connection]]; its own hold is in [holds]."""
     row = {"from": f"{c.source}.{c.source_port}", "to": f"{c.target}.{c.target_port}"}
     if not wire:
         return row

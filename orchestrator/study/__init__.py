@@ -1,4 +1,4 @@
-"""The mismatch itself: what rates, holds and coupling do to error and energy, as one page."""
+"""The study of mismatched rates: effect of rates, holds and coupling on error and energy."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from hapticlink.orchestrator.sweep.job import Job
 
 
 def study(jobs: Sequence[Job], folder: Path, room: Path, processes: int, tell: Tell) -> Path:
-    """Make the runs that `room` does not hold yet, and write table, figures and README.md into
-    `folder`; `tell` hears how many are done."""
-    folders.made(folder)
+    """Run the `jobs` that have no row in `room` yet, and write table, figures and README.md to
+    `folder`; `tell` is called with the number of finished runs. Raises as `sweep` does."""
+    folders.ensure(folder)
     rows = sweep(jobs, room, processes, tell=tell, measure=errors.measure)
     found = errors.compared(rows)
     table.write(folder / "table.csv", [errors.rounded(row) for row in found])

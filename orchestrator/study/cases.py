@@ -17,9 +17,9 @@ MODELS = {
     "own": ("local_model=false",),
     "held": ("local_model=true", "mechanism.stabilization=baumgarte"),
 }
-"""Whose D, W, w and J_h the mechanism moves by: its own, or those of the last frame (B.15)."""
+"""The D, W, w and J_h of the mechanism: its own, or those held from the last frame (B.15)."""
 REFERENCE, FLOOR = 8192, 4096
-"""Hz of the runs taken as continuous, and of those that tell how far they are from it."""
+"""Rates (Hz) of the runs taken as continuous, and of those that estimate their error."""
 
 PRINTED = "printed"
 GAINS: dict[str, tuple[str, ...]] = {
@@ -47,7 +47,7 @@ def jobs() -> list[Job]:
 
 
 def _references() -> Iterator[Job]:
-    """Everything at one high rate, each block with its own Lambda^-1: nothing is held."""
+    """All blocks at one high rate, with the mechanism's own Lambda^-1: nothing is held."""
     for gains, bias, rate in product(GAINS, BIAS, (REFERENCE, FLOOR)):
         options = ["directions_from=mechanism", f"haptics.rate={rate}", f"controller.bias={bias}"]
         point = {"scene": "continuous", "gains": gains, "bias": bias, "rate": str(rate)}
@@ -55,7 +55,7 @@ def _references() -> Iterator[Job]:
 
 
 def _closed_loop() -> Iterator[Job]:
-    """Lambda^-1 and P_c cross from the graphics rate; no power does."""
+    """Lambda^-1 and P_c cross from the graphics rate; no power crosses rates."""
     holds = _holds(("derivative", "power", "spring"))
     for model, sync, bias, hold, (rate, seed, option) in product(
         MODELS, SYNC, BIAS, holds, _rates()
@@ -67,7 +67,7 @@ def _closed_loop() -> Iterator[Job]:
 
 
 def _direct() -> Iterator[Job]:
-    """The mechanism itself at the graphics rate: wrenches, poses and velocities cross."""
+    """The mechanism runs at the graphics rate: wrenches, poses and velocities cross rates."""
     holds = _holds(())
     for gains, bias, hold, (rate, seed, option) in product(GAINS, BIAS, holds, _rates()):
         options = [*holds[hold], option, f"controller.bias={bias}", *GAINS[gains]]
@@ -76,7 +76,7 @@ def _direct() -> Iterator[Job]:
 
 
 def _holds(without: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """The holds of the registry from slow to fast, but for those that need what is not there."""
+    """Options of each hold from slow to fast, except for holds with the needs `without`."""
     names = HOLDS.names(lambda kind: kind.needs not in without and not kind.downsamples)
     found: dict[str, tuple[str, ...]] = {n: (f"hold={n}",) for n in names}
     means = {f"{n}, mean": (*found[n], "downsampling=mean") for n in MEANS if n in found}
@@ -86,7 +86,7 @@ def _holds(without: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
 
 
 def _rates() -> Iterator[tuple[str, str, str]]:
-    """(rate, seed, option)."""
+    """Rate, seed ("" for a fixed rate) and option of each graphics rate."""
     for rate in RATES:
         yield rate, "", f"graphics.rate={rate}"
     low, high = VARIABLE.split("..")

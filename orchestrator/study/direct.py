@@ -1,4 +1,5 @@
-"""The mechanism at the graphics rate: poses, velocities and wrenches are held, power crosses."""
+"""The part of the page with the mechanism at the graphics rate: poses, velocities and wrenches are
+held, and power crosses rates."""
 
 from __future__ import annotations
 
@@ -14,10 +15,10 @@ from hapticlink.orchestrator.study.grids import (
     ENERGY,
     Grid,
     grid,
-    lasting,
     median,
     scaled,
     short,
+    stable_rates,
 )
 from hapticlink.orchestrator.sweep.row import METRIC, Row
 
@@ -25,6 +26,7 @@ DIRECT, WEAKER = "closed-loop-direct", "weaker"
 
 
 def at_weaker_gains(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
+    """The section with the gains of the scene closed-loop-direct; writes its figures."""
     grids = {b: grid(rows, METRIC, scene=DIRECT, gains=WEAKER, bias=b) for b in ("none", "full")}
     energy = {b: grid(rows, ENERGY, scene=DIRECT, gains=WEAKER, bias=b) for b in grids}
     coupling = {b: grid(rows, COUPLING, scene=DIRECT, gains=WEAKER, bias=b) for b in grids}
@@ -44,7 +46,7 @@ def at_weaker_gains(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
     made = figures.maps(
         folder,
         "direct_energy.png",
-        "Red feeds the loop: what holding the wrenches of hand and coupling makes in 3 s",
+        "Energy that holding the wrenches of hand and coupling generates in 3 s (red: generated)",
         [(headings[b], in_mJ[b]) for b in in_mJ],
         "energy generated (mJ)",
         signed=True,
@@ -55,7 +57,7 @@ def at_weaker_gains(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
 def _everywhere(grids: dict[str, Grid]) -> dict[str, list[str]]:
     """By hold, the rates at which the run stays stable with and without Coriolis compensation."""
     return {
-        hold: [r for r in COLUMNS if all(r in lasting(g, hold) for g in grids.values())]
+        hold: [r for r in COLUMNS if all(r in stable_rates(g, hold) for g in grids.values())]
         for hold in grids["full"]
     }
 
@@ -64,14 +66,14 @@ def _title(grids: dict[str, Grid]) -> str:
     rates = _everywhere(grids)
     most = max(map(len, rates.values()))
     names = [h for h, r in rates.items() if len(r) == most]
-    return f"{_and(names)}: lasting at {most} of {len(COLUMNS)} rates, more than any other hold"
+    return f"{_and(names)}: stable at {most} of {len(COLUMNS)} rates, more than any other hold"
 
 
 def _advice(grids: dict[str, Grid], coupling: dict[str, Grid], energy: dict[str, Grid]) -> str:
     rates = _everywhere(grids)
     lines = [
         "| graphics rate (Hz) | take | tracking error (mm) | `zoh` there (mm) | coupling error at "
-        "1 s (mm) | energy generated (mJ) | holds that last |\n|---|---|---|---|---|---|---|"
+        "1 s (mm) | energy generated (mJ) | stable holds |\n|---|---|---|---|---|---|---|"
     ]
     for rate in COLUMNS:
         worst = {h: _worst(grids, h, rate) for h in rates if rate in rates[h]}
@@ -79,19 +81,20 @@ def _advice(grids: dict[str, Grid], coupling: dict[str, Grid], energy: dict[str,
             lines.append(f"| {rate} | none stays stable | | | | | 0 of {len(rates)} |")
             continue
         first = min(worst, key=worst.__getitem__)
-        by_zoh = short(worst["zoh"]) if "zoh" in worst else "lost"
+        by_zoh = short(worst["zoh"]) if "zoh" in worst else "unstable"
         lines.append(
             f"| {rate} | `{first}` | {short(worst[first])} | {by_zoh} | "
             f"{short(_worst(coupling, first, rate))} | {short(1e3 * _worst(energy, first, rate))} "
             f"| {len(worst)} of {len(rates)} |"
         )
-    said = (
-        "Of the holds that last the 3 s with velocity terms left out and with them sent, the one "
-        "of the least largest tracking error; every number is the worse of the two. `a, b` is hold "
-        "`a` from slow to fast and `b` from fast to slow: the mean over the slow step, `passive`. "
-        "All others give the latest sample there, but `passive` and `nepce`: they stand there only."
+    text = (
+        "Of the holds with which the loop stays stable for 3 s, both with Coriolis and centrifugal "
+        "compensation off and on, the one with the smallest largest tracking error; every number "
+        "is the worse of the two. `a, b` is hold `a` from slow to fast and `b` from fast to slow: "
+        "`mean`, the mean over the slow step, or `passive`. Without `b` it is the latest sample; "
+        "`passive` and `nepce` alone are used from fast to slow only."
     )
-    return f"{fill(said, 108)}\n\n" + "\n".join(lines)
+    return f"{fill(text, 108)}\n\n" + "\n".join(lines)
 
 
 def _worst(grids: dict[str, Grid], hold: str, rate: str) -> float:
@@ -111,13 +114,14 @@ def _decision(grids: dict[str, Grid], coupling: dict[str, Grid], energy: dict[st
             continue
         track = median([grids["full"][hold][r].value for r in rates])
         far = median([coupling["full"][hold][r].value for r in rates])
-        made = max(_worst(energy, hold, r) for r in rates)
-        cells = f"{', '.join(rates)} | {short(track)} | {short(far)} | {short(1e3 * made)}"
+        generated = max(_worst(energy, hold, r) for r in rates)
+        cells = f"{', '.join(rates)} | {short(track)} | {short(far)} | {short(1e3 * generated)}"
         lines.append(f"| `{hold}` | {cells} |")
     return "\n".join(lines)
 
 
 def at_printed_gains(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
+    """The section with the gains of the report's section B.6; writes its figure."""
     grids = {b: grid(rows, METRIC, scene=DIRECT, gains=PRINTED, bias=b) for b in ("none", "full")}
     cells = [c for g in grids.values() for by in g.values() for c in by.values()]
     ended = sum(c.value is None for c in cells)
@@ -125,21 +129,21 @@ def at_printed_gains(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
         c for g in grids.values() for by in g.values() for r, c in by.items()
         if r in ("10", "20", "24")
     ]  # fmt: skip
-    lost = sum(c.value is None for c in low)
-    lasts = {h: sum(len(lasting(g, h)) for g in grids.values()) for h in grids["full"]}
-    most = max(lasts, key=lasts.__getitem__)
+    ended_low = sum(c.value is None for c in low)
+    stable = {h: sum(len(stable_rates(g, h)) for g in grids.values()) for h in grids["full"]}
+    most = max(stable, key=stable.__getitem__)
     yield "## The same at the report's own gains"
     yield fill(
         f"K_pc and B_pc of section B.6 were tuned for a mechanism at 512 Hz. With the mechanism at "
-        f"the graphics rate {ended} of {len(cells)} cells end early, {lost} of {len(low)} at 24 Hz "
-        f"and below; the hold that stays stable most often, `{most}`, does in {lasts[most]} of "
-        f"{len(COLUMNS) * len(grids)}.",
+        f"the graphics rate {ended} of {len(cells)} cells are unstable, {ended_low} of {len(low)} "
+        f"at 24 Hz and below; the hold that stays stable most often, `{most}`, does in "
+        f"{stable[most]} of {len(COLUMNS) * len(grids)}.",
         108,
     )
     made = figures.maps(
         folder,
         "printed_gains.png",
-        f"At the report's gains {ended} of {len(cells)} combinations are lost",
+        f"At the report's gains {ended} of {len(cells)} combinations are unstable",
         [
             ("Coriolis compensation off", grids["none"]),
             ("Coriolis compensation on", grids["full"]),

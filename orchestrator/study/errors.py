@@ -1,9 +1,9 @@
 """Tracking, coupling and modelling errors of the study's runs.
 
-Tracking: |x_S - x_D| (mm). Coupling: how far the handle is from where it is in the same blocks
-run continuously, with their own Lambda^-1 and nothing held. Modelling: how far it is with the
-velocity terms left out from where it is with them. Both on one grid, up to the first end of the
-runs compared; over the first second too, before the loop, which is active, has grown the
+Tracking: |x_S - x_D| (mm). Coupling: distance of the handle from that of the same blocks run
+continuously, with their own Lambda^-1 and nothing held. Modelling: distance of the handle without
+Coriolis and centrifugal compensation from that with it. Both are taken on one grid, up to the first
+end of the two runs, and over the first second as well, before the active loop has amplified the
 difference.
 """
 
@@ -20,7 +20,7 @@ from hapticlink.orchestrator.sweep import row as sweep_row
 from hapticlink.orchestrator.sweep.row import Row
 
 GRID = 128
-"""Hz of the grid that paths of the handle are compared on; it divides all haptic rates."""
+"""Rate (Hz) of the grid on which paths of the handle are compared; it divides all haptic rates."""
 PATH = "handle"
 PARTS = ("scene", "gains", "model", "sync", "bias", "hold", "rate", "seed")
 
@@ -39,34 +39,35 @@ def compared(rows: Sequence[Row]) -> list[Row]:
     found = []
     for r in rows:
         gains, bias = r["gains"], r["bias"]
-        made = {k: v for k, v in r.items() if k != PATH}
+        row = {k: v for k, v in r.items() if k != PATH}
         if PATH in r:
             if r["rate"] != str(REFERENCE):
                 reference = by_case[_case(continuous(gains, bias))]
-                made |= _distance("coupling", r, reference)
+                row |= _distance("coupling", r, reference)
             if bias == "none" and PATH in (other := by_case[_case({**r, "bias": "full"})]):
-                made |= _distance("modelling", r, other)
-        found.append(made)
+                row |= _distance("modelling", r, other)
+        found.append(row)
     return found
 
 
 def continuous(gains: str, bias: str, rate: int = REFERENCE) -> Row:
-    """The parts of a reference."""
+    """The key columns of a continuous run."""
     return {"scene": "continuous", "gains": gains, "bias": bias, "rate": str(rate)}
 
 
 def floor(rows: Iterable[Row], column: str) -> float:
-    """The largest coupling error of the runs at half the reference's rate: what is below it is
-    not told from none."""
+    """The largest coupling error of the runs at half the reference's rate: smaller errors cannot be
+    distinguished from zero."""
     return max(r[column] for r in rows if r["scene"] == "continuous" and r["rate"] == str(FLOOR))
 
 
 def rounded(row: Row) -> Row:
-    """Four digits, for a table that is kept; without what another machine makes other."""
+    """A row with four digits and without machine-dependent columns, for a table under version
+    control."""
     return {
         k: float(f"{v:.4g}") if isinstance(v, float) else v
         for k, v in row.items()
-        if not k.startswith(("steps ", "made_J ", "run_time"))
+        if not k.startswith(("steps ", "generated_J ", "run_time"))
     }
 
 

@@ -1,4 +1,4 @@
-"""Maps of the study: holds by rates, the number in each cell."""
+"""Maps of the study: holds against rates, with the number in each cell."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ def maps(
     label: str,
     signed: bool = False,
 ) -> str:
-    """Grids side by side under one colour scale, each number in its cell; where a run ends early
-    the cell is grey and tells when (s). `signed` sets 0 apart from either side."""
+    """Draws grids side by side with one colour scale and a number in each cell; returns the file's
+    name. The cell of a run that ends early is grey and has the time of the end (s). `signed`
+    selects a diverging scale around 0."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

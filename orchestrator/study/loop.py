@@ -1,4 +1,5 @@
-"""The mechanism at 512 Hz: Lambda^-1 and P_c are held, no power crosses (the report)."""
+"""The part of the page with the mechanism at 512 Hz: Lambda^-1 and P_c are held, and no power
+crosses rates (the report)."""
 
 from __future__ import annotations
 
@@ -14,28 +15,29 @@ from hapticlink.orchestrator.study.grids import (
     Grid,
     best,
     grid,
-    lasting,
     median,
     short,
+    stable_rates,
 )
 from hapticlink.orchestrator.sweep.row import METRIC, Row
 
-MOVES = {"own": "its own D, W, w, J_h", "held": "those of the last frame (B.15)"}
+MATRICES = {"own": "its own", "held": "of the last frame (B.15)"}
 FOLLOWS = {"operational": "the pose", "joint": "the joints"}
-SENDS = {"none": "left out", "full": "sent"}
+COMPENSATION = {"none": "off", "full": "on"}
 LOOP = "closed-loop"
 
 
 def at_haptic_rate(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
+    """The section of the page; writes its figure."""
     cases = [(m, s, b) for m in MODELS for s in SYNC for b in BIAS]
     wheres = {(m, s, b): {"model": m, "sync": s, "bias": b} for m, s, b in cases}
     track = {c: grid(rows, METRIC, scene=LOOP, **where) for c, where in wheres.items()}
     far = {c: grid(rows, COUPLING, scene=LOOP, **where) for c, where in wheres.items()}
     yield "## The mechanism at 512 Hz, Lambda^-1 and P_c held (the report)"
     lines = [
-        "| mechanism moves by | copy follows | velocity terms | cells lost | tracking error, `zoh` "
-        "(mm) | coupling error at 1 s, `zoh` (mm) | least of all holds (mm) |\n"
-        "|---|---|---|---|---|---|---|"
+        "| mechanism's D, W, w, J_h | copy follows | Coriolis compensation | unstable cells | "
+        "tracking error, `zoh` (mm) | coupling error at 1 s, `zoh` (mm) | smallest of all holds "
+        "(mm) |\n|---|---|---|---|---|---|---|"
     ]
     for case in cases:
         model, sync, bias = case
@@ -46,7 +48,8 @@ def at_haptic_rate(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
         )
         hold, least = _least(found)
         lines.append(
-            f"| {MOVES[model]} | {FOLLOWS[sync]} | {SENDS[bias]} | {sum(ended)} of {len(ended)} | "
+            f"| {MATRICES[model]} | {FOLLOWS[sync]} | {COMPENSATION[bias]} | "
+            f"{sum(ended)} of {len(ended)} | "
             f"{short(tracked)} | {short(apart)} | {short(least)} {hold} |"
         )
     yield f"Medians over the rates.\n\n{chr(10).join(lines)}"
@@ -65,18 +68,19 @@ def at_haptic_rate(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
     tracks = [track["own", s, "full"] for s in SYNC]
     most = max(v for g in tracks for by in g.values() for c in by.values() if (v := c.value))
     yield fill(
-        "No power crosses a rate here, so no hold makes energy. Where the mechanism moves by its "
-        f"own matrices and velocity terms are sent, no hold tracks worse than {short(most)} mm at "
-        "any rate; what the user feels is how far the handle strays from the continuous run. The "
-        f"least of that by rate, copy by the joints: {bests}.",
+        "No power crosses rates here, so no hold generates energy. With the mechanism's own "
+        "matrices and Coriolis and centrifugal compensation on, the tracking error is at most "
+        f"{short(most)} mm for every hold and rate; what the user feels is the coupling error, the "
+        "distance of the handle from the continuous run. Holds with the smallest one by rate, "
+        f"where the copy follows the joints: {bests}.",
         108,
         break_on_hyphens=False,
     )
     made = figures.maps(
         folder,
         "loop_coupling.png",
-        f"Lambda^-1 held: the best hold of a rate takes {gain:.0f} % off the zero-order hold's "
-        "coupling error",
+        f"Lambda^-1 held: the best hold of a rate reduces the zero-order hold's coupling error by "
+        f"{gain:.0f} %",
         [(f"copy follows {follows}", g) for follows, g in own.items()],
         "coupling error at 1 s (mm), Coriolis and centrifugal compensation on",
     )
@@ -84,11 +88,11 @@ def at_haptic_rate(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _least(found: Grid) -> tuple[str, float | None]:
-    """The hold of the least median, among those that last at all rates."""
+    """The hold with the smallest median, among those that are stable at all rates."""
     able = {
         h: median([c.value for c in by.values()])
         for h, by in found.items()
-        if lasting(found, h) == list(COLUMNS)
+        if stable_rates(found, h) == list(COLUMNS)
     }
     if not able:
         return "", None

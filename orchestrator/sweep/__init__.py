@@ -1,4 +1,4 @@
-"""Many runs of a scene: a grid or a list, in parallel, resumable, with one table at the end."""
+"""Sweeps: many runs of a scene, a grid or a list, in parallel and resumable, as one table."""
 
 from __future__ import annotations
 
@@ -20,18 +20,19 @@ Tell = Callable[[int], None]
 
 
 class Unfinished(Fault):
-    """Ctrl-C ended a sweep of `of` runs when it had `done` of them."""
+    """A sweep of `of` runs was interrupted after `done` of them."""
 
     def __init__(self, done: int, of: int, folder: Path) -> None:
         self.done, self.of = done, of
         super().__init__(
             f"interrupted: {done} of {of} runs are in {folder}/table.csv; "
-            "the same command does the rest"
+            "the same command continues"
         )
 
 
 def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row:
-    """The row of one job; its results live in `room` (None: the machine's own) until measured."""
+    """Runs one job and returns its row; results are kept in `room` (by default the machine's folder
+    for temporary files) until they are measured."""
     assert each.scene is not None
     try:
         plugins.load(each.plugins)
@@ -43,20 +44,20 @@ def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row
         try:
             experiment = simulate(each.scene, folder)
             row, fault = measure(experiment), experiment.outcome.fault
-            return row if fault is None or _of_scene(fault) else row | {"end": _apart(fault)}
+            return row if fault is None or _of_scene(fault) else row | {"end": _retried(fault)}
         except Fault as fault:
-            return failed(REFUSED if _of_scene(fault) else _apart(fault), str(fault))
-        except Exception as error:  # one run of many: the others go on
+            return failed(REFUSED if _of_scene(fault) else _retried(fault), str(fault))
+        except Exception as error:  # the other runs of the sweep go on
             return failed(DIED, f"{type(error).__name__}: {error}")
 
 
 def _of_scene(fault: Fault) -> bool:
-    """Whether the scene gives the fault again, wherever and whenever it is run."""
+    """Whether a repetition of the run would give the same fault."""
     return fault.repeatable and not isinstance(fault.__cause__, OSError)
 
 
-def _apart(fault: Fault) -> str:
-    """The end of a run that tells nothing of its scene: it is made again by the next sweep."""
+def _retried(fault: Fault) -> str:
+    """The end of a run whose fault is not caused by its scene, which the next sweep repeats."""
     return INTERRUPTED if isinstance(fault, Interrupted) else DIED
 
 
@@ -68,11 +69,12 @@ def sweep(
     tell: Tell = lambda done: None,
     measure: Measure = measure,
 ) -> list[Row]:
-    """The rows of `jobs`, in their order, each with its point; `tell` hears how many are done.
+    """The rows of `jobs`, in their order, each with its point; `tell` is called with the number of
+    finished runs.
 
-    A row is kept in `folder`/rows when its run ends, and not made again by a later call, unless the
-    run failed for a reason that is not its scene's. Raises Fault where it is interrupted, with
-    table.csv of the rows so far, or where the disk is full.
+    A row is stored in `folder`/rows when its run ends and is reused by a later call, unless the run
+    failed for a reason other than its scene. Raises Unfinished if the sweep is interrupted, after
+    writing table.csv with the rows so far, and Fault if the disk is full.
     """
     with interrupt.held():
         return _rows(jobs, folder, processes, scheduler, tell, measure)
@@ -89,7 +91,7 @@ def _rows(
     try:
         rows = table.Rows(folder / "rows")
         found = {j.key: kept for j in jobs if j.scene and (kept := rows.find(j.key))}
-        # Two points may give one scene: it runs once.
+        # Points that give the same scene are run once.
         missing = list({j.key: j for j in jobs if j.scene and j.key not in found}.values())
         refused = sum(j.scene is None for j in jobs)
 
@@ -101,23 +103,23 @@ def _rows(
             for each, made in _finished(missing, folder, processes, scheduler, measure):
                 if made["end"] == INTERRUPTED:  # a signal reached the worker too
                     continue
-                if made["end"] != DIED:  # the next sweep tries those again
+                if made["end"] != DIED:  # the next sweep repeats those
                     rows.keep(each.key, made)
                 found[each.key] = made
                 tell(done())
         except Interrupted:
             pass
-        told = [
+        known = [
             {**j.point, **(found[j.key] if j.scene else failed(REFUSED, j.refusal))}
             for j in jobs
             if not j.scene or j.key in found
         ]
-        table.write(folder / "table.csv", told)
+        table.write(folder / "table.csv", known)
     except OSError as error:
         raise Fault(f"{folder}: {error}") from error
-    if len(told) < len(jobs):
-        raise Unfinished(len(told), len(jobs), folder)
-    return told
+    if len(known) < len(jobs):
+        raise Unfinished(len(known), len(jobs), folder)
+    return known
 
 
 def _finished(
@@ -127,7 +129,7 @@ def _finished(
         yield from cluster.on_cluster(partial(work, measure=measure), jobs, scheduler)
         return
     room = folder / ".running"
-    shutil.rmtree(room, ignore_errors=True)  # of a sweep that was killed
+    shutil.rmtree(room, ignore_errors=True)  # left by a sweep that was killed
     room.mkdir(parents=True)
     try:
         yield from pool.in_processes(partial(work, room=room, measure=measure), jobs, processes)

@@ -1,7 +1,7 @@
-"""Jobs on a Dask cluster, for those who outgrow one machine.
+"""Runs jobs on a Dask cluster.
 
-Its workers need hapticlink of the same version, and one thread each (`dask worker --nthreads 1`):
-the Python FMUs of a process share one interpreter.
+Its workers need the same version of hapticlink, and one thread each (`dask worker --nthreads 1`),
+since the Python FMUs of a process share one interpreter.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from hapticlink.orchestrator.sweep.row import DIED, failed
 
 
 def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
-    """Each job with its row, as they finish. Raises InputFault without Dask or a scheduler."""
+    """Each job with its row, as they finish. Raises InputFault without Dask, or if no scheduler
+    answers at `address`."""
     try:
         from dask.distributed import Client, wait
     except ImportError:
@@ -41,7 +42,7 @@ def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
                     left.remove(future)
                     try:
                         row = future.result()
-                    except Exception as error:  # whatever a cluster can break of
+                    except Exception as error:  # any failure of the cluster
                         row = failed(DIED, f"{type(error).__name__}: {error}")
                     yield futures[future], row
         finally:

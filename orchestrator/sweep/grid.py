@@ -1,6 +1,6 @@
-"""What a sweep varies: axes of a grid, or a list of runs from a file.
+"""The points of a sweep: a grid of axes, or a list of runs from a file.
 
-A point is {dotted key: value as text}, what `--set` takes.
+A point is {dotted key: value as text}, as `--set` takes them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Point = dict[str, str]
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?:\.\.({_NUMBER})|:(\d+))?")
 MOST = 100_000
-"""Values of one axis, and runs; more are a slip of the pen."""
+"""Largest number of values of one axis, and of runs; more are taken for a mistake."""
 LONGEST = 15
 """Digits of the ends of a range on either side of the point: their differences are exact."""
 LARGEST = 2**24
@@ -34,17 +34,17 @@ LARGEST = 2**24
 
 @dataclass(frozen=True)
 class Axis:
-    """A key and the values that it takes, as text."""
+    """A key and its values, as text."""
 
     key: str
     values: tuple[str, ...]
 
 
 def parse(text: str) -> Axis:
-    """The axis of `key=values`: values and ranges between commas.
+    """The axis of `key=values`, with values and ranges separated by commas.
 
-    `a..b` is every whole number from a to b, `a..b..step` goes in steps, `a..b:n` has n points
-    evenly spread (to 6 digits). Raises InputFault where it cannot be read or is empty.
+    `a..b` is every whole number from a to b, `a..b..step` has this step, `a..b:n` has n evenly
+    spaced points (to 6 digits). Raises InputFault if it cannot be read or is empty.
     """
     key, equals, values = text.partition("=")
     key = key.strip()
@@ -57,7 +57,8 @@ def parse(text: str) -> Axis:
 
 
 def grid(axes: Sequence[Axis]) -> list[Point]:
-    """Every combination; the first axis varies slowest."""
+    """Every combination of the axes' values; the first axis varies slowest. Raises InputFault for a
+    key that is given twice."""
     keys = [axis.key for axis in axes]
     twice = next((k for k in keys if keys.count(k) > 1), None)
     if twice:
@@ -68,8 +69,8 @@ def grid(axes: Sequence[Axis]) -> list[Point]:
 
 
 def listed(path: Path) -> list[Point]:
-    """The runs of a file: a CSV with a column a key (an empty cell leaves the scene's own), or a
-    TOML of [[run]] tables. Raises InputFault."""
+    """The runs of a file: a CSV with one column per key (an empty cell keeps the scene's value), or
+    a TOML file of [[run]] tables. Raises InputFault if it cannot be read or has no run."""
     text = text_files.read(path, "a list of runs", LARGEST, "utf-8-sig")
     points = list(_toml(path, text) if path.suffix == ".toml" else _csv(path, text))
     if not points:
@@ -79,7 +80,7 @@ def listed(path: Path) -> list[Point]:
 
 
 def _items(text: str) -> Iterator[str]:
-    """Split at commas outside of brackets and quotes."""
+    """The parts of a text between commas that are outside of brackets and quotes."""
     depth, quote, start = 0, "", 0
     for i, letter in enumerate(text):
         if quote:
@@ -143,12 +144,14 @@ def _toml(path: Path, text: str) -> Iterator[Point]:
     if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
         raise InputFault(f"--runs {path}: `run` is no array of tables; write [[run]]")
     for run in runs:
-        said = {key: value for key, value in flat(run) if value != {}}
-        yield {k: v if isinstance(v, str) else json.dumps(v, default=str) for k, v in said.items()}
+        options = {key: value for key, value in flat(run) if value != {}}
+        yield {
+            k: v if isinstance(v, str) else json.dumps(v, default=str) for k, v in options.items()
+        }
 
 
 def number(text: str) -> float | None:
-    """The number that a value is, None for a word."""
+    """The number that a text writes, None if it is no number."""
     try:
         return float(Decimal(text))
     except InvalidOperation:

@@ -1,4 +1,4 @@
-"""One run of a sweep, and the key that its row is kept by."""
+"""One run of a sweep, and the key under which its row is stored."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from hapticlink.orchestrator.run_json import PACKAGES
 from hapticlink.orchestrator.scene.scene import Scene
 
 APART = frozenset({"api", "commands", "report", "study"})
-"""Folders of the orchestrator that no run depends on."""
+"""Folders of the orchestrator that results do not depend on."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A point of a sweep. `scene` is the checked one, or None where it is refused for `refusal`.
-    plugins: the modules whose parts it may name."""
+    """A point of a sweep. scene: the checked scene, None if it was refused; then `refusal` says
+    why. plugins: the modules that it may need."""
 
     point: Mapping[str, str]
     scene: Scene | None
@@ -41,9 +41,9 @@ class Job:
 def jobs(
     scene: str | Path | Scene, options: Sequence[str], points: Iterable[Mapping[str, str]]
 ) -> list[Job]:
-    """The jobs of `points`, each over `scene` with the common `options`.
+    """The jobs of `points`, each of `scene` with the common `options` and those of its point.
 
-    A point that gives no scene is a job that is refused; where every one does, InputFault.
+    A point without a valid scene is a refused job. Raises InputFault if all points are refused.
     """
     made = [job(scene, [*options, *(f"{k}={v}" for k, v in p.items())], p) for p in points]
     if made and all(each.scene is None for each in made):
@@ -52,7 +52,7 @@ def jobs(
 
 
 def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, str]) -> Job:
-    """The job of `scene` with `options`, told in the table as `point`."""
+    """The job of `scene` with `options`, listed in the table as `point`."""
     try:
         found = open_scene.load(scene, options)
         return Job(point, found, key(found), plugins=tuple(plugins.loaded()))
@@ -61,9 +61,8 @@ def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, s
 
 
 def key(scene: Scene) -> str:
-    """sha256 of the resolved scene, the FMU files that it names, the versions and the sources,
-    those of plugins too: where one of them changes, a run is made again. Raises InputFault for an
-    FMU not to be read."""
+    """SHA-256 of everything that a run depends on: the resolved scene, its FMU files, versions and
+    sources, also those of plugins. Raises InputFault for an FMU file that cannot be read."""
     made_with = [*_made_with(), plugins.loaded()]
     whole: dict[str, Any] = {"scene": scene.tables(), "made_with": made_with}
     try:

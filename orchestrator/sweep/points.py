@@ -1,4 +1,4 @@
-"""The runs of a sweep, as Python or the command line says them."""
+"""The points of a sweep, given in Python or on the command line."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from hapticlink.orchestrator.scene.overrides import text
 from hapticlink.orchestrator.sweep.grid import Axis, Point, grid, listed, parse
 
 Vary = Mapping[str, Iterable[Any]] | Sequence[str]
-"""The values of each key; as text, what `--vary` takes."""
+"""The values of each key, or texts as `--vary` takes them."""
 Runs = str | Path | Sequence[Mapping[str, Any]]
-"""The options of each run, or the file that `--runs` takes."""
+"""The options of each run, or a file as `--runs` takes it."""
 
 
 def points(vary: Vary, runs: Runs) -> list[Point]:
-    """Every combination of `vary`, or `runs`. Raises InputFault, where both are given too."""
+    """The points of every combination of `vary`, or of `runs`. Raises InputFault unless exactly one
+    of them is given, and for values that cannot be read."""
     if bool(vary) == bool(runs):
         raise InputFault("sweep: give either --vary key=values (repeatable) or --runs FILE")
     if isinstance(vary, Mapping):

@@ -1,7 +1,7 @@
-"""Jobs in processes of their own: a crash takes one run, Ctrl-C leaves nothing behind.
+"""Runs jobs in a pool of processes: a crash fails one run, and Ctrl-C ends all processes.
 
-At most one job a process is under way. Where a process dies, its pool breaks and does not say
-which job did it: those under way are made again, each alone, and the one that dies alone is told.
+Each process has at most one job. When a process dies its pool breaks without saying which job was
+the cause: the jobs in progress are repeated one by one, and one that dies alone has failed.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from hapticlink.orchestrator.sweep.row import DIED, Row, failed
 Work = Callable[[Job], Row]
 Done = tuple[Job, Row]
 RUNS = 200
-"""Runs of one process, before a fresh one takes over: libraries of Python FMUs stay loaded."""
+"""Runs of a process before it is replaced, since libraries of FMUs stay loaded."""
 
 
 def in_processes(work: Work, jobs: Sequence[Job], count: int) -> Iterator[Done]:
-    """Each job with its row, as they finish. Raises Interrupted at SIGINT or SIGTERM, when all
+    """Each job with its row, as they finish. Raises Interrupted after SIGINT or SIGTERM, when all
     processes have ended."""
     queue = deque(jobs)
     while queue:
@@ -44,28 +44,28 @@ def in_processes(work: Work, jobs: Sequence[Job], count: int) -> Iterator[Done]:
 
 
 def _spread(work: Work, queue: deque[Job], count: int) -> Generator[Done, None, list[Job]]:
-    """Take jobs from `queue` until it is empty, or a process dies: then what was under way."""
-    under_way: dict[Future[Row], Job] = {}
+    """Runs jobs from `queue` until it is empty; if a process dies, returns the jobs in progress."""
+    in_progress: dict[Future[Row], Job] = {}
     with _executor(min(count, len(queue))) as pool:
-        while queue or under_way:
+        while queue or in_progress:
             try:
-                while queue and len(under_way) < count:
+                while queue and len(in_progress) < count:
                     with _signals_blocked():
-                        under_way[pool.submit(work, queue[0])] = queue[0]
+                        in_progress[pool.submit(work, queue[0])] = queue[0]
                     queue.popleft()
-                ready = wait(under_way, timeout=0.2, return_when=FIRST_COMPLETED).done
+                ready = wait(in_progress, timeout=0.2, return_when=FIRST_COMPLETED).done
                 interrupt.check()
                 for future in ready:
                     row = future.result()
-                    yield under_way.pop(future), row
+                    yield in_progress.pop(future), row
             except BrokenProcessPool:
-                return list(under_way.values())
+                return list(in_progress.values())
     return []
 
 
 class _Worker(SpawnProcess):
-    """A spawned process that does not run the caller's script once more, as they do by default:
-    a sweep in it needs no `if __name__ == "__main__"`, and its file need not be there."""
+    """A spawned process that does not import the caller's main script, as it would by default: a
+    script needs no `if __name__ == "__main__"`, and need not be a file."""
 
     @staticmethod
     def _Popen(process: BaseProcess) -> Any:
@@ -99,7 +99,7 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(wait=False, cancel_futures=True)
         for process in workers:
             process.terminate()
-        for process in workers:  # they remove their folders; a second shutdown waits for nobody
+        for process in workers:  # time to remove their folders, since `shutdown` does not wait
             process.join(5.0)
         raise
     finally:
@@ -109,8 +109,8 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def _signals_blocked() -> Iterator[None]:
-    """Processes and threads that are made within get no Ctrl-C from the terminal, not at their
-    imports either."""
+    """Processes and threads that are created in this context get no Ctrl-C from the terminal, not
+    even during their imports."""
     if sys.platform == "win32":
         yield
         return
@@ -122,8 +122,8 @@ def _signals_blocked() -> Iterator[None]:
 
 
 def _follow() -> None:
-    """A worker leaves signals of the terminal to its parent, ends by SIGTERM with its folders
-    cleaned up, and does not outlive the parent."""
+    """Initialises a worker: it ignores SIGINT, which its parent handles, ends orderly by SIGTERM so
+    that its folders are removed, and ends with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -133,6 +133,6 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()
-    while True:  # a first one ends the run, a second one the process
+    while True:  # the first signal ends the run, the second one the process
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(0.5)

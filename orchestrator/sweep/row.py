@@ -1,6 +1,6 @@
 """The numbers of one run, as a row of the sweep's table.
 
-The names of the columns carry the unit. Where a scene has no such signal, its cell is empty.
+Column names end in the unit. The cell of a signal that a scene does not have is empty.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ Row = dict[str, Any]
 METRIC = "tracking_max_mm"
 REFUSED, DIED, INTERRUPTED = "refused", "died", "interrupted"
 FAILED = ("fault", "diverged", REFUSED, DIED)
-"""Ends in bad order: a fault of the run, one that left physics, bad input, and what is not the
-scene's fault: a process that crashed or hung, a full disk."""
+"""Ends with an error: a fault of the run, divergence, bad input, and what is no fault of the scene
+(a process that crashed or hung, a full disk)."""
 
 
 def measure(experiment: Experiment) -> Row:
-    """Everything that the table says of a run."""
+    """All numbers of a run that the table lists."""
     outcome = experiment.outcome
     results = experiment.results
     held = {c.name for c in experiment.system.connections if c.hold}
-    made = {n: e.made for n, e in outcome.energies.items() if n in held}
+    generated = {n: e.generated for n, e in outcome.energies.items() if n in held}
     found: Row = {
         "end": outcome.reason,
         "end_time_s": outcome.end_time,
@@ -37,16 +37,16 @@ def measure(experiment: Experiment) -> Row:
         **_switches(results),
         **_folded(results),
     }
-    if made:
-        found["held_energy_made_J"] = sum(made.values())
-        found |= {f"made_J {name}": energy for name, energy in made.items()}
+    if generated:
+        found["held_energy_generated_J"] = sum(generated.values())
+        found |= {f"generated_J {name}": energy for name, energy in generated.items()}
     calls = outcome.calls
     found |= {f"steps {name}": counts.get("step", 0) for name, counts in calls.items()}
     return found | {"run_time_s": outcome.wall_time}
 
 
 def failed(reason: str, message: str) -> Row:
-    """The row of a run that did not come to an outcome."""
+    """The row of a run without an outcome."""
     return {"end": reason, "message": _line(message)}
 
 
@@ -84,7 +84,8 @@ def _folded(results: Results) -> Row:
 
 
 def _switches(results: Results) -> Row:
-    """How often the number of constrained directions changes, as the controller sees it."""
+    """How often the number of constrained directions changes, at the rate of the block that the
+    controller gets it from."""
     for fmu in ("virtual_environment", "virtual_mechanism"):
         signal = f"{fmu}.n_constraints"
         count = next((t[signal] for t in results.tables.values() if signal in t), None)

@@ -1,4 +1,4 @@
-"""Rows on disk, each written when its run ends, and the one table of them all."""
+"""The rows of a sweep on disk, each written when its run ends, and the table of all rows."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ LAST = "run_time_s"
 
 
 class Rows:
-    """A folder with one file a row, by the key of its job."""
+    """A folder with one file per row, named by the key of its job."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
 
     def find(self, key: str) -> Row | None:
-        """The row of an earlier sweep, None where it is not there or cannot be read."""
+        """The row of an earlier sweep; None if there is none or it cannot be read."""
         try:
             found = json.loads((self._folder / f"{key}.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -31,18 +31,19 @@ class Rows:
         return found if isinstance(found, dict) else None
 
     def keep(self, key: str, row: Row) -> None:
+        """Store a row."""
         write_json(self._folder / f"{key}.json", row)
 
 
 def columns(rows: Sequence[Row]) -> list[str]:
-    """Of all rows, in the order in which they first come; the run time, which no second sweep
-    repeats, last."""
+    """The columns of all rows, in the order of their first occurrence; the run time, which is not
+    reproducible, comes last."""
     found = dict.fromkeys(name for row in rows for name in row)
     return [n for n in found if n != LAST] + [n for n in found if n == LAST]
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:
-    """A CSV with one line a row, whole or not at all."""
+    """Writes the rows as a CSV, atomically."""
     text = io.StringIO()
     writer = csv.DictWriter(text, columns(rows), restval="", lineterminator="\n")
     writer.writeheader()

@@ -1,4 +1,4 @@
-"""What stands on the figure of a sweep: its finding, with units."""
+"""Title and axis labels of a sweep's figure, with units."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from hapticlink.orchestrator.results.figures import short
 from hapticlink.orchestrator.sweep.row import Row
 
 UNITS = {"rate": "Hz", "duration": "s", "phase": "s", "mass": "kg", "inertia": "kg m2"}
-"""Of what is varied most, by the last part of its key."""
+"""Units of the keys that are varied most often, by the last part of the key."""
 
 
 def unit(key: str) -> str:
-    """The unit of a scene's key, "" where it has none or is not known."""
+    """The unit of a scene's key; "" if it has none or is not in `UNITS`."""
     return UNITS.get(key.rpartition(".")[2], "")
 
 
 def axis(key: str) -> str:
-    """`graphics.rate (Hz)`."""
+    """A key with its unit, `graphics.rate (Hz)`."""
     return f"{key} ({unit(key)})" if unit(key) else key
 
 
-def title(best: Row, value: float, quantity: str, keys: Sequence[str], lost: int, of: int) -> str:
-    """The least value of a quantity, as `RMS tracking error (mm)`, and where it stands; how many of
-    the runs have none."""
+def title(best: Row, value: float, quantity: str, keys: Sequence[str], ended: int, of: int) -> str:
+    """A title with the smallest value of a quantity such as `RMS tracking error (mm)`, the point of
+    the row `best` that has it, and how many of the `of` runs ended early or failed."""
     name, _, measured = quantity.partition(" (")
     where = ", ".join(f"{k} = {best.get(k, 'as in the scene')} {unit(k)}".rstrip() for k in keys)
-    found = f"Least: {name} {short(value)} {measured.rstrip(')')}".rstrip()
-    few = f"; {lost} of {of} runs ended early or failed" if lost else ""
+    found = f"Smallest {name}: {short(value)} {measured.rstrip(')')}".rstrip()
+    few = f"; {ended} of {of} runs ended early or failed" if ended else ""
     return f"{found} at {where}{few}"

@@ -1,9 +1,9 @@
-"""The power that a connection carries, entry by entry: a bond, as bond graphs call it.
+"""Power bonds: the power that a connection carries, entry by entry.
 
-An entry y of the source reaches the target's effort input as e = a y + b (its units converted,
-`factor` and `offset` of the connection), and works on the displacement x that [[power]] pairs with
-that input: power = sign e dx/dt. In W: units of the FMUs count by their factors to SI, and an FMU
-that says none is taken to use N and m, N.m and rad.
+An entry y of the source reaches the target's effort input as e = a y + b (unit conversion, `factor`
+and `offset` of the connection), and acts on the displacement x that is paired with that input:
+power = sign e dx/dt, in W. Units of the FMUs are converted to SI; an FMU without units is taken to
+use N and m, N.m and rad.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Bond:
-    """By entry of the connection that carries power.
+    """The entries of a connection that carry power, n of them.
 
-    entries: its place in the connection. moved: the displacement's place in the signal vector;
-    moving: that of its derivative, none where the target does not put it out. The effort (SI) is
-    factor y + offset, its displacement (SI, with the sign) scale x.
+    entries: their indices in the connection. moved: indices of their displacements in the signal
+    vector. moving: indices of the displacements' derivatives, empty if the target does not have
+    them as outputs. The effort (SI) is factor y + offset, its displacement (SI, with the sign)
+    scale x.
     """
 
     entries: tuple[int, ...]
@@ -40,12 +41,12 @@ class Bond:
     scale: Vector
 
     def of(self, places: Sequence[int]) -> list[int]:
-        """Those of `places`, one for each entry of the connection, that carry power."""
+        """The elements of `places`, one per entry of the connection, whose entries carry power."""
         return [places[i] for i in self.entries]
 
     @property
     def work(self) -> Vector:
-        """J for a value of 1 in the source over a displacement of 1, both in their own units."""
+        """Work (J) of a unit source value over a unit displacement in their own units; (n,)."""
         return self.factor * self.scale
 
 
@@ -70,7 +71,7 @@ def bond(c: Connection, system: System, signals: SignalVector) -> Bond | None:
 
 
 def _displacement(target: Description, s: Scalar, effort: str, displacement: str) -> Scalar:
-    """The entry of `displacement` that stands where `s` stands in `effort`."""
+    """The entry of `displacement` with the index that `s` has in `effort`."""
     efforts, moved = (name.partition(".")[2] for name in (effort, displacement))
     place = [e.name for e in target.port(efforts, "input")].index(s.name)
     return target.port(moved, "output")[place]
@@ -79,7 +80,7 @@ def _displacement(target: Description, s: Scalar, effort: str, displacement: str
 def _moving(
     target: Description, name: str, moved: Sequence[Scalar], signals: SignalVector
 ) -> tuple[int, ...]:
-    """The places of the derivatives, all or none."""
+    """Indices of the displacements' derivatives in the signal vector; empty unless all exist."""
     return tuple(signals.scalar(name, s.name) for s in target.derivative(moved) or ())
 
 
@@ -91,7 +92,7 @@ def _factor(target: Description, scalar: Scalar) -> float:
 def reader(
     signals: SignalVector, places: Sequence[int], factor: Vector, offset: Vector | float = 0.0
 ) -> Callable[[], Vector]:
-    """What reads factor y + offset of the values at `places`, each time into a new vector."""
+    """A function that returns factor y + offset of the values y at `places`, as a new vector."""
     values, view, where = signals.values, signals.view(places), np.array(places, dtype=np.intp)
     if np.any(factor != 1.0) or np.any(offset != 0.0):
         return lambda: factor * values[where] + offset

@@ -42,13 +42,13 @@ class Meters:
 
     def read(self, fmu: str, ahead: int, get: Callable[[], object]) -> Call:
         """The get call of an FMU, wrapped to update the meters of its outputs."""
-        given = [m.sample for m in self._sources.get(fmu, [])]
+        sampled = [m.sample for m in self._sources.get(fmu, [])]
         moved = [m.move for m in self._targets.get(fmu, [])]
-        told = given + moved
-        if not told:
+        updates = sampled + moved
+        if not updates:
             return lambda tick: get()
-        if len(told) == 1:
-            (only,) = told
+        if len(updates) == 1:
+            (only,) = updates
 
             def read_one(tick: int) -> None:
                 get()
@@ -58,8 +58,8 @@ class Meters:
 
         def read(tick: int) -> None:
             get()
-            for tell in told:
-                tell(tick + ahead)
+            for update in updates:
+                update(tick + ahead)
 
         return read
 
@@ -77,14 +77,16 @@ class Meters:
 
         return feed
 
-    def mark(self, deep: bool = False) -> list[Mark]:
-        """Checkpoint of all meters for `back` (rollback); `deep` checkpoints may enclose others."""
-        room = 16 if deep else 4
-        return [meter.mark(room) for meter in self._meters.values()]
+    def checkpoint(self, deep: bool = False) -> list[Mark]:
+        """Checkpoint of all meters for `rollback`; `deep` checkpoints may enclose others."""
+        rows = 16 if deep else 4
+        return [meter.checkpoint(rows) for meter in self._meters.values()]
 
-    def back(self, marks: list[Mark]) -> None:
+    def rollback(self, marks: list[Mark]) -> None:
+        """Remove what all meters recorded since the checkpoint `marks`."""
         for meter, mark in zip(self._meters.values(), marks, strict=True):
-            meter.back(mark)
+            meter.rollback(mark)
 
     def energies(self) -> dict[str, Energy]:
+        """The energies (J) of each connection that carries power, by its name."""
         return {name: meter.energy(self._seconds) for name, meter in self._meters.items()}

@@ -118,10 +118,10 @@ def test_its_account_is_the_meters(
 
     line.run(500, lambda: generator.uniform(-LARGEST, LARGEST), go)
     made, scale = float(line.hold.generated.sum()), 5.0 * 200
-    assert made == pytest.approx(line.told.energy(1.0).made, abs=1e-12 * scale)
+    assert made == pytest.approx(line.told.energy(1.0).generated, abs=1e-12 * scale)
     link = line.late.link
     if not link.lost and not link.overtaken:
-        assert made == pytest.approx(line.truth.energy(1.0).made, abs=1e-12 * scale)
+        assert made == pytest.approx(line.truth.energy(1.0).generated, abs=1e-12 * scale)
 
 
 def path_over(xs: list[float], steps: int) -> float:
@@ -168,7 +168,7 @@ def test_passive_makes_nothing_of_late_samples_where_the_way_is_foreseen(
     line.run(250, force, go, begin)
     window = -(-(least + 2 * every) // step) + 2
     limit = 0.0 if known else SWING * path_over(xs, window)
-    assert line.truth.energy(1.0).most <= limit + 1e-9
+    assert line.truth.energy(1.0).peak <= limit + 1e-9
 
 
 @settings(max_examples=60)
@@ -201,4 +201,4 @@ def test_what_passive_makes_of_white_noise_is_bounded(
     line.run(250, lambda: generator.uniform(-LARGEST, LARGEST), go)
     window = -(-(least + 2 * every) // step) + 2
     limit = SWING * path_over(xs, window) + 2 * SWING * unforeseen
-    assert line.truth.energy(1.0).most <= limit
+    assert line.truth.energy(1.0).peak <= limit

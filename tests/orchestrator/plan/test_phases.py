@@ -58,7 +58,7 @@ def test_explain_and_run_json_tell_phases(
     np.testing.assert_allclose(rows_of["time"], [0, *at], rtol=0, atol=1e-15)
     assert rows_of["virtual_mechanism.x"].shape == (52, 3)
     age = found.run["delays"]["virtual_mechanism.x -> controller.x_S"]
-    assert age["least"] == age["most"] == pytest.approx(1 / 512 - 0.0005, rel=1e-15)
+    assert age["min"] == age["max"] == pytest.approx(1 / 512 - 0.0005, rel=1e-15)
 
 
 def test_explain_goes_on_until_all_phases_have_begun_and_come_again(

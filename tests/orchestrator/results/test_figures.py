@@ -73,11 +73,11 @@ def test_a_sampled_spring_shows_its_energy(tmp_path: Path) -> None:
     assert "(J;" in axes.get_xlabel()
 
 
-def test_the_title_of_a_sweep_has_quantity_unit_and_what_was_lost() -> None:
+def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
     best = {"graphics.rate": "60", "hold": "foh"}
     told = title.title(best, 0.4361, "RMS tracking error (mm)", list(best), 3, 12)
     assert told == (
-        "Least: RMS tracking error 0.436 mm at graphics.rate = 60 Hz, hold = foh; "
+        "Smallest RMS tracking error: 0.436 mm at graphics.rate = 60 Hz, hold = foh; "
         "3 of 12 runs ended early or failed"
     )
     assert title.axis("graphics.rate") == "graphics.rate (Hz)"

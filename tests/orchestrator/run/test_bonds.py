@@ -96,7 +96,7 @@ def energies(experiment: Experiment) -> dict[str, NDArray[np.float64]]:
     """made, held and ideal (J) of both entries."""
     found = experiment.results.run["energies_within_a_rate"]
     rows = [found[f"spring.F[{i}] -> moves.f[{i}]"] for i in (1, 2)]
-    return {key: np.array([row[key] for row in rows]) for key in ("made", "held", "ideal")}
+    return {key: np.array([row[key] for row in rows]) for key in ("generated", "held", "ideal")}
 
 
 @pytest.mark.parametrize("length", ["m", "mm"])
@@ -112,7 +112,7 @@ def test_a_sampled_spring_through_conversions(
     gone = x[-1] - x[0]
     made = 0.5 * stiffness * np.sum(np.diff(x, axis=0) ** 2, axis=0)
     ideal = -0.5 * stiffness * (x[-1] ** 2 - x[0] ** 2) + push * gone
-    np.testing.assert_allclose(found["made"], made, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found["generated"], made, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(found["ideal"], ideal, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(found["held"], made + ideal, rtol=1e-12, atol=1e-15)
 
@@ -129,7 +129,7 @@ def test_holds_that_keep_account_do_so_in_the_units_of_the_target(
     for key, value in plain.items():
         np.testing.assert_allclose(turned[key], value, rtol=1e-9)
     fmus(tmp_path)
-    assert (plain["made"] < 0.2 * energies(run(tmp_path))["made"]).all()
+    assert (plain["generated"] < 0.2 * energies(run(tmp_path))["generated"]).all()
 
 
 def test_a_vector_whose_entries_stand_apart_is_booked_as_one(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path: Pa
     outcome = simulate("closed-loop-direct", tmp_path / "unstable", options).outcome
     assert outcome.reason == "diverged"
     assert outcome.end_time < 1.0
-    said = "haptic_device: left its workspace, and sampling and holding made "
+    said = "haptic_device: left its workspace, and sampling and holding generated "
     assert str(outcome.fault).startswith(said)
     assert "the loop is unstable" in str(outcome.fault)
     options = ["controller.topology=false", "hand.wrench=[0, 1, 0]"]

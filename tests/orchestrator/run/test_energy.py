@@ -26,7 +26,7 @@ def test_a_sampled_spring_makes_half_k_dx_squared(tmp_path: Path, rate: int) -> 
     run = experiment.results.run
     energy = run["energies_within_a_rate"][FORCE]
     assert run["energies"] == "none"
-    assert energy["made"] == pytest.approx(50.0 * np.sum(np.diff(x) ** 2), rel=1e-12)
+    assert energy["generated"] == pytest.approx(50.0 * np.sum(np.diff(x) ** 2), rel=1e-12)
     assert energy["ideal"] == pytest.approx(-50.0 * (x[-1] ** 2 - x[0] ** 2), rel=1e-12)
     # What the hold gave went into the mass, all of it.
     motion = experiment.results.haptics["virtual_mechanism.energy"]
@@ -55,8 +55,8 @@ def test_a_spring_renewed_more_rarely_than_the_target_steps(
         meter.hold(1.0)
     steps = np.diff(path[: last + 1 : every], axis=0)
     made = (0.5 * stiffness * steps**2).sum()
-    assert meter.energy(1.0).made == pytest.approx(made, rel=1e-10)
-    assert meter.energy(1.0).most == pytest.approx(made, rel=1e-10)  # it only grows
+    assert meter.energy(1.0).generated == pytest.approx(made, rel=1e-10)
+    assert meter.energy(1.0).peak == pytest.approx(made, rel=1e-10)  # it only grows
 
 
 @settings(max_examples=25)
@@ -80,14 +80,14 @@ def test_a_fast_spring_held_by_a_slow_target(every: int, seed: int) -> None:
     meter.move((len(frames) - 1) * every)
     meter.sample((len(frames) - 1) * every)
     made = (0.5 * np.diff(frames) ** 2).sum()
-    assert meter.energy(1.0).made == pytest.approx(made, rel=1e-10)
+    assert meter.energy(1.0).generated == pytest.approx(made, rel=1e-10)
 
 
 def test_a_passive_hold_takes_back_what_sampling_makes(tmp_path: Path) -> None:
     made = {}
     for hold in ("zoh", "passive", "nepce"):
         experiment = simulate("sampled-spring", tmp_path, [f"holds.hand.F={hold}"])
-        made[hold] = experiment.results.run["energies_within_a_rate"][FORCE]["made"]
+        made[hold] = experiment.results.run["energies_within_a_rate"][FORCE]["generated"]
     assert made["zoh"] > 40
     assert made["passive"] < 0
     assert abs(made["nepce"]) < 0.01 * made["zoh"]
@@ -103,7 +103,7 @@ def test_power_across_rates_is_told_and_kept_in_check(tmp_path: Path) -> None:
         options = [f"hold={hold}", "graphics.rate=30"]
         run = simulate("closed-loop-direct", tmp_path, options).results.run
         assert set(run["power_across_rates"]) == set(run["energies"]) == forces
-        made[hold] = sum(e["made"] for e in run["energies"].values())
+        made[hold] = sum(e["generated"] for e in run["energies"].values())
     assert {run["holds"][name] for name in forces} == {"passive"}
     reasons = run["holds_that_did_not_fit"]
     assert "carries no power" in reasons["virtual_mechanism.x -> controller.x_S"]["reason"]

@@ -164,7 +164,7 @@ def test_energy_is_booked_with_the_mean(fmus: Fmus, tmp_path: Path) -> None:
     outcome, _ = coupled.simulate(made, tmp_path)
     booked = outcome.energies["two.F -> one.F"]
     assert abs(booked.held) > 1.0
-    assert abs(booked.made) < 1e-8
+    assert abs(booked.generated) < 1e-8
 
 
 SCENE = """

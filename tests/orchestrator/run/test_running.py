@@ -46,7 +46,7 @@ def test_a_folder_that_cannot_be_is_bad_input(
     assert status(command, bar, "--out", tmp_path / "file") == 2
     assert "is a file; name a folder" in capsys.readouterr().err
     assert status(command, bar, "--out", tmp_path / "file" / "below") == 2
-    assert "cannot be made" in capsys.readouterr().err
+    assert "cannot be created" in capsys.readouterr().err
 
 
 def test_a_handle_out_of_reach_is_a_fault_of_the_device(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_a_start_that_assembly_moves_far_is_told(
         assert status("info", "four-bar", *options) == 0
         assert status("run", "four-bar", "--out", tmp_path, *SHORT, *options) == 0
         told = capsys.readouterr().out
-        assert told.count("the loops do not close at the start given") == 2 * count
+        assert told.count("the loops do not close at the given start") == 2 * count
     assert told.count("rocker from 2.9 to ") == 2
 
 
@@ -83,7 +83,7 @@ def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:
         f"{a}.y -> b.u": {"hold": "passive", "reason": "no power"} for a in "ac"
     }
     assert list(summary.lines(found))[1:] == [
-        "one: 7 steps were discarded and taken again in smaller ones",
+        "one: 7 steps were discarded and repeated with smaller ones",
         "2 of 5 iterated steps did not converge",
         "a.y -> b.u: 2 of 9 samples were lost, 1 overtaken",
         "hold passive does not fit a.y -> b.u (no power) and 1 more: zoh there",

@@ -27,7 +27,7 @@ def test_a_tunable_parameter_is_set_at_each_communication_point(fmus: Path) -> N
     given = results.haptics["gives.y"]
     np.testing.assert_array_equal(results.haptics["takes.y"][1:], given[:-1])
     assert given[-1] == 100.0 + 400.0 * 0.5
-    assert results.run["delays"]["gives.y -> takes.gain"]["most"] == 0.0
+    assert results.run["delays"]["gives.y -> takes.gain"]["max"] == 0.0
 
 
 def test_a_fixed_parameter_is_set_once(fmus: Path) -> None:

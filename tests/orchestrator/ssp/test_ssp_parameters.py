@@ -126,7 +126,7 @@ def test_values_that_match_nothing_are_passed_over_and_told(
         values(("gain", "2"), ("lost", "1")), mapping(("lost", "away", ""), ("no", "u", ""))
     )
     assert starts(tmp_path, box=bindings(bound))["box_p"]["gain"] == 7.0
-    assert "passed over: box.no, box.away" in caplog.text
+    assert "ignored: box.no, box.away" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_values_that_match_nothing_are_passed_over_and_told(
         (binding(values(("gain", "much"))), "is no SSP 1.0"),
         (binding(about='source="resources/no.ssv"'), "holds no resources/no.ssv"),
         (binding(about='source="../v.ssv"'), r"holds no \.\./v\.ssv"),
-        (binding(about='source="v.ssv" sourceBase="component"'), "stands inside an FMU"),
+        (binding(about='source="v.ssv" sourceBase="component"'), "is inside an FMU"),
         (binding(), "neither source nor content"),
         (binding(about='source="resources/v.ssv"'), "declares a document type"),
     ],

@@ -8,7 +8,7 @@ import pytest
 
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.study import cases, errors, figures, page
-from hapticlink.orchestrator.study.grids import COLUMNS, best, grid, lasting, short
+from hapticlink.orchestrator.study.grids import COLUMNS, best, grid, short, stable_rates
 from hapticlink.orchestrator.sweep.row import Row
 from tests.orchestrator.conftest import status
 
@@ -65,7 +65,7 @@ def test_a_cell_lasts_where_all_its_seeds_do() -> None:
     assert found["zoh"]["10..60"].value == 4.0  # the worse seed
     assert (found["foh"]["10..60"].value, found["foh"]["10..60"].end) == (None, 0.0)
     assert (best(found, "30"), best(found, "10..60")) == ("foh", "zoh")
-    assert lasting(found, "foh") == list(cases.RATES)
+    assert stable_rates(found, "foh") == list(cases.RATES)
     assert grid(rows, "m", bias="none") == {}
     for what, limit in (("tracking_max_mm", 42.0), ("theta_max_rad", 1.0)):
         apart = [{**r, what: limit, "end_time_s": 3.0} for r in rows]
@@ -115,14 +115,14 @@ def test_the_page_names_the_hold_of_the_least_error(
                 "coupling_1s_mm": error,
                 "coupling_max_mm": error,
                 "modelling_1s_mm": error,
-                "held_energy_made_J": -0.002,
+                "held_energy_generated_J": -0.002,
             }
         )
     text = page.write(tmp_path, rows).read_text()
     for rate in COLUMNS:
         assert f"| {rate} | `foh, mean` | 1 | 5" in text
     assert "| `second-order` | none | | | |" in text
-    assert "| those of the last frame (B.15) | the pose | left out | 64 of 64 |  |  |   |" in text
+    assert "| of the last frame (B.15) | the pose | off | 64 of 64 |  |  |   |" in text
     best = {"direct_tracking": "1", "direct_energy": "-2", "printed_gains": "1"}
     for name, value in (best | {"loop_coupling": "1"}).items():
         assert f"({name}.png)" in text

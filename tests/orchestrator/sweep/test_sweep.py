@@ -161,8 +161,8 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
     assert made["theta_max_rad"] == pytest.approx(0.1, rel=1e-12)
     assert made["closure_max_m"] == 2e-6
     assert made["switches"] == 3
-    assert made["held_energy_made_J"] == made["made_J a -> b"] == 0.25
-    assert "made_J c -> d" not in made
+    assert made["held_energy_generated_J"] == made["generated_J a -> b"] == 0.25
+    assert "generated_J c -> d" not in made
     assert (made["steps m"], made["end"], made["end_time_s"]) == (10, "stop_when", 1.0)
     assert list(made)[-1] == "run_time_s"
 

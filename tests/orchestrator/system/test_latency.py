@@ -127,7 +127,7 @@ def test_a_scene_with_delays(tmp_path: Path) -> None:
     ]
     run = simulate("closed-loop", tmp_path, options).results.run
     assert run["latencies"]["haptic_device.x -> controller.x_D"]["min"] == 0.004
-    assert run["delays"]["haptic_device.x -> controller.x_D"]["most"] == 3 / 512
+    assert run["delays"]["haptic_device.x -> controller.x_D"]["max"] == 3 / 512
     assert run["seeds"]["controller.F_motor -> haptic_device.F_motor"] == 7
     assert run["links"]["controller.F_motor -> haptic_device.F_motor"]["sent"] == 103
 
