@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -53,7 +54,7 @@ class Description:
     """By output: the variables that it depends on directly. An output that is not here may depend
     on every input."""
     strings: tuple[Scalar, ...] = ()
-    """Variables that are text: they are set at the start, never connected."""
+    """Variables that are text or binary: they are set at the start, never connected."""
     derivatives: Mapping[str, str] = field(default_factory=dict)
     """By output: the output that is its derivative with respect to time."""
     kinds: Mapping[str, Kind] = field(default_factory=dict)
@@ -92,9 +93,10 @@ class Description:
         return tuple(sorted(found, key=lambda s: TYPES.index(s.type)))
 
 
-def describe(path: Path) -> Description:
-    """Raises InputFault where the file is no co-simulation FMU of FMI 2.0 or 3.0 that can run
-    here."""
+def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Description:
+    """The FMU, its arrays of the sizes that structural parameters have with the values of `sizes`
+    (FMI 3.0 section 2.4.7.5.1). Raises InputFault where the file is no co-simulation FMU of FMI 2.0
+    or 3.0 that can run here."""
     with opened(path, "FMU") as archive:
         content = read_xml(archive, "modelDescription.xml")
         tree = ElementTree.fromstring(content)
@@ -105,6 +107,11 @@ def describe(path: Path) -> Description:
                 f"{tree.find('CoSimulation') is not None}; "
                 "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
             )
+        for variable in tree.iterfind("./ModelVariables/*") if sizes else ():
+            if variable.get("name") in sizes:
+                variable.set("start", str(sizes[variable.get("name", "")]))
+        if sizes:
+            content = ElementTree.tostring(tree)
         block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
         try:
             model = read_model_description(_only_xml(content), validate=False)
@@ -112,7 +119,13 @@ def describe(path: Path) -> Description:
             scalars = tuple(
                 s
                 for v in model.modelVariables
-                for s in numbers(v, version[0], v.name in relative, bounded=block is not None)
+                for s in numbers(
+                    v,
+                    version[0],
+                    v.name in relative,
+                    bounded=block is not None,
+                    resized=bool(sizes),
+                )
             )
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
@@ -138,7 +151,9 @@ def describe(path: Path) -> Description:
             for output in model.outputs
             if output.dependencies is not None
         },
-        strings=tuple(text(v) for v in model.modelVariables if v.type == "String" and not v.shape),
+        strings=tuple(
+            text(v) for v in model.modelVariables if v.type in ("String", "Binary") and not v.shape
+        ),
         derivatives=derivatives(model),
         kinds=declared.kinds,
         power=declared.power,

@@ -13,7 +13,8 @@ import os
 import shutil
 import sys
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from hapticlink.orchestrator.fmi.input_derivatives import Varying
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 from hapticlink.orchestrator.fmi.python_exit import release_at_exit
 from hapticlink.orchestrator.fmi.retry import Retry, Saved
+from hapticlink.orchestrator.fmi.start_values import Starts, wide
 from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
 from hapticlink.orchestrator.fmi.units import SAME
@@ -103,19 +105,31 @@ class InProcess(Instance):
             raise AsksToEnd(self.name, what, time, passing=True)
         self.ended = True
 
-    def _transfers(self, verb: str, scalars: Sequence[Scalar], values: Vector) -> list[Transfer]:
-        return transfers(self._slave, self.description.fmi, verb, scalars, values)
+    def _transfers(
+        self,
+        verb: str,
+        scalars: Sequence[Scalar],
+        values: Vector,
+        exact: Mapping[str, int] = MappingProxyType({}),
+    ) -> list[Transfer]:
+        return transfers(self._slave, self.description.fmi, verb, scalars, values, exact)
 
     # --- initialisation -------------------------------------------------------------------
 
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
+        return self._connected(scalars, places, {})
+
+    def _connected(
+        self, scalars: Sequence[Scalar], places: Sequence[int], exact: Mapping[str, int]
+    ) -> Callable[[Vector], None]:
+        """As `connect`; exact: whole numbers that are set in place of values."""
         order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
         where = np.array([places[i] for i in order], dtype=np.intp)
         conversions = [scalars[i].conversion for i in order]
         plain = all(c == SAME for c in conversions)
         factors = np.array([c.factor for c in conversions])
         offsets = np.array([c.offset for c in conversions])
-        values, setting = self._setting([scalars[i] for i in order])
+        values, setting = self._setting([scalars[i] for i in order], exact)
 
         def set_from(board: Vector) -> None:
             if self.ended:
@@ -146,23 +160,27 @@ class InProcess(Instance):
         return set_from
 
     def _setting(
-        self, scalars: Sequence[Scalar]
+        self, scalars: Sequence[Scalar], exact: Mapping[str, int]
     ) -> tuple[Vector, list[tuple[Callable[[], int], str]]]:
         """(values of `scalars`, the named calls that set them)."""
         values = np.zeros(len(scalars))
-        return values, [(t.call, t.name) for t in self._transfers("Set", scalars, values)]
+        return values, [(t.call, t.name) for t in self._transfers("Set", scalars, values, exact)]
 
     def _set_starts(self) -> None:
-        numbers = [(s, v) for s, v in self.starts if not isinstance(v, str)]
-        if numbers:
-            set_from = self.connect([s for s, _ in numbers], range(len(numbers)))
-            set_from(np.array([float(v) for _, v in numbers]))
+        self._set_numbers(tuple(row for row in self.starts if not row[0].structural))
         for scalar, text in self.starts:
             if isinstance(text, str):
-                self._set_text(scalar.reference, text)
+                self._set_text(scalar, text)
 
-    def _set_text(self, reference: int, text: str) -> None:
-        one = (ctypes.c_uint * 1)(reference), 1, (ctypes.c_char_p * 1)(text.encode())
+    def _set_numbers(self, starts: Starts) -> None:
+        numbers = [(s, v) for s, v in starts if not isinstance(v, str)]
+        if numbers:
+            places = range(len(numbers))
+            set_from = self._connected([s for s, _ in numbers], places, wide(starts))
+            set_from(np.array([float(v) for _, v in numbers]))
+
+    def _set_text(self, scalar: Scalar, text: str) -> None:
+        one = (ctypes.c_uint * 1)(scalar.reference), 1, (ctypes.c_char_p * 1)(text.encode())
         self._call("fmi2SetString", *one)
 
     def enter_initialization(self, stop_time: float) -> None:
@@ -184,9 +202,12 @@ class InProcess(Instance):
     # --- the loop -------------------------------------------------------------------------
 
     def read(self) -> None:
-        for transfer in self._gets:
-            if (status := transfer.call()) > WARNING:
-                raise self._failed(transfer.name, status)
+        try:
+            for transfer in self._gets:
+                if (status := transfer.call()) > WARNING:
+                    raise self._failed(transfer.name, status)
+        except Unfit as why:
+            raise self._fault(str(why), self.time, passing=True, repeatable=True) from None
 
     @property
     def smaller_steps(self) -> int:

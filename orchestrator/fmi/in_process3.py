@@ -6,7 +6,7 @@ inputs are constant (FMI 3.0 section 4.2.1)."""
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from hapticlink.orchestrator.fmi.in_process import WARNING, InProcess
 from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.python_exit import release_at_exit
+from hapticlink.orchestrator.fmi.start_values import wide
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 
@@ -56,9 +57,10 @@ class InProcess3(InProcess):
         return advance
 
     def _setting(
-        self, scalars: Sequence[Scalar]
+        self, scalars: Sequence[Scalar], exact: Mapping[str, int]
     ) -> tuple[Vector, list[tuple[Callable[[], int], str]]]:
-        """Arrays are set whole: entries that nobody sets keep their start values."""
+        """Arrays are set whole: entries that nobody sets keep their start values. Raises FmuFault
+        for an entry that has none, since its array was given another size."""
         references = {s.reference for s in scalars}
         whole = [s for s in self.description.scalars if s.reference in references]
         whole.sort(key=lambda s: TYPES.index(s.type))
@@ -67,7 +69,13 @@ class InProcess3(InProcess):
         known = {s.name: float(v) for s, v in self.starts if not isinstance(v, str)}
         everything = np.array([known.get(s.name, s.start) for s in whole])
         values = np.zeros(len(scalars))
-        calls = [(t.call, t.name) for t in self._transfers("Set", whole, everything)]
+        kept = set(place) - {s.name for s in scalars}
+        for name in kept:
+            if np.isnan(everything[place[name]]):
+                what = f"{name} has no start value in an array of this size; give start.{name}"
+                raise self._fault(what, 0.0)
+        exact = {n: v for n, v in wide(self.starts).items() if n in kept} | dict(exact)
+        calls = [(t.call, t.name) for t in self._transfers("Set", whole, everything, exact)]
 
         def spread() -> int:
             everything[into] = values
@@ -75,10 +83,19 @@ class InProcess3(InProcess):
 
         return values, [(spread, "set"), *calls]
 
-    def _set_text(self, reference: int, text: str) -> None:
-        one = (ctypes.c_uint * 1)(reference), 1, (ctypes.c_char_p * 1)(text.encode()), 1
-        self._call("fmi3SetString", *one)
+    def _set_text(self, scalar: Scalar, text: str) -> None:
+        reference = (ctypes.c_uint * 1)(scalar.reference)
+        if scalar.type == "Binary":
+            content = bytes.fromhex(text)
+            sizes, values = (ctypes.c_size_t * 1)(len(content)), (ctypes.c_char_p * 1)(content)
+            self._call("fmi3SetBinary", reference, 1, sizes, values, 1)
+        else:
+            self._call("fmi3SetString", reference, 1, (ctypes.c_char_p * 1)(text.encode()), 1)
 
     def enter_initialization(self, stop_time: float) -> None:
+        if sizes := tuple(row for row in self.starts if row[0].structural):
+            self._call("fmi3EnterConfigurationMode")
+            self._set_numbers(sizes)
+            self._call("fmi3ExitConfigurationMode")
         self._set_starts()
         self._call("fmi3EnterInitializationMode", False, 0.0, 0.0, True, stop_time)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.fmi.start_values import WIDE
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 Vector = NDArray[np.float64]
@@ -30,10 +32,18 @@ class Transfer:
     """The scalars of one FMI type within a vector, and the C call that moves them.
 
     Entries of an FMI 3.0 array move together, so they stand side by side and none is left out.
+    exact: by name, whole numbers to set in place of values that are doubles.
     """
 
     def __init__(
-        self, slave: Any, fmi: str, verb: str, scalars: Sequence[Scalar], type_: str, values: Vector
+        self,
+        slave: Any,
+        fmi: str,
+        verb: str,
+        scalars: Sequence[Scalar],
+        type_: str,
+        values: Vector,
+        exact: Mapping[str, int],
     ) -> None:
         chosen = [i for i, s in enumerate(scalars) if s.type == type_]
         self.name = f"fmi{fmi}{verb}{type_}"
@@ -44,6 +54,12 @@ class Transfer:
             self._limits = np.iinfo(in_c)
             self._named = f"{type_} holds {self._limits.min} to {self._limits.max}"
             self._names = [scalars[i].name for i in chosen]
+        self._exact = [
+            (k, exact[scalars[i].name])
+            for k, i in enumerate(chosen)
+            if type_ in WIDE and scalars[i].name in exact
+        ]
+        self._wide = type_ in WIDE
         direct = in_c is np.float64
         self._buffer: Any = self._values if direct else np.zeros(len(chosen), in_c)
         references = [scalars[i].reference for i in chosen if scalars[i].entry == 0]
@@ -61,15 +77,27 @@ class Transfer:
         self.call: Callable[[], int] = self._transfer if direct else through
 
     def _get(self) -> int:
+        """Raises Unfit for a whole number that is no double."""
         status = self._transfer()
         self._values[:] = self._buffer
+        if self._wide:
+            for name, whole, value in zip(self._names, self._buffer, self._values, strict=True):
+                if int(whole) != int(value):
+                    what = "which signals and results, of double precision, cannot hold"
+                    raise Unfit(f"{name} is {int(whole)}, {what}")
         return status
 
     def _set(self) -> int:
+        for k, _ in self._exact:
+            self._values[k] = 0.0
         if self._boolean:
             self._buffer[:] = self._values >= 0.5
         else:
             self._buffer[:] = self._rounded() if self._whole else self._values
+        for k, whole in self._exact:
+            if not self._limits.min <= whole <= self._limits.max:
+                raise Unfit(f"{self._names[k]} cannot be {whole}: {self._named}")
+            self._buffer[k] = whole
         return self._transfer()
 
     def _rounded(self) -> Vector:
@@ -85,8 +113,13 @@ class Transfer:
 
 
 def transfers(
-    slave: Any, fmi: str, verb: str, scalars: Sequence[Scalar], values: Vector
+    slave: Any,
+    fmi: str,
+    verb: str,
+    scalars: Sequence[Scalar],
+    values: Vector,
+    exact: Mapping[str, int] = MappingProxyType({}),
 ) -> list[Transfer]:
     """One for each type present; `scalars` are sorted by type."""
     present = [t for t in TYPES if any(s.type == t for s in scalars)]
-    return [Transfer(slave, fmi, verb, scalars, t, values) for t in present]
+    return [Transfer(slave, fmi, verb, scalars, t, values, exact) for t in present]

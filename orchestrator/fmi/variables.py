@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -66,11 +67,16 @@ class Scalar:
         return self.causality in ("input", "parameter") and self.variability != "constant"
 
     @property
+    def structural(self) -> bool:
+        """Whether it sets the size of arrays, in configuration mode (FMI 3.0 section 2.3.3)."""
+        return self.causality == "structuralParameter"
+
+    @property
     def startable(self) -> bool:
         """Whether it takes a start value: states do too, where the FMU says how they start
         (FMI 2.0.5 section 2.2.7, FMI 3.0 section 2.4.7)."""
         started = self.initial in ("exact", "approx") and self.variability != "constant"
-        return self.settable or started
+        return self.settable or self.structural or started
 
 
 def differences(tree: ElementTree.Element) -> set[str | None]:
@@ -82,9 +88,12 @@ def differences(tree: ElementTree.Element) -> set[str | None]:
     }
 
 
-def numbers(variable: Any, fmi: str, relative: bool, bounded: bool = False) -> Iterator[Scalar]:
+def numbers(
+    variable: Any, fmi: str, relative: bool, bounded: bool = False, resized: bool = False
+) -> Iterator[Scalar]:
     """The numbers of a variable; entries of an FMI 3.0 array row by row, named from 1. bounded: its
-    `max` is one that a run must keep to."""
+    `max` is one that a run must keep to. resized: structural parameters are not those that its
+    start values are for, which then are NaN where their number is another."""
     kind = _CALLED.get((fmi, variable.type), variable.type)
     if kind not in TYPES:
         return
@@ -92,6 +101,8 @@ def numbers(variable: Any, fmi: str, relative: bool, bounded: bool = False) -> I
     starts = [_number(text) for text in (variable.start or "").split()] or [0.0]
     if len(starts) == 1:
         starts *= len(names)
+    elif len(starts) != len(names) and resized:
+        starts = [math.nan] * len(names)
     declared = variable.declaredType
     for i, (name, start) in enumerate(zip(names, starts, strict=True)):
         yield Scalar(
@@ -137,7 +148,7 @@ def _nominal(variable: Any) -> float:
 
 def text(v: Any) -> Scalar:
     about = v.causality or "local", None, v.variability
-    return Scalar(v.name, v.valueReference, "String", *about, initial=v.initial)
+    return Scalar(v.name, v.valueReference, v.type, *about, initial=v.initial)
 
 
 def _number(text: str) -> float:

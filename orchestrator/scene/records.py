@@ -20,12 +20,15 @@ HoldName = Annotated[str, HOLDS.names()]
 
 OWN = "the variable's own"
 """The unit of values of a foreign FMU's variables."""
+_Row = tuple[bool | Annotated[int | float, Quantity(OWN)], ...]
 Value = (
     bool
     | Annotated[int, Quantity(OWN)]
     | Annotated[float, Quantity(OWN)]
     | str
-    | tuple[bool | Annotated[int | float, Quantity(OWN)], ...]
+    | _Row
+    | tuple[_Row, ...]
+    | tuple[tuple[_Row, ...], ...]
 )
 
 
@@ -52,7 +55,8 @@ class ForeignFmu:
     """sampled: doStep(t, h) computes y(t) from the inputs at t; continuous: y(t + h). By default
     what the FMU declares, else that of the block that it replaces, else "continuous"."""
     start: Mapping[str, Value] = field(default_factory=dict)
-    """Start values of inputs and parameters by name; a list for a whole vector."""
+    """Start values of inputs and parameters by name; a list for a whole vector, lists of rows for a
+    matrix."""
     derivatives: Mapping[str, str] = field(default_factory=dict)
     """For an output, the output that is its time derivative, where the FMU does not declare it."""
     isolate: bool = False

@@ -3,10 +3,11 @@ in an annotation, because the standard has no rates and no holds."""
 
 from __future__ import annotations
 
-SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
-SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
-SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
-SSM = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+SSP1 = "http://ssp-standard.org/SSP1/"
+SSD = f"{SSP1}SystemStructureDescription"
+SSC = f"{SSP1}SystemStructureCommon"
+SSV = f"{SSP1}SystemStructureParameterValues"
+SSM = f"{SSP1}SystemStructureParameterMapping"
 RUN = "urn:hapticlink:run"
 ANNOTATION = "hapticlink.run"
 STRUCTURE = "SystemStructure.ssd"

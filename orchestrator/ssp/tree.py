@@ -15,7 +15,7 @@ from lxml import etree
 from hapticlink.components.base_units import BASES
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
-from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD
+from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD, SSP1
 
 Place = tuple[str, ...]
 """The names of the elements from the root system, (), down to this one."""
@@ -66,9 +66,16 @@ def dotted(place: Place, *names: str) -> str:
 
 
 def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
-    """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 1.0."""
+    """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 1.0.
+
+    A file of version 2.0 in the namespaces of 1.0, as OMSimulator writes it, is read as 1.0.
+    """
     try:
-        validate_tree(etree.fromstring(text), f"{schema}.xsd")
+        root = etree.fromstring(text)
+        if root.get("version", "").startswith("2.") and str(root.tag).startswith(f"{{{SSP1}"):
+            root.set("version", "1.0")
+            text = etree.tostring(root)
+        validate_tree(root, f"{schema}.xsd")
     except Exception as error:  # FMPy raises bare Exception
         what = str(error).removeprefix("Failed to validate SystemStructure.ssd:").strip()
         raise InputFault(f"{path}: {entry} is no SSP 1.0 ({schema}): {what}") from error

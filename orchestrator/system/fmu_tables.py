@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path as FilePath
+from typing import Any
 
 from hapticlink.components.component import Component
 from hapticlink.orchestrator.base.faults import InputFault, unknown
@@ -27,7 +30,7 @@ def fmus(
     for blocks. Findings are appended to `problems`."""
     for i, fmu in enumerate(scene.fmu):
         try:
-            found = describe(files.get(fmu.name) or FilePath(fmu.path or ""))
+            found = _described(files.get(fmu.name) or FilePath(fmu.path or ""), fmu)
         except InputFault as fault:
             problems.append((("fmu", i, "path"), str(fault)))
             continue
@@ -50,6 +53,14 @@ def fmus(
         yield fmu, found, sum(starts, ())
 
 
+def _described(path: FilePath, fmu: ForeignFmu) -> Description:
+    """The FMU with the sizes that `start` gives it by structural parameters. Raises InputFault."""
+    found = describe(path)
+    structural = {s.name for s in found.scalars if s.structural}
+    sizes = {n: v for n, v in fmu.start.items() if n in structural and isinstance(v, int)}
+    return describe(path, sizes) if sizes else found
+
+
 def _with_derivative(found: Description, name: str, derivative: str) -> Description:
     """The description with `derivative` declared as the derivative of `name`. Raises ValueError
     unless both are outputs of one size."""
@@ -64,10 +75,25 @@ def _start(found: Description, name: str, value: Value) -> Starts:
     """The start value of each scalar of `name`. Raises ValueError for a name that takes no start
     value, and for a value of a different size, type or range."""
     scalars = settable(found, name, start=True)
-    values = value if isinstance(value, tuple) else (value,)
+    values = tuple(_entries(value, scalars[-1].indices, name))
     if len(values) != len(scalars):
         raise ValueError(f"{len(values)} values for the {len(scalars)} of {name}")
     return tuple((s, fitting(s, given)) for s, given in zip(scalars, values, strict=True))
+
+
+def _entries(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
+    """The entries of a value, row by row. Raises ValueError for rows that do not fit `shape`."""
+    if not isinstance(value, tuple):
+        yield value
+    elif not any(isinstance(row, tuple) for row in value):
+        yield from value
+    else:
+        rows, size = (shape[0], math.prod(shape[1:])) if shape else (1, 1)
+        found = [tuple(_entries(row, shape[1:], name)) for row in value]
+        sizes = [len(row) for row in found]
+        if sizes != [size] * rows:
+            raise ValueError(f"rows of {sizes} values for the {rows} rows of {size} of {name}")
+        yield from chain.from_iterable(found)
 
 
 def outputs(found: Description, name: str) -> tuple[Scalar, ...]:

@@ -142,7 +142,8 @@ NUMBERS = (
 
 def c_fmu3(folder: Path) -> Path:
     """The FMU of types_fmu3.c: input in_<type> and output out_<type> of every number type of FMI
-    3.0, parameters mode and text."""
+    3.0, parameters mode and text, a matrix whose size is a structural parameter, the weighted sum
+    of its entries, and a binary input."""
     rows = []
     for k, kind in enumerate(NUMBERS):
         how = "continuous" if kind.startswith("Float") else "discrete"
@@ -160,8 +161,15 @@ def c_fmu3(folder: Path) -> Path:
 <ModelVariables>{"".join(rows)}
 <Int32 name="mode" valueReference="22" causality="parameter" variability="fixed" start="0"/>
 <String name="text" valueReference="23" causality="parameter" variability="fixed"><Start value=""/>
-</String></ModelVariables>
-<ModelStructure>{outputs}</ModelStructure>
+</String>
+<UInt64 name="size" valueReference="24" causality="structuralParameter" variability="fixed"
+ start="2"/>
+<Float64 name="array" valueReference="25" causality="parameter" variability="fixed" start="0 0 0 0">
+<Dimension valueReference="24"/><Dimension valueReference="24"/></Float64>
+<Float64 name="sum" valueReference="26" causality="output" variability="continuous"/>
+<Binary name="blob" valueReference="27" causality="input" variability="discrete"><Start value=""/>
+</Binary></ModelVariables>
+<ModelStructure>{outputs}<Output valueReference="26"/></ModelStructure>
 </fmiModelDescription>
 """
     return _packed(folder, "types_fmu3.c", "types", platform_tuple, description)

@@ -12,21 +12,24 @@
     X(0, Float64, double) X(1, Float32, float) X(2, Int64, int64_t) X(3, Int32, int32_t) \
     X(4, Int16, int16_t) X(5, Int8, int8_t) X(6, UInt64, uint64_t) X(7, UInt32, uint32_t) \
     X(8, UInt16, uint16_t) X(9, UInt8, uint8_t) X(10, Boolean, bool)
-enum { KINDS = 11, MODE = 22 };
+enum { KINDS = 11, MODE = 22, SIZE = 24, ARRAY = 25, SUM = 26, BLOB = 27, LARGEST = 9 };
 
 typedef struct {
 #define PAIR(k, name, type) type name[2];
     TYPES(PAIR)
     int32_t mode, steps;
     char text[64];
+    bool configuring;
+    uint64_t size;
+    double array[LARGEST];
 } Model;
 
 /* An importer may ask for every function of the standard; these are not called. */
 #define UNUSED(name) int name(void) { return 3; }
 UNUSED(fmi3ActivateModelPartition) UNUSED(fmi3CompletedIntegratorStep)
-UNUSED(fmi3DeserializeFMUState) UNUSED(fmi3EnterConfigurationMode)
+UNUSED(fmi3DeserializeFMUState)
 UNUSED(fmi3EnterContinuousTimeMode) UNUSED(fmi3EnterEventMode) UNUSED(fmi3EnterStepMode)
-UNUSED(fmi3EvaluateDiscreteStates) UNUSED(fmi3ExitConfigurationMode) UNUSED(fmi3FreeFMUState)
+UNUSED(fmi3EvaluateDiscreteStates) UNUSED(fmi3FreeFMUState)
 UNUSED(fmi3GetAdjointDerivative) UNUSED(fmi3GetBinary) UNUSED(fmi3GetClock)
 UNUSED(fmi3GetContinuousStateDerivatives) UNUSED(fmi3GetContinuousStates)
 UNUSED(fmi3GetDirectionalDerivative) UNUSED(fmi3GetEventIndicators) UNUSED(fmi3GetFMUState)
@@ -36,7 +39,7 @@ UNUSED(fmi3GetNumberOfEventIndicators) UNUSED(fmi3GetNumberOfVariableDependencie
 UNUSED(fmi3GetOutputDerivatives) UNUSED(fmi3GetShiftDecimal) UNUSED(fmi3GetShiftFraction)
 UNUSED(fmi3GetString) UNUSED(fmi3GetVariableDependencies) UNUSED(fmi3GetVersion)
 UNUSED(fmi3InstantiateModelExchange) UNUSED(fmi3InstantiateScheduledExecution) UNUSED(fmi3Reset)
-UNUSED(fmi3SerializeFMUState) UNUSED(fmi3SerializedFMUStateSize) UNUSED(fmi3SetBinary)
+UNUSED(fmi3SerializeFMUState) UNUSED(fmi3SerializedFMUStateSize)
 UNUSED(fmi3SetClock) UNUSED(fmi3SetContinuousStates) UNUSED(fmi3SetDebugLogging)
 UNUSED(fmi3SetFMUState) UNUSED(fmi3SetIntervalDecimal) UNUSED(fmi3SetIntervalFraction)
 UNUSED(fmi3SetShiftDecimal) UNUSED(fmi3SetShiftFraction) UNUSED(fmi3SetTime)
@@ -48,18 +51,39 @@ static void say(const char *what) {
     if (file) fprintf(file, "%s\n", what), fclose(file);
 }
 
-/* References: 2k the input, 2k + 1 the output of type k. */
+/* References: 2k the input, 2k + 1 the output of type k. A matrix of `size` rows and columns, whose
+   size is set in configuration mode alone, has its entries added up by their weights 1, 2, ... */
+static bool of_array(Model *m, unsigned vr, double *value, bool set) {
+    size_t count = m->size * m->size;
+    if (vr == SUM && !set) {
+        *value = 0;
+        for (size_t i = 0; i < count; i++) *value += (double)(i + 1) * m->array[i];
+        return true;
+    }
+    if (vr != ARRAY || !set) return false;
+    memcpy(m->array, value, count * sizeof *value);
+    return true;
+}
 #define ACCESS(k, name, type) \
     int fmi3Get##name(Model *m, const unsigned *vr, size_t n, type *value, size_t size) { \
         for (size_t i = 0; i < n; i++) { \
+            if (k == 0 && vr[i] >= SIZE) { \
+                if (!of_array(m, vr[i], (double *)(value + i), false)) return 3; \
+                continue; \
+            } \
             if (vr[i] / 2 != k) return 3; \
             value[i] = m->name[vr[i] % 2]; \
         } \
         return n == size ? 0 : 3; \
     } \
     int fmi3Set##name(Model *m, const unsigned *vr, size_t n, const type *value, size_t size) { \
+        if (k == 0 && n == 1 && vr[0] == ARRAY) \
+            return size == m->size * m->size && of_array(m, ARRAY, (double *)value, true) ? 0 : 3; \
         for (size_t i = 0; i < n; i++) { \
-            if (k == 3 && vr[i] == MODE) m->mode = (int32_t)value[i]; \
+            if (k == 6 && vr[i] == SIZE) { \
+                if (!m->configuring || value[i] > 3) return 3; \
+                m->size = (uint64_t)value[i]; \
+            } else if (k == 3 && vr[i] == MODE) m->mode = (int32_t)value[i]; \
             else if (vr[i] == 2 * k) m->name[0] = value[i]; \
             else return 3; \
         } \
@@ -71,11 +95,24 @@ int fmi3SetString(Model *m, const unsigned *vr, size_t n, const char *const *val
     return 0;
 }
 
+int fmi3SetBinary(Model *m, const unsigned *vr, size_t n, const size_t *sizes,
+                  const unsigned char *const *value, size_t count) {
+    char text[64] = "blob ";
+    if (vr[0] != BLOB) return 3;
+    for (size_t i = 0; i < sizes[0] && i < 24; i++) sprintf(text + 5 + 2 * i, "%02x", value[0][i]);
+    say(text);
+    return 0;
+}
+int fmi3EnterConfigurationMode(Model *m) { m->configuring = true; return 0; }
+int fmi3ExitConfigurationMode(Model *m) { m->configuring = false; return 0; }
+
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources,
                                   bool visible, bool logging, bool events, bool early,
                                   const unsigned *required, size_t count, void *environment,
                                   void *log, void *update) {
-    return strcmp(token, "{types}") ? NULL : calloc(1, sizeof(Model));
+    Model *m = strcmp(token, "{types}") ? NULL : calloc(1, sizeof(Model));
+    if (m) m->size = 2;
+    return m;
 }
 void fmi3FreeInstance(Model *m) { say("free"); free(m); }
 int fmi3Terminate(Model *m) { say("terminate"); return 0; }

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.fmi.description import describe
 from tests.orchestrator.foreign_fmus import NUMBERS, c_fmu3, edited, python_fmu, run
 
@@ -128,3 +129,74 @@ def test_an_isolated_one_that_crashes(tmp_path: Path) -> None:
     said = "one: its process ended by SIGABRT at t = 0.046875 s"
     assert str(experiment.outcome.fault) == said
     assert len(found.haptics["time"]) == 4
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_whole_numbers_beyond_2_53_start_exactly(tmp_path: Path, isolate: str) -> None:
+    """The largest whole numbers of both wide types come out as they went in where a double holds
+    them; one that none holds is a fault, not another number."""
+    c_fmu3(tmp_path)
+    exact = {"in_UInt64": 2**64 - 2048, "in_Int64": -(2**63)}
+    starts = "".join(f"start.{k} = {v}\n" for k, v in exact.items())
+    experiment, found = run(tmp_path, ONE + isolate + starts)
+    assert experiment.outcome.fault is None
+    for name, value in exact.items():
+        assert int(found.haptics[f"one.{name.replace('in', 'out')}"][-1]) == value
+    for name, value in {"in_UInt64": 2**64 - 1, "in_Int64": 2**53 + 1}.items():
+        experiment, found = run(tmp_path, ONE + isolate + f"start.{name} = {value}\n")
+        said = f"one: {name.replace('in', 'out')} is {value}, which signals and results"
+        assert str(experiment.outcome.fault).startswith(said)
+
+
+def test_a_whole_number_beyond_its_type_is_refused(tmp_path: Path) -> None:
+    c_fmu3(tmp_path)
+    experiment, _ = run(tmp_path, ONE + f"start.in_Int64 = {2**63}\n")
+    said = f"one: in_Int64 cannot be {2**63}: Int64 holds {-(2**63)} to {2**63 - 1}"
+    assert str(experiment.outcome.fault).startswith(said)
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_a_structural_parameter_sizes_a_matrix_given_by_rows(tmp_path: Path, isolate: str) -> None:
+    """Set in configuration mode (the FMU refuses it elsewhere); sum of i times entry i."""
+    c_fmu3(tmp_path)
+    starts = "start.size = 3\nstart.array = [[1, 2, 3], [4, 5, 6], [7, 8, 10]]\n"
+    experiment, found = run(tmp_path, ONE + isolate + starts)
+    assert experiment.outcome.fault is None
+    entries = [1, 2, 3, 4, 5, 6, 7, 8, 10]
+    expected = sum((i + 1) * v for i, v in enumerate(entries))
+    np.testing.assert_array_equal(found.haptics["one.sum"], expected)
+    flat = "start.size = 3\nstart.array = [1, 2, 3, 4, 5, 6, 7, 8, 10]\n"
+    np.testing.assert_array_equal(run(tmp_path, ONE + flat)[1].haptics["one.sum"], expected)
+
+
+@pytest.mark.parametrize(
+    ("starts", "message"),
+    [
+        ("start.array = [[1, 2], [3]]\n", "rows of \\[2, 1\\] values for the 2 rows of 2 of array"),
+        ("start.array = [[1, 2, 3], [4, 5, 6]]\n", "rows of \\[3, 3\\] values"),
+        ("start.size = 3\nstart.array = [[1, 2], [3, 4]]\n", "for the 3 rows of 3 of array"),
+        ('start.blob = "0g"\n', "blob takes pairs of hexadecimal digits"),
+    ],
+)
+def test_what_fits_no_array_or_binary_is_refused(tmp_path: Path, starts: str, message: str) -> None:
+    c_fmu3(tmp_path)
+    with pytest.raises(SceneFault, match=message):
+        run(tmp_path, ONE + starts)
+
+
+def test_an_entry_alone_of_a_resized_array_is_refused(tmp_path: Path) -> None:
+    """The start values in modelDescription.xml are those of another size."""
+    c_fmu3(tmp_path)
+    experiment, _ = run(tmp_path, ONE + 'start.size = 3\nstart."array[1,1]" = 1.0\n')
+    assert "has no start value in an array of this size" in str(experiment.outcome.fault)
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_a_binary_input_starts_with_bytes(
+    tmp_path: Path, isolate: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    c_fmu3(tmp_path)
+    monkeypatch.setenv("FAULT_FMU_LOG", str(tmp_path / "log"))
+    experiment, _ = run(tmp_path, ONE + isolate + 'start.blob = "00ff10"\n')
+    assert experiment.outcome.fault is None
+    assert (tmp_path / "log").read_text().splitlines()[0] == "blob 00ff10"

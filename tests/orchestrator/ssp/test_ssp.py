@@ -116,6 +116,14 @@ def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path: Path) -> Non
     assert len(ended.results.haptics["a_b.y"]) == 11
 
 
+def test_version_2_in_the_namespaces_of_1_is_read(tmp_path: Path) -> None:
+    """As OMSimulator writes it."""
+    text = FOREIGN.replace('version="1.0"', 'version="2.0"')
+    assert text != FOREIGN
+    ended = simulate(foreign(tmp_path, text), tmp_path / "out", ["haptics.rate=50", "duration=0.2"])
+    np.testing.assert_allclose(ended.results.haptics["c.y"][-1], 2.0, rtol=1e-15)
+
+
 def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path: Path) -> None:
     with pytest.raises(SceneFault) as refused:
         open_scene.load(foreign(tmp_path))
