@@ -87,7 +87,9 @@ class InProcess3(InProcess):
         reference = (ctypes.c_uint * 1)(scalar.reference)
         if scalar.type == "Binary":
             content = bytes.fromhex(text)
-            sizes, values = (ctypes.c_size_t * 1)(len(content)), (ctypes.c_char_p * 1)(content)
+            sizes = (ctypes.c_size_t * 1)(len(content))
+            pointer = ctypes.POINTER(ctypes.c_uint8)
+            values = (pointer * 1)(ctypes.cast(ctypes.c_char_p(content), pointer))
             self._call("fmi3SetBinary", reference, 1, sizes, values, 1)
         else:
             self._call("fmi3SetString", reference, 1, (ctypes.c_char_p * 1)(text.encode()), 1)

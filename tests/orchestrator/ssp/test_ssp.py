@@ -118,8 +118,9 @@ def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path: Path) -> Non
 
 def test_version_2_in_the_namespaces_of_1_is_read(tmp_path: Path) -> None:
     """As OMSimulator writes it."""
-    text = FOREIGN.replace('version="1.0"', 'version="2.0"')
-    assert text != FOREIGN
+    head, version, rest = FOREIGN.rpartition('version="1.0"')
+    text = f'{head}version="2.0"{rest}'
+    assert version
     ended = simulate(foreign(tmp_path, text), tmp_path / "out", ["haptics.rate=50", "duration=0.2"])
     np.testing.assert_allclose(ended.results.haptics["c.y"][-1], 2.0, rtol=1e-15)
 
