@@ -70,7 +70,11 @@ def sanitized(component: Component, folder: Path, wrapper: Path = WRAPPER) -> Fm
     headers = Path(fmpy.__file__).parent / "c-code"
     command = ["gcc", *flags, "-fno-sanitize-recover=all", f"-I{room}", f"-I{headers}"]
     subprocess.run([*command, "-o", library, wrapper, "-lm"], check=True)
-    environment = {"LD_PRELOAD": _address_library(), "ASAN_OPTIONS": "detect_leaks=0"}
+    environment = {
+        "LD_PRELOAD": _address_library(),
+        "ASAN_OPTIONS": "detect_leaks=0",
+        "PYTHONMALLOC": "malloc",  # else small arrays lie beside each other in one block
+    }
     kind = "native, address and undefined-behaviour sanitizers"
     return Fmu(kind, library, GUID, _reals(component), True, environment)
 
