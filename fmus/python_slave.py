@@ -219,9 +219,11 @@ class HapticlinkSlave(Fmi2Slave):
         key = tuple(vrs)
         found = self._blocks.get(key)
         if found is None:
-            last = max(key, default=-1)
-            if last >= len(self._values):
-                raise ValueError(f"unknown value reference {last}; {len(self._values)} are known")
+            last, known = max(key, default=-1), range(len(self._values))
+            for vr in key:
+                if vr not in known:  # pythonfmu passes on references from 2^31 as negative ones
+                    unknown = f"unknown value reference {vr % 2**32}; {len(known)} are known"
+                    raise ValueError(unknown)
             run = key == tuple(range(last + 1 - len(key), last + 1))
             found = (slice(last + 1 - len(key), last + 1) if run else None, last)
             if len(self._blocks) >= 1000:

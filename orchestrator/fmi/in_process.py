@@ -27,6 +27,7 @@ from hapticlink.orchestrator.fmi.input_derivatives import Varying
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 from hapticlink.orchestrator.fmi.python_exit import release_at_exit
 from hapticlink.orchestrator.fmi.retry import Retry, Saved
+from hapticlink.orchestrator.fmi.slave_module import require_slave_module
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
 from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
@@ -76,6 +77,7 @@ class InProcess(Instance):
             instanceName=self.name,
         )
         release_at_exit(slave.dll)
+        require_slave_module(slave.dll, self._folder)
         slave.instantiate(callbacks=messages.callbacks(self._key), loggingOn=True)
         return slave
 

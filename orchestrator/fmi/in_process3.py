@@ -16,6 +16,7 @@ from hapticlink.orchestrator.fmi.in_process import WARNING, InProcess
 from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.python_exit import release_at_exit
+from hapticlink.orchestrator.fmi.slave_module import require_slave_module
 from hapticlink.orchestrator.fmi.start_values import wide
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
@@ -31,6 +32,7 @@ class InProcess3(InProcess):
             instanceName=self.name,
         )
         release_at_exit(slave.dll)
+        require_slave_module(slave.dll, self._folder)
 
         def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:
             keep(self._key, status, message)

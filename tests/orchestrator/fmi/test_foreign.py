@@ -345,7 +345,7 @@ def findings(folder: Path, text: str) -> dict[str, tuple[int | None, str]]:
         ("\n[[conn", "\nrate = 'graphics'\n[[conn", "fmu[1] (takes).rate", 11, "no graphics rate"),
         ("\n[[conn", "\nstart.gan = 1\n[[conn", "fmu[1] (takes).start.gan", 11, "mean 'gain'"),
         ("\n[[conn", "\nstart.y = 1\n[[conn", "fmu[1] (takes).start.y", 11, "causality is output"),
-        ("\n[[conn", "\nstart.y = 1\n[[conn", "fmu[1] (takes).start.y", 11, "take one: u, on, gain"),
+        ("\n[[conn", "\nstart.y = 1\n[[conn", "fmu[1] (takes).start.y", 11, "one: u, on, gain"),
         ("\n[[conn", "\nstart.on = 1\n[[conn", "fmu[1] (takes).start.on", 11, "true or false"),
         ("\n[[conn", "\nstart.u = [1, 2]\n[[conn", "fmu[1] (takes).start.u", 11, "2 values"),
         ("\n[[conn", "\nsteps = 1\n[[conn", "fmu[1] (takes).steps", 11, "unknown key"),

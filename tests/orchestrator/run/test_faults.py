@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -423,6 +424,21 @@ def test_bad_fmus_are_refused_before_anything_runs(tmp_path: Path) -> None:
     with pytest.raises(InputFault, match="damaged, not a readable zip archive"):
         run(tmp_path, ONE.format("broken.fmu"))
     assert json.loads((tmp_path / "out" / "run.json").read_text())["fault"]
+
+
+@pytest.mark.parametrize("gone", [".py", "slavemodule.txt"])
+def test_a_python_fmu_without_its_module_is_told(tmp_path: Path, gone: str) -> None:
+    """The libraries of pythonfmu crash the process."""
+    path = python_fmu(tmp_path, "Bare")
+    with zipfile.ZipFile(path) as archive:
+        entries = {n: archive.read(n) for n in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in entries.items():
+            if not name.startswith("resources/") or not name.endswith(gone):
+                archive.writestr(name, content)
+    experiment, _ = run(tmp_path, ONE.format("Bare.fmu"))
+    said = "could not be loaded: resources/slavemodule.txt names no module beside it; build"
+    assert said in str(experiment.outcome.fault)
 
 
 def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path: Path) -> None:
