@@ -220,8 +220,10 @@ class HapticlinkSlave(Fmi2Slave):
         found = self._blocks.get(key)
         if found is None:
             last = max(key, default=-1)
-            if last >= len(self._values):
-                raise ValueError(f"unknown value reference {last}; {len(self._values)} are known")
+            # pythonfmu passes those of more than 31 bits as negative numbers.
+            if wrong := [vr for vr in key if not 0 <= vr < len(self._values)]:
+                said = f"unknown value reference {wrong[0] % 2**32}"
+                raise ValueError(f"{said}; {len(self._values)} are known")
             run = key == tuple(range(last + 1 - len(key), last + 1))
             found = (slice(last + 1 - len(key), last + 1) if run else None, last)
             if len(self._blocks) >= 1000:

@@ -114,6 +114,13 @@ def describe(path: Path) -> Description:
                 for v in model.modelVariables
                 for s in numbers(v, version[0], v.name in relative, bounded=block is not None)
             )
+            strings = (v for v in model.modelVariables if v.type == "String" and not v.shape)
+            texts, of = tuple(text(v) for v in strings), derivatives(model)
+            dependencies = {
+                output.variable.name: frozenset(v.name for v in output.dependencies)
+                for output in model.outputs
+                if output.dependencies is not None
+            }
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
         _require_binary(archive, model.coSimulation.modelIdentifier, version[0])
@@ -133,13 +140,9 @@ def describe(path: Path) -> Description:
         units,
         frozenset(capable),
         model.defaultExperiment and model.defaultExperiment.stepSize,
-        dependencies={
-            output.variable.name: frozenset(v.name for v in output.dependencies)
-            for output in model.outputs
-            if output.dependencies is not None
-        },
-        strings=tuple(text(v) for v in model.modelVariables if v.type == "String" and not v.shape),
-        derivatives=derivatives(model),
+        dependencies=dependencies,
+        strings=texts,
+        derivatives=of,
         kinds=declared.kinds,
         power=declared.power,
         springs=declared.springs,
