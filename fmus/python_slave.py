@@ -219,11 +219,11 @@ class HapticlinkSlave(Fmi2Slave):
         key = tuple(vrs)
         found = self._blocks.get(key)
         if found is None:
-            last, known = max(key, default=-1), range(len(self._values))
-            for vr in key:
-                if vr not in known:  # pythonfmu passes on references from 2^31 as negative ones
-                    unknown = f"unknown value reference {vr % 2**32}; {len(known)} are known"
-                    raise ValueError(unknown)
+            last = max(key, default=-1)
+            # pythonfmu passes those of more than 31 bits as negative numbers.
+            if wrong := [vr for vr in key if not 0 <= vr < len(self._values)]:
+                said = f"unknown value reference {wrong[0] % 2**32}"
+                raise ValueError(f"{said}; {len(self._values)} are known")
             run = key == tuple(range(last + 1 - len(key), last + 1))
             found = (slice(last + 1 - len(key), last + 1) if run else None, last)
             if len(self._blocks) >= 1000:

@@ -62,5 +62,5 @@ def _check_ssp(source: Source) -> None:
         say = "the FMUs of an SSP are made: change its scene and export that again"
         raise SceneFault(source.name, [Finding(".".join(k), say) for k in fixed])
     if missing := [n for n in needed if tuple(n[0].split(".")) not in keys]:
-        say = "neither it nor its FMUs' DefaultExperiment say: give e.g. --set {}={}"
+        say = "neither it nor the DefaultExperiment of its FMUs gives one: write e.g. --set {}={}"
         raise SceneFault(source.name, [Finding(key, say.format(key, v)) for key, v in missing])

@@ -95,6 +95,6 @@ def read_xml(archive: zipfile.ZipFile, entry: str) -> bytes:
     parser.StartDoctypeDeclHandler = refuse
     try:
         parser.Parse(text, True)
-    except expat.ExpatError as error:
+    except (expat.ExpatError, LookupError, ValueError) as error:  # of an encoding, the last two
         raise InputFault(f"{path}: {entry} is not well-formed XML: {error}") from error
     return text

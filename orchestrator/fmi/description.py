@@ -127,6 +127,14 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
                     resized=bool(sizes),
                 )
             )
+            written = ("String", "Binary")
+            strings = (v for v in model.modelVariables if v.type in written and not v.shape)
+            texts, of = tuple(text(v) for v in strings), derivatives(model)
+            dependencies = {
+                output.variable.name: frozenset(v.name for v in output.dependencies)
+                for output in model.outputs
+                if output.dependencies is not None
+            }
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
         _require_binary(archive, model.coSimulation.modelIdentifier, version[0])
@@ -146,15 +154,9 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         units,
         frozenset(capable),
         model.defaultExperiment and model.defaultExperiment.stepSize,
-        dependencies={
-            output.variable.name: frozenset(v.name for v in output.dependencies)
-            for output in model.outputs
-            if output.dependencies is not None
-        },
-        strings=tuple(
-            text(v) for v in model.modelVariables if v.type in ("String", "Binary") and not v.shape
-        ),
-        derivatives=derivatives(model),
+        dependencies=dependencies,
+        strings=texts,
+        derivatives=of,
         kinds=declared.kinds,
         power=declared.power,
         springs=declared.springs,

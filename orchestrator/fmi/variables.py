@@ -97,6 +97,7 @@ def numbers(
     kind = _CALLED.get((fmi, variable.type), variable.type)
     if kind not in TYPES:
         return
+    check(variable)
     names = _names(variable)
     starts = [_number(text) for text in (variable.start or "").split()] or [0.0]
     if len(starts) == 1:
@@ -146,7 +147,21 @@ def _nominal(variable: Any) -> float:
     return abs(float(given or 1.0)) or 1.0
 
 
+def check(variable: Any) -> None:
+    """Raises ValueError for a name with control characters, which the schemas of FMI 2.0 and 3.0
+    exclude too, and for a value reference that is no unsigned number of 32 bits, which a call would
+    cut to another variable's."""
+    name, reference = variable.name, variable.valueReference
+    if not name.isprintable():
+        raise ValueError(f"variable {name!r}: a name has printable characters only")
+    if not 0 <= reference < 2**32:
+        raise ValueError(
+            f"variable {name!r}: value reference {reference} is not from 0 to 2^32 - 1"
+        )
+
+
 def text(v: Any) -> Scalar:
+    check(v)
     about = v.causality or "local", None, v.variability
     return Scalar(v.name, v.valueReference, v.type, *about, initial=v.initial)
 

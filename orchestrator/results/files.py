@@ -74,8 +74,10 @@ class Recorder:
 
 
 def _quoted(name: str) -> str:
-    """A column name in CSV: quoted where it contains a comma, as those of matrix entries."""
-    return f'"{name}"' if "," in name else name
+    """A column name in CSV (RFC 4180): names of matrix entries contain a comma, those of FMUs
+    any printable character."""
+    doubled = name.replace('"', '""')
+    return f'"{doubled}"' if "," in name or '"' in name else name
 
 
 def write_json(path: Path, content: Mapping[str, Any], room: int = 0) -> None:

@@ -147,7 +147,8 @@ def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     branch = loc[-2] if len(loc) > 1 else None  # without a type, pydantic tried the default's
     this = table.get("type", branch) if isinstance(table, dict) else branch
     owners = [repr(name) for name, k in types.items() if key in schema.keys([k])]
-    if this in types and owners:
+    kind = types.get(this) if isinstance(this, str) else None
+    if kind and owners:
         return f"`{key}` belongs to type {' or '.join(owners)}, not {this!r}"
-    known = schema.keys([types[this]] if this in types else kinds)
+    known = schema.keys([kind] if kind else kinds)
     return f"unknown key; {near(key, sorted(known))}"

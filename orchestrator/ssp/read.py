@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import atexit
 import hashlib
-import json
 import re
 import shutil
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -27,8 +27,9 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.ssp import annotation
 from hapticlink.orchestrator.ssp.connections import Row, Wires
-from hapticlink.orchestrator.ssp.names import ANNOTATION, RUN, SSC, SSD, STRUCTURE
+from hapticlink.orchestrator.ssp.names import SSD, STRUCTURE
 from hapticlink.orchestrator.ssp.parameters import Parameters
 from hapticlink.orchestrator.ssp.tree import Part, Place, checked, dotted, tree, units
 
@@ -54,7 +55,7 @@ def tables(path: Path) -> dict[str, Any]:
         described = {place: describe(file) for place, file in files.items()}
         wires = Wires(path, system, described, defined)
         starts = Parameters(path, archive, wires).starts()
-    rest = _annotation(path, root)
+    rest = annotation.read(path, root)
     found: dict[str, Any] = {
         "title": root.get("description") or root.get("name") or path.stem,
         **rest,
@@ -96,9 +97,17 @@ def _experiment(
         if float(experiment.get("startTime", "0")):
             raise InputFault(f"{path}: starts at {experiment.get('startTime')} s; runs start at 0")
         found["duration"] = float(experiment.get("stopTime", ""))
-    steps = [exact(d.step_size) for d in described if d.step_size]
-    if "haptics" not in found and steps:
+    steps = [_seconds(d.step_size) for d in described if d.step_size]
+    if "haptics" not in found and steps and all(steps):
         found["haptics"] = {"rate": str(1 / min(steps))}
+
+
+def _seconds(text: str) -> Fraction:
+    """A step size; 0 for what is none."""
+    try:
+        return max(exact(text), Fraction(0))
+    except (ValueError, ZeroDivisionError):
+        return Fraction(0)
 
 
 def _names(places: Iterable[Place]) -> dict[Place, str]:
@@ -149,16 +158,3 @@ def _grouped(rows: list[Row], described: Mapping[Place, Description]) -> Iterato
         else:
             yield rows[i]
             i += 1
-
-
-def _annotation(path: Path, root: Element) -> dict[str, Any]:
-    for annotation in root.iterfind(f"{{{SSD}}}Annotations/{{{SSC}}}Annotation"):
-        if annotation.get("type") == ANNOTATION:
-            try:
-                found = json.loads(annotation.findtext(f"{{{RUN}}}Scene") or "")
-            except json.JSONDecodeError as error:
-                raise InputFault(f"{path}: annotation {ANNOTATION}: {error}") from error
-            if not isinstance(found, dict):
-                raise InputFault(f"{path}: annotation {ANNOTATION} holds no table")
-            return found
-    return {}

@@ -78,7 +78,7 @@ def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
         validate_tree(root, f"{schema}.xsd")
     except Exception as error:  # FMPy raises bare Exception
         what = str(error).removeprefix("Failed to validate SystemStructure.ssd:").strip()
-        raise InputFault(f"{path}: {entry} is no SSP 1.0 ({schema}): {what}") from error
+        raise InputFault(f"{path}: {entry} is no SSP 1.0 ({schema}): {what[:300]}") from error
     return fromstring(text)
 
 

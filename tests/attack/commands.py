@@ -44,7 +44,9 @@ class Place:
     def __init__(self, folder: Path) -> None:
         self.folder, self.out = folder, folder / "out"
         self._earlier, self._temporary = folder / "earlier", folder / "temporary"
-        self._temporary.mkdir()
+        self._here = folder / "here"
+        for each in (self._temporary, self._here):
+            each.mkdir()
         status, said = self._forked(["run", "pendulum", "--out", str(self._earlier)])
         assert status == 0, said
 
@@ -95,6 +97,7 @@ class Place:
         earlier = rows.stat().st_ino if rows.exists() else None
         process = os.fork()
         if process == 0:
+            os.chdir(self._here)
             _child(lambda: commands.main(arguments), told, self._temporary)
         begin, began = time.monotonic(), None
         while not (found := os.waitpid(process, os.WNOHANG))[0]:

@@ -36,7 +36,12 @@ def test_an_error_leaves_instance_and_process_whole(opened):
     at = opened("spring")
     fmu = Named(at).start()
     for _ in range(20):
-        for call in (lambda: fmu.slave.getReal([99]), lambda: fmu.slave.getInteger([0])):
+        for call in (
+            lambda: fmu.slave.getReal([99]),
+            lambda: fmu.slave.getReal([2**32 - 1]),  # -1 to pythonfmu, the last of an array
+            lambda: fmu.slave.setReal([0, 2**31], [1.0, 1.0]),
+            lambda: fmu.slave.getInteger([0]),
+        ):
             with pytest.raises(FMICallException) as raised:
                 call()
             assert raised.value.status == FATAL

@@ -1,0 +1,119 @@
+"""Options of the commands that are wrong: keys and values of --set, ranges of --vary, flags.
+
+python -m tests.attack.options --cases 4000
+"""
+
+from __future__ import annotations
+
+import random
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from hapticlink.orchestrator.scene import find
+from tests.attack import mutations
+from tests.attack.cases import Made, command
+from tests.attack.commands import Place
+from tests.attack.scenes import SMALL
+
+KINDS = ("set", "vary", "flags")
+WORDS = (
+    *("run", "info", "build", "export", "sweep", "schema", "--set", "--vary", "--out", "--explain"),
+    *("--plugin", "--jobs", "--runs", "--metric", "--scheduler", "--help", "--version", "--bogus"),
+    *(
+        "--",
+        "-",
+        "",
+        "=",
+        "--set=",
+        "--jobs=-1",
+        "--jobs=1e9",
+        "0",
+        "two",
+        "/dev/null",
+        "/dev/full",
+    ),
+    *(
+        "none.toml",
+        "none.ssp",
+        "none.csv",
+        ".",
+        "/",
+        "\udcff",
+        "closed-loop",
+        "pendulum",
+        "x" * 300,
+    ),
+)
+NUMBERS = ("0", "1", "-1", "1e400", "1e-400", "0.5", "nan", "inf", "1e9", "9" * 5000, "", "x", "²")
+
+
+def _keys(draw: random.Random) -> tuple[str, Any]:
+    """A dotted key of a scene, and what stands there."""
+    tables = tomllib.loads(find.find(draw.choice(SMALL))[1])
+    path = draw.choice([*mutations.places(tables)])
+    names = [str(name) for name in path]
+    for _ in range(draw.choice((0, 0, 1, 2))):
+        i = draw.randrange(len(names))
+        how = draw.randrange(4)
+        if how == 0:
+            names[i] = mutations.text(names[i], draw)
+        elif how == 1:
+            names[i] = draw.choice(mutations.TEXTS)
+        elif how == 2:
+            names.insert(i, draw.choice(mutations.TEXTS))
+        else:
+            names.pop(i)
+            names = names or [""]
+    return ".".join(names), mutations.at(tables, path)
+
+
+def _value(old: Any, draw: random.Random) -> str:
+    pool = (*mutations.NUMBERS, *mutations.TEXTS, *mutations.TABLES)
+    value = draw.choice((old, draw.choice(pool), draw.choice(pool)))
+    said = draw.choice((str(value), repr(value)))
+    return mutations.text(said, draw) if draw.random() < 0.4 else said
+
+
+def _range(draw: random.Random) -> str:
+    a, b, c = (draw.choice(NUMBERS) for _ in range(3))
+    return draw.choice((f"{a}..{b}", f"{a}..{b}..{c}", f"{a}..{b}:{c}", f"{a},{b},{c}", a))
+
+
+def arguments(kind: str, out: Path, draw: random.Random) -> list[str]:
+    """Of a command that writes to `out` at most."""
+    scene = draw.choice(SMALL)
+    short = ["--set", "duration=0.05", "--out", str(out)]
+    if kind == "set":
+        found = ["run", scene, *short]
+        for _ in range(draw.choice((1, 1, 2))):
+            key, old = _keys(draw)
+            found += ["--set", draw.choice((f"{key}={_value(old, draw)}", key))]
+        return found
+    if kind == "vary":
+        key, old = _keys(draw)
+        values = draw.choice((_range(draw), _value(old, draw)))
+        values = mutations.text(values, draw) if draw.random() < 0.3 else values
+        return ["sweep", scene, *short, "--jobs", "1", "--vary", f"{key}={values}"]
+    found = [draw.choice(("run", "info", "export", "build", "sweep", "schema")), scene, *short]
+    for _ in range(draw.choice((1, 2, 3))):
+        found.insert(draw.randrange(len(found) + 1), draw.choice(WORDS))
+    if draw.random() < 0.3:
+        found.pop(draw.randrange(len(found)))
+    return found
+
+
+def attack(number: int, seed: int) -> Iterator[Made]:
+    draw = random.Random(seed)
+    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+        place = Place(Path(folder))
+        for i in range(number):
+            kind = KINDS[i % len(KINDS)]
+            made = [a.replace("\0", "") for a in arguments(kind, place.out, draw)]
+            yield Made(kind, ascii(made)[:500], *place.made(made))
+
+
+if __name__ == "__main__":
+    command("options", "Options that are wrong.", attack, 4000)

@@ -1,0 +1,132 @@
+"""Exported SSPs with bytes, structure or annotation changed, each run by the command.
+
+python -m tests.attack.ssps --cases 400
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from html import escape, unescape
+from io import BytesIO
+from pathlib import Path
+from xml.etree import ElementTree
+
+from hapticlink.orchestrator import api
+from tests.attack import mutations
+from tests.attack.cases import Made, command
+from tests.attack.commands import Place
+
+SCENES = ("pendulum", "sampled-spring", "closed-loop")
+KINDS = ("bytes", "text", "elements", "annotation", "description")
+STRUCTURE, DESCRIPTION = "SystemStructure.ssd", "modelDescription.xml"
+_SCENE = re.compile(r"(<hapticlink:Scene>)(.*?)(</hapticlink:Scene>)", re.DOTALL)
+XML = (
+    *('encoding="martian"', "<!DOCTYPE a>", "&#0;", "&lol;", "<a>", "]]>", "1e999", "NaN", "-1"),
+    *("4294967297", "2147483649", "9" * 5000, "x" * 5000, "../../etc/passwd", "/etc/passwd"),
+)
+"""Words that hurt where an attribute or some text stands."""
+
+
+def entries(content: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(BytesIO(content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def packed(files: dict[str, bytes]) -> bytes:
+    made = BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return made.getvalue()
+
+
+def elements(text: bytes, draw: random.Random) -> bytes:
+    """XML with an element or attribute dropped, doubled, moved or of another value."""
+    root = ElementTree.fromstring(text)
+    every = [*root.iter()]
+    for _ in range(draw.choice((1, 1, 2, 3))):
+        node, other = draw.choice(every), draw.choice(every)
+        how = draw.randrange(6)
+        if how == 0 and len(node):
+            node.remove(draw.choice([*node]))
+        elif how == 1 and len(node):
+            node.append(draw.choice([*node]))
+        elif how == 2 and node is not other and other not in [*node.iter()]:
+            other.append(node) if node not in [*other.iter()] else None
+        elif node.attrib:
+            key = draw.choice([*node.attrib])
+            values = [v for e in every for v in e.attrib.values()]
+            if how == 3:
+                del node.attrib[key]
+            else:
+                words = [*XML, *mutations.TEXTS, draw.choice(values), draw.choice(values)]
+                word = re.sub("[^\t\n -\ud7ff]", "", draw.choice(words))
+                node.set(key, mutations.text(node.attrib[key], draw) if how == 4 else word)
+    return ElementTree.tostring(root, encoding="utf-8")
+
+
+def text(content: bytes, draw: random.Random) -> bytes:
+    """XML that may be none any more."""
+    found = content.decode()
+    for _ in range(draw.choice((1, 2))):
+        if draw.random() < 0.5:
+            i = draw.randrange(len(found))
+            found = found[:i] + draw.choice(XML) + found[i:]
+        else:
+            found = mutations.lines(found, draw)
+    return found.encode(errors="replace")
+
+
+def annotation(content: bytes, draw: random.Random) -> bytes:
+    def change(match: re.Match[str]) -> str:
+        tables = json.loads(unescape(match[2]))
+        for _ in range(draw.choice((1, 1, 2, 3))):
+            tables, _ = mutations.mutated(tables, draw)
+        made = json.dumps(tables)
+        made = mutations.text(made, draw) if draw.random() < 0.2 else made
+        return match[1] + escape(re.sub("[^\t\n -\ud7ff]", "", made)) + match[3]
+
+    return _SCENE.sub(change, content.decode()).encode(errors="replace")
+
+
+CHANGES = {"text": text, "elements": elements, "annotation": annotation}
+
+
+def changed(kind: str, content: bytes, draw: random.Random) -> bytes:
+    if kind == "bytes":
+        return mutations.flipped(content, draw)
+    files = entries(content)
+    if kind == "description":
+        name = draw.choice([name for name in files if name.endswith(".fmu")])
+        inside = entries(files[name])
+        change = draw.choice((text, elements))
+        inside[DESCRIPTION] = change(inside[DESCRIPTION], draw)
+        files[name] = packed(inside)
+    else:
+        files[STRUCTURE] = CHANGES[kind](files[STRUCTURE], draw)
+    return packed(files)
+
+
+def attack(number: int, seed: int) -> Iterator[Made]:
+    draw = random.Random(seed)
+    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+        whole = [
+            api.export(name, {"duration": 0.05}, out=Path(folder) / f"{name}.ssp").read_bytes()
+            for name in SCENES
+        ]
+        place = Place(Path(folder))
+        path = Path(folder) / "attack.ssp"
+        for i in range(number):
+            kind, which = KINDS[i % len(KINDS)], draw.randrange(len(SCENES))
+            path.write_bytes(changed(kind, whole[which], draw))
+            made = place.made(["run", str(path), "--out", str(place.out)])
+            yield Made(kind, f"{SCENES[which]}, case {i}", *made)
+
+
+if __name__ == "__main__":
+    command("ssps", "Exported SSPs that are changed.", attack, 400)

@@ -1,0 +1,37 @@
+"""Names and value references of foreign FMUs: none shifts a column, none is another variable's."""
+
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.description import describe
+from tests.orchestrator.fmi.test_archives import fmu
+from tests.orchestrator.foreign_fmus import DESCRIPTION, edited, python_fmu, run
+
+FMU = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
+
+
+@pytest.mark.parametrize("name", ["a,b", '"a", b', '"', '""', "'", ',",', "a b", "λ[1,2]"])
+def test_any_name_comes_back_from_the_csv(tmp_path: Path, name: str) -> None:
+    xml = name.replace('"', "&quot;")
+    path = python_fmu(tmp_path, "Gives", "self.y = 7.0")
+    edited(path, lambda text: text.replace('name="y"', f'name="{xml}"'))
+    _, results = run(tmp_path, FMU)
+    assert results.haptics.columns == ("time", f"gives.{name}", "gives.steps")
+    assert results.haptics[f"gives.{name}"][-1] == 7.0
+    assert results.haptics["gives.steps"][-1] == 32.0
+
+
+@pytest.mark.parametrize("name", ["a&#10;b", "a&#13;", "a&#9;b", "a&#x202e;b"])
+def test_names_that_are_no_line(tmp_path: Path, name: str) -> None:
+    text = DESCRIPTION.replace('name="y"', f'name="{name}"')
+    with pytest.raises(InputFault, match="printable characters"):
+        describe(fmu(tmp_path / "model.fmu", text))
+
+
+@pytest.mark.parametrize("reference", [2**32, 2**32 + 1, -1, 2**64])
+def test_value_references_are_of_32_bits(tmp_path: Path, reference: int) -> None:
+    text = DESCRIPTION.replace('valueReference="1"', f'valueReference="{reference}"')
+    with pytest.raises(InputFault, match=f"'y': value reference {reference} is not from 0 to"):
+        describe(fmu(tmp_path / "model.fmu", text))
