@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.components.device import pantograph
+from hapticlink.components.device.torques import numbers
 from hapticlink.components.specs.device import Device
 
 Field = NDArray[np.float64]
@@ -19,15 +20,11 @@ POINTS, ANGLES = 81, 48
 Range = tuple[float, float]
 
 
-def _numbers(device: Device) -> dict[str, Any]:
-    return {k: v for k, v in asdict(device).items() if isinstance(v, float | int)}
-
-
 def margin(device: Device, poses: Field) -> Field:
     """Least distance (m) of an arm to its stops, shape (n,), at poses (x m, y m, theta rad) of
     shape (n, 3); negative beyond them."""
     pose = ca.SX.sym("pose", 3)
-    least = ca.Function("margin", [pose], [ca.mmin(pantograph.margins(pose, _numbers(device)))])
+    least = ca.Function("margin", [pose], [ca.mmin(pantograph.margins(pose, numbers(device)))])
     given, found = np.ascontiguousarray(poses, float), np.zeros(len(poses))
     buffer: Any
     buffer, evaluate = least.map(len(poses)).buffer()  # a plain call takes ten times as long
@@ -40,7 +37,7 @@ def margin(device: Device, poses: Field) -> Field:
 def links(device: Device, pose: Sequence[float]) -> Field:
     """Base joint, elbow and crank end (x, y m) of the four arms at a pose, shape (4, 3, 2); NaN
     elbows where an arm does not reach."""
-    p, at = _numbers(device), ca.SX.sym("pose", 3)
+    p, at = numbers(device), ca.SX.sym("pose", 3)
     rows = []
     for arm in pantograph.arms(at, p):
         elbow = arm.base + p["proximal_length"] * arm.proximal_direction

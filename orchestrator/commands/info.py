@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 
 from hapticlink.orchestrator.base.say import say
-from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, options
+from hapticlink.orchestrator.commands.options import (
+    Out,
+    Scene,
+    Set,
+    Swap,
+    default_folder,
+    options,
+)
 from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.results.summary import MECHANISM
 from hapticlink.orchestrator.system.system import System
@@ -18,12 +26,28 @@ if TYPE_CHECKING:
     from hapticlink.orchestrator.base.ticks import Timeline
 
 
+Draw = Annotated[
+    bool,
+    Parameter(
+        negative="",
+        help="Draw the mechanism where it starts, and the device in its workspace, into OUT "
+        "(default info/<scene>).",
+    ),
+]
+
+
 def info(
-    scene: Scene | None = None, /, *, set: Set = None, swap: Swap = None, out: Out = None
+    scene: Scene | None = None,
+    /,
+    *,
+    set: Set = None,
+    swap: Swap = None,
+    draw: Draw = False,
+    out: Out = None,
 ) -> int:
     """Tell what a scene consists of: rates, FMUs, connections, holds; where the device's workspace
     lies, and whether the scene starts in it; what it needs and leaves out, and what that saves.
-    Without SCENE, list the shipped scenes. With OUT, draw the workspace there, as workspace.png.
+    Without SCENE, list the shipped scenes.
     """
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.plan import sample_ages
@@ -38,7 +62,7 @@ def info(
     read = api.scene(scene, options(set, swap))
     with built(read) as made:
         time = made.timeline
-        start = at_start(made) if read.linkage and (read.linkage.loop or read.device) else {}
+        start = at_start(made) if read.linkage else {}
     say(f"{read.title}\n{read.description.strip()}".strip())
     say(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
     if read.linkage and start:
@@ -60,21 +84,33 @@ def info(
     for line in summary.replaced({n: asdict(r) for n, r in made.replacements.items()}):
         say(f"  {line}")
     if read.device:
-        _workspace(read, [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)], out)
+        from hapticlink.orchestrator.results import workspace
+
+        say("\ndevice's workspace")
+        for line in workspace.lines(read.device, _pose(start)):
+            say(f"  {line}")
     _needs(read, time)
+    if draw or out:
+        _draw(read, start, out or default_folder("info", scene))
     return 0
 
 
-def _workspace(scene: Any, start: list[float], out: Path | None) -> None:
-    from hapticlink.orchestrator.results import folders, workspace
+def _pose(start: dict[str, float]) -> list[float]:
+    """Of the operational point at the start: x m, y m, theta rad."""
+    return [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)]
 
-    say("\ndevice's workspace")
-    for line in workspace.lines(scene.device, start):
-        say(f"  {line}")
-    if out:
-        path = folders.ensure(out) / "workspace.png"
+
+def _draw(scene: Any, start: dict[str, float], out: Path) -> None:
+    from hapticlink.orchestrator.results import folders, mechanism_drawing, workspace
+
+    figures = {}
+    if q := coordinates(start):
+        figures["mechanism"] = mechanism_drawing.figure(scene, q)
+    if scene.device:
         title = f"Device and its workspace: {scene.title}"
-        figure = workspace.draw(scene.device, start, title)
+        figures["workspace"] = workspace.draw(scene.device, _pose(start), title)
+    for name, figure in figures.items():
+        path = folders.ensure(out) / f"{name}.png"
         figure.savefig(path, dpi=150, metadata={"Software": None})  # the same bytes every time
         say(f"  {path}")
 

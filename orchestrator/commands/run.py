@@ -43,7 +43,7 @@ def run(
     if made.fault:
         say(f"hapticlink: {made.fault}", file=sys.stderr)
     say(f"{default_folder('runs', scene).name}: {summary.ending(made)}")
-    for line in summary.lines(made):
+    for line in (*summary.numbers(made), *summary.lines(made)):
         say(f"  {line}")
     wall_time = made.run["timings"]["run"]
     speed = made.run["end"]["time"] / wall_time

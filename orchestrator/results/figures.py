@@ -11,33 +11,37 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.results import mechanism_drawing
+from hapticlink.orchestrator.results.figure_axes import last_time, short, titled
+from hapticlink.orchestrator.results.force_figure import forces
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import DEVICE, MECHANISM, table_of, tracking
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CONTACT = "virtual_mechanism.F_env"
-_ENDS = {
-    "stop_when": "stop_when ended the run",
-    "terminated": "an FMU ended the run",
-    "diverged": "the run diverged",
-    "interrupted": "the run was interrupted",
-    "running": "the last row so far",
-}
+CONTACT, COORDINATES = "virtual_mechanism.F_env", "virtual_mechanism.q"
 
 
 def figures(results: Results) -> dict[str, Figure]:
     """Figures of a run by name, as far as it has the signals; none before its first step."""
     drawn: dict[str, Figure] = {}
-    if not _last(results):
+    if not last_time(results):
         return drawn
+    if coordinates := table_of(results, COORDINATES):
+        drawn["mechanism"] = _mechanism(results, coordinates)
     if table_of(results, MECHANISM):
         drawn["trajectories"] = _trajectories(results)
         if table_of(results, DEVICE):
             drawn["distance"] = _distance(results)
+    if found := forces(results, _part(results, "device", Device)):
+        drawn["forces"] = found
     if contact := table_of(results, CONTACT):
         drawn["contact"] = _contact(results, contact)
     counting = next((t for t in results.tables.values() if _count(t)), None)
@@ -56,34 +60,23 @@ def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
     return [f"{name}.png" for name in figures]
 
 
-def _last(results: Results) -> float:
-    """The time (s) of the last row of the first table."""
-    rows = next(iter(results.tables.values()))["time"]
-    return float(rows[-1]) if len(rows) else 0.0
+def _part(results: Results, name: str, kind: Any) -> Any:
+    """A table of the scene as its record, None where the scene has none."""
+    return TypeAdapter(kind | None).validate_python(results.run["scene"][name])
 
 
-def short(value: float) -> str:
-    """A number with three significant digits, with an exponent only if very large or small."""
-    if value and not 1e-3 <= abs(value) < 1e6:
-        return f"{value:.3g}"
-    return np.format_float_positional(value, precision=3, fractional=False, trim="-")
-
-
-def _axes(results: Results, title: str, x: str, y: str) -> tuple[Figure, Any]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    end = results.run["end"]
-    if end["reason"] != "duration":
-        why = _ENDS.get(end["reason"], "a fault ended the run")
-        title += f", until {why} at {short(_last(results))} s"
-    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    axes.set(xlabel=x, ylabel=y)
-    axes.set_title(fill(title, 70), fontsize="medium")
-    axes.grid(alpha=0.3)
-    return figure, axes
+def _mechanism(results: Results, table: Table) -> Figure:
+    linkage: Linkage = _part(results, "linkage", Linkage)
+    q = table[COORDINATES]
+    title = f"{results.run['scene']['title']} at the start and at {short(last_time(results))} s"
+    figure, axes = titled(results, title, "x (mm)", "y (mm)")
+    device, contacts = _part(results, "device", Device), _part(results, "contacts", Contacts)
+    for label, style, path in _paths(results):
+        axes.plot(*path.T, style, color=mechanism_drawing.RED, lw=0.8, label=f"path of {label}")
+    mechanism_drawing.draw(axes, linkage, q[0], q[-1], device, contacts)
+    figure.set_size_inches(7.4, 6.4)
+    figure.legend(fontsize="x-small", ncols=3, loc="outside lower center")
+    return figure
 
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
@@ -112,34 +105,15 @@ def _trajectories(results: Results) -> Figure:
     else:
         reach = np.linalg.norm(paths[0][2] - paths[0][2][0], axis=1).max()
         title = f"The operational point moves up to {short(reach)} mm from its start"
-    figure, axes = _axes(results, title, "x (mm)", "y (mm)")
+    figure, axes = titled(results, title, "x (mm)", "y (mm)")
     for label, style, path in paths:
         axes.plot(*path.T, style, label=label)
     axes.plot(*np.array([path[0] for _, _, path in paths]).T, "k.", label="start")
-    _obstacles(axes, results.run["scene"]["contacts"])
+    if contacts := _part(results, "contacts", Contacts):
+        mechanism_drawing.obstacles(axes, contacts)
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(fontsize="small")
     return figure
-
-
-def _obstacles(axes: Any, contacts: dict[str, Any] | None) -> None:
-    from matplotlib.patches import Circle, Patch, Polygon
-
-    if not contacts:
-        return
-    look: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "0.4"}
-    found: list[Patch] = [
-        Circle(tuple(1e3 * x for x in d["center"]), d["radius"] * 1e3, **look)
-        for d in contacts["disc"]
-    ]
-    found += [Polygon(np.array(p["corners"]) * 1e3, **look) for p in contacts["polygon"]]
-    if contacts["enclosure"]:
-        walls = np.array(contacts["enclosure"]) * 1e3
-        found.append(Polygon(walls, fill=False, edgecolor="0.4", label="enclosure"))
-    if contacts["disc"] or contacts["polygon"]:
-        found[0].set_label("obstacles")
-    for patch in found:
-        axes.add_patch(patch)
 
 
 def _distance(results: Results) -> Figure:
@@ -149,7 +123,7 @@ def _distance(results: Results) -> Figure:
         f"Distance of handle to operational point: at most {short(gap[at])} mm, "
         f"at {short(time[at])} s"
     )
-    figure, axes = _axes(results, title, "time (s)", "distance |x_S - x_D| (mm)")
+    figure, axes = titled(results, title, "time (s)", "distance |x_S - x_D| (mm)")
     axes.plot(time, gap)
     return figure
 
@@ -158,7 +132,7 @@ def _contact(results: Results, table: Table) -> Figure:
     force = np.linalg.norm(table[CONTACT][:, :2], axis=1)
     share = 100 * float((force > 0).mean())
     title = f"Contacts push with at most {short(force.max())} N, in {short(share)} % of the samples"
-    figure, axes = _axes(results, title, "time (s)", "|F_env| of the contacts (N)")
+    figure, axes = titled(results, title, "time (s)", "|F_env| of the contacts (N)")
     axes.plot(table["time"], force)
     return figure
 
@@ -175,7 +149,7 @@ def _constraints(results: Results, table: Table) -> Figure:
     most = int(count.max())
     share = 100 * float((count == most).mean())
     title = f"{most} constrained directions in {share:.3g} % of the samples"
-    figure, axes = _axes(results, title, "time (s)", "constrained directions")
+    figure, axes = titled(results, title, "time (s)", "constrained directions")
     axes.step(time, count, where="post")
     axes.set_yticks(range(most + 2))
     return figure
@@ -195,7 +169,7 @@ def _energies(results: Results, generated: dict[str, float]) -> Figure:
     verb = "generate" if total >= 0 else "dissipate"
     title = f"The holds {verb} {short(abs(total) * per)} {unit} in all"
     label = f"energy generated by the hold ({unit}; negative: dissipated)"
-    figure, axes = _axes(results, title, label, "")
+    figure, axes = titled(results, title, label, "")
     values = [value * per for value in generated.values()]
     bars = axes.barh([fill(name, 28) for name in generated], values, height=0.5)
     axes.bar_label(bars, [short(value) for value in values], padding=3)

@@ -8,8 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from hapticlink.orchestrator.results.figure_axes import short
+from hapticlink.orchestrator.results.force_figure import wrenches
 from hapticlink.orchestrator.results.tables import Results
-from hapticlink.orchestrator.results.tracking import DEVICE, folded, table_of
+from hapticlink.orchestrator.results.tracking import (
+    DEVICE,
+    folded,
+    has_tracking,
+    pose_error,
+    table_of,
+)
 
 
 def ending(results: Results) -> str:
@@ -23,6 +31,23 @@ def ending(results: Results) -> str:
         "duration": "done",
     }
     return f"{how.get(end['reason'], end['reason'])} at {end['time']:.6g} s"
+
+
+def numbers(results: Results) -> Iterator[str]:
+    """What one would open the figures for: tracking error, largest forces, closure of the loops."""
+    if has_tracking(results) and len((error := pose_error(results)).time):
+        distance = error.distance
+        rms = float(np.sqrt(np.mean(distance**2)))
+        yield (
+            f"handle at most {short(distance.max())} mm from the operational point, "
+            f"{short(rms)} mm RMS; at most {short(error.angle.max())} rad"
+        )
+    if found := wrenches(results):
+        peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())
+        yield f"largest forces: {'; '.join(peaks)}"
+    table = table_of(results, CLOSURE)
+    if table and len(table["time"]):
+        yield f"loops close within {table[CLOSURE].max():.2g} m"
 
 
 def lines(results: Results) -> Iterator[str]:
@@ -117,3 +142,4 @@ _UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}
 
 MECHANISM = "virtual_mechanism"
 MARGIN = "haptic_device.workspace_margin"
+CLOSURE = "virtual_mechanism.closure_error"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hapticlink.orchestrator.results.figures import short
+from hapticlink.orchestrator.results.figure_axes import short
 from hapticlink.orchestrator.sweep.row import Row
 
 UNITS = {"rate": "Hz", "duration": "s", "phase": "s", "mass": "kg", "inertia": "kg m2"}

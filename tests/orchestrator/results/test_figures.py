@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import figures, tables
+from hapticlink.orchestrator.results import figure_axes, figures, tables
 from hapticlink.orchestrator.sweep import title
 
 
@@ -16,7 +16,7 @@ from hapticlink.orchestrator.sweep import title
      (3.21e-9, "3.21e-09")],
 )  # fmt: skip
 def test_numbers_are_three_digits_without_powers_of_ten(value: float, text: str) -> None:
-    assert figures.short(value) == text
+    assert figure_axes.short(value) == text
 
 
 def drawn(results: tables.Results) -> dict[str, Any]:
@@ -30,7 +30,8 @@ def run(scene: str, out: Path, *options: str) -> tables.Results:
 
 def test_an_early_end_stands_in_every_title(tmp_path: Path) -> None:
     found = drawn(run("closed-loop", tmp_path, "stop_when='virtual_mechanism.x[1]<0.044'"))
-    assert {"trajectories", "distance", "constraints", "energies"} == set(found)
+    drawings = {"mechanism", "trajectories", "distance", "forces", "constraints", "energies"}
+    assert drawings == set(found)
     for axes in found.values():
         assert "until stop_when ended the run at 0." in axes.get_title().replace("\n", " ")
     names = [text.get_text() for text in found["trajectories"].get_legend().get_texts()]

@@ -1,0 +1,29 @@
+"""The torques of the device's motors, in numbers."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.components.device import pantograph
+from hapticlink.components.specs.device import Device
+
+Field = NDArray[np.float64]
+
+
+def numbers(device: Device) -> dict[str, Any]:
+    """The device's parameters by name."""
+    return {k: v for k, v in asdict(device).items() if isinstance(v, float | int)}
+
+
+def motor_torques(device: Device, wrenches: Field, poses: Field) -> Field:
+    """Torques (N.m), (k, 4), of wrenches (N, N, N.m) at poses (m, m, rad) of the handle, both
+    (k, 3), as the device's motors give them: of least norm, and limited."""
+    wrench, pose = ca.SX.sym("wrench", 3), ca.SX.sym("pose", 3)
+    tau = pantograph.motor_torques(wrench, pose, numbers(device))
+    found = ca.Function("torques", [wrench, pose], [tau]).map(len(wrenches))
+    return np.asarray(found(wrenches.T, poses.T)).T

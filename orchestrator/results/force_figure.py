@@ -1,0 +1,69 @@
+"""Forces, moments and motor torques of a haptic run over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator.results.figure_axes import short, titled
+from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.tracking import table_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WRENCHES = {
+    "hand.F": "hand, F_hand",
+    "controller.F_drift": "virtual coupling, F_drift",
+    "controller.F_constraint": "topology controller, F_T",
+    "virtual_mechanism.F_env": "contacts, F_env",
+}
+"""By signal, what it is called; each is (N, N, N.m)."""
+MOTOR, HANDLE = "controller.F_motor", "haptic_device.x"
+
+
+def wrenches(results: Results) -> dict[str, tuple[Vector, Vector, Vector]]:
+    """By name: times (s), force (N) and moment (N.m) of each wrench that the run has."""
+    found = {}
+    for signal, name in WRENCHES.items():
+        if (table := table_of(results, signal)) and len(table["time"]):
+            F = table[signal]
+            found[name] = table["time"], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
+    return found
+
+
+def torques(results: Results, device: Device | None) -> tuple[Vector, Vector] | None:
+    """Times (s) and torques (N.m) of the four motors, None without a device that is driven."""
+    # casadi, which the terminal's lines, of the same module, can do without
+    from hapticlink.components.device.torques import motor_torques
+
+    table = table_of(results, MOTOR)
+    if device is None or table is None or HANDLE not in table or not len(table["time"]):
+        return None
+    return table["time"], motor_torques(device, table[MOTOR], table[HANDLE])
+
+
+def forces(results: Results, device: Device | None) -> Figure | None:
+    """Forces, moments and, against their limit, motor torques; None for a run without wrenches."""
+    found, driven = wrenches(results), torques(results, device)
+    if not found:
+        return None
+    largest, (_, force, _) = max(found.items(), key=lambda item: item[1][1].max())
+    title = f"Largest force {short(force.max())} N, of {largest}"
+    labels = ["force (N)", "moment (N.m)", *(["motor torque (N.m)"] if driven else [])]
+    if driven and device:
+        share = 100 * np.abs(driven[1]).max() / device.torque_limit
+        title += f"; motors use {short(share)} % of their torque"
+    figure, axes = titled(results, title, "time (s)", *labels)
+    for name, (time, force, moment) in found.items():
+        axes[0].plot(time, force, lw=1, label=name)
+        axes[1].plot(time, moment, lw=1)
+    axes[0].legend(fontsize="x-small", ncols=2)
+    if driven and device:
+        axes[2].plot(driven[0], driven[1], lw=1, label=[f"motor {i}" for i in (1, 2, 3, 4)])
+        for limit in (-device.torque_limit, device.torque_limit):
+            axes[2].axhline(limit, color="k", lw=0.8, ls="--")
+        axes[2].legend(fontsize="x-small", ncols=4)
+    return figure

@@ -1,0 +1,275 @@
+"""A drawing of a scene's mechanism: bodies, joints, operational points, walls and the device."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.components.device.workspace import links
+from hapticlink.components.linkage.poses import poses
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.linkage import Body, Joint, Linkage
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from hapticlink.orchestrator.scene.scene import Scene
+
+Pose = NDArray[np.float64]
+NAMED = 10
+"""Number of bodies up to which names are written beside them."""
+MM = 1e3
+RED = "#cc3311"
+BODIES = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")
+"""The bright scheme of P. Tol, which colour-blind readers can tell apart."""
+
+
+def draw(
+    axes: Axes,
+    linkage: Linkage,
+    q: Sequence[float],
+    end: Sequence[float] | None = None,
+    device: Device | None = None,
+    contacts: Contacts | None = None,
+) -> None:
+    """The linkage at joint coordinates q, in mm; its pose at `end` as thin lines; what the links
+    can touch; the arms of the device, its handle at the operational point, as far as they reach
+    into the picture."""
+    drawing = _Drawing(axes, linkage, poses(linkage, [q]))
+    if contacts:
+        obstacles(axes, contacts)
+    if end is not None:
+        _Drawing(axes, linkage, poses(linkage, [end])).outlines()
+    drawing.bodies()
+    drawing.joints()
+    drawing.springs()
+    drawing.points()
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+    if device:
+        limits = axes.get_xlim(), axes.get_ylim()
+        _device(axes, device, drawing.operational_pose())
+        axes.set(xlim=limits[0], ylim=limits[1])
+    axes.set_aspect("equal", adjustable="box" if device else "datalim")
+
+
+def figure(scene: Scene, q: Sequence[float]) -> Figure:
+    """A figure of the scene's mechanism at joint coordinates q."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    made = Figure(figsize=(7.4, 6.4), layout="constrained")
+    FigureCanvasAgg(made)
+    axes = made.add_subplot()
+    assert scene.linkage is not None
+    draw(axes, scene.linkage, q, None, scene.device, scene.contacts)
+    axes.set_title(fill(f"{scene.title} at the start", 70), fontsize="medium")
+    axes.grid(alpha=0.3)
+    made.legend(fontsize="x-small", ncols=3, loc="outside lower center")
+    return made
+
+
+class _Drawing:
+    """One pose of a linkage."""
+
+    def __init__(self, axes: Axes, linkage: Linkage, at: dict[str, Pose]) -> None:
+        self.axes, self.linkage = axes, linkage
+        self._at = {name: found[0] for name, found in at.items()}
+        self._names = len(linkage.body) <= NAMED
+
+    def _world(self, body: str, point: Sequence[float] | None) -> Pose:
+        """The place (mm) of a point of a body."""
+        x, y, angle = self._at[body]
+        c, s = np.cos(angle), np.sin(angle)
+        px, py = point or (0.0, 0.0)
+        return np.array([x + c * px - s * py, y + s * px + c * py]) * MM
+
+    def _attached(self, body: str) -> Iterator[Pose]:
+        """What a body holds together: its joints, closures and operational points."""
+        for joint in self.linkage.joint:
+            if joint.child == body:
+                yield self._world(body, joint.at_child)
+            if joint.parent == body and joint.type != "free":
+                yield self._world(body, joint.at_parent)
+        for loop in self.linkage.loop:
+            for name, at in zip(loop.bodies, loop.at, strict=True):
+                if name == body:
+                    yield self._world(body, at)
+        for point in (self.linkage.operational_point, *self.linkage.point):
+            if point.body == body:
+                yield self._world(body, point.at)
+
+    def _outline(self, body: Body) -> Pose:
+        """The corners of the convex hull of what is attached, (k, 2); a line has two, a body that
+        holds one thing together one."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        found = np.unique(np.round(np.array(list(self._attached(body.name))), 9), axis=0)
+        try:
+            return found[ConvexHull(found).vertices] if len(found) > 2 else found
+        except QhullError:  # all on one line
+            along = found @ (found[-1] - found[0])
+            return found[[along.argmin(), along.argmax()]]
+
+    def outlines(self) -> None:
+        """The bodies as thin lines."""
+        for i, body in enumerate(self.linkage.body):
+            corners = self._outline(body)
+            closed = np.vstack([corners, corners[:1]])
+            label = "at the end" if i == 0 else None
+            self.axes.plot(*closed.T, color="0.55", lw=1.0, ls="--", zorder=2, label=label)
+
+    def bodies(self) -> None:
+        """Each body with its name, centre of mass and, where it has one, shape for contacts."""
+        from matplotlib.patches import Polygon
+
+        for i, body in enumerate(self.linkage.body):
+            color = BODIES[i % len(BODIES)]
+            corners = self._outline(body)
+            if len(corners) > 2:
+                self.axes.add_patch(
+                    Polygon(corners, fc=(*_rgb(color), 0.25), ec=color, lw=2.5, zorder=3)
+                )
+            else:
+                self.axes.plot(*corners.T, color=color, lw=5, solid_capstyle="round", zorder=3)
+            if body.radius:
+                ends = np.array([self._world(body.name, at) for at in body.capsule])
+                self.axes.add_patch(_capsule(ends, body.radius * MM, color))
+            center = self._world(body.name, body.center)
+            mark = "centre of mass" if i == 0 else None
+            self.axes.plot(*center, "k+", ms=6, mew=1.2, zorder=6, ls="", label=mark)
+            if self._names:
+                self._text(corners.mean(axis=0), body.name, (0, 8), color)
+
+    def joints(self) -> None:
+        """Revolute joints as circles, prismatic ones as sliders on their axis; closures are
+        filled."""
+        for joint in self.linkage.joint:
+            if joint.type == "free":
+                continue
+            place = self._world(joint.parent, joint.at_parent)
+            if joint.type == "prismatic":
+                place = self._slider(joint, place)
+            else:
+                self._circle(place, "w")
+            self._ground(joint.parent, place)
+            if self._names:
+                self._text(place, joint.name, (6, -11), "0.35")
+        for loop in self.linkage.loop:
+            place = self._world(loop.bodies[0], loop.at[0])
+            self._circle(place, "k")
+            if "ground" in loop.bodies:
+                self._ground("ground", place)
+        if self.linkage.loop:
+            self.axes.plot([], [], "ko", ms=6, label="joint that closes a loop")
+
+    def _circle(self, place: Pose, fill: str) -> None:
+        self.axes.plot(*place, "o", mfc=fill, mec="k", ms=6, mew=1.2, zorder=5)
+
+    def _ground(self, body: str, place: Pose) -> None:
+        if body == "ground":
+            self.axes.plot(*place, marker=(3, 0, 0), color="0.4", ms=13, zorder=1)
+
+    def _slider(self, joint: Joint, place: Pose) -> Pose:
+        """The place of the slider; its axis is drawn through it."""
+        child = self._world(joint.child, joint.at_child)
+        angle = self._at[joint.parent][2] + (joint.axis or 0.0)
+        along = np.array([np.cos(angle), np.sin(angle)])
+        reach = max(float(np.linalg.norm(child - place)), 0.15 * self._size())
+        ends = np.array([place - 0.3 * reach * along, place + 1.3 * reach * along])
+        if np.dot(child - place, along) < 0:
+            ends = 2 * place - ends
+        self.axes.plot(*ends.T, color="0.4", lw=1, ls="-.", zorder=1)
+        turned = (4, 0, np.degrees(angle) + 45)
+        self.axes.plot(*child, marker=turned, mfc="w", mec="k", ms=12, mew=1.2, zorder=4)
+        return child
+
+    def _size(self) -> float:
+        found = np.array([p for b in self.linkage.body for p in self._attached(b.name)])
+        return float(np.ptp(found, axis=0).max()) or 100.0
+
+    def springs(self) -> None:
+        """Springs and dampers between points of bodies."""
+        for i, spring in enumerate(self.linkage.spring):
+            ends = [self._world(b, at) for b, at in zip(spring.bodies, spring.at, strict=True)]
+            label = "spring or damper" if i == 0 else None
+            self.axes.plot(*_zigzag(*ends).T, color="0.3", lw=1.0, zorder=2, label=label)
+
+    def points(self) -> None:
+        """The points that hands hold."""
+        held = self.linkage.operational_point
+        marks = [(held, "X", "operational point")]
+        marks += [(point, "P", f"point {point.name}") for point in self.linkage.point]
+        for point, mark, label in marks:
+            place = self._world(point.body, point.at)
+            self.axes.plot(*place, mark, color=RED, ms=9, zorder=7, ls="", label=label)
+
+    def operational_pose(self) -> Pose:
+        """Of the operational point: x m, y m, theta rad."""
+        held = self.linkage.operational_point
+        return np.array([*(self._world(held.body, held.at) / MM), self._at[held.body][2]])
+
+    def _text(self, place: Pose, text: str, offset: tuple[int, int], color: str) -> None:
+        halo: dict[str, Any] = {"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7}
+        self.axes.annotate(
+            text, tuple(place), xytext=offset, textcoords="offset points", fontsize="x-small",
+            color=color, zorder=8, bbox=halo,
+        )  # fmt: skip
+
+
+def obstacles(axes: Axes, contacts: Contacts) -> None:
+    """Enclosure and obstacles, in mm."""
+    from matplotlib.patches import Circle, Patch, Polygon
+
+    look: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "0.4"}
+    found: list[Patch] = [
+        Circle((d.center[0] * MM, d.center[1] * MM), d.radius * MM, **look) for d in contacts.disc
+    ]
+    found += [Polygon(np.array(p.corners) * MM, **look) for p in contacts.polygon]
+    if found:
+        found[0].set_label("obstacles")
+    if contacts.enclosure:
+        walls = np.array(contacts.enclosure) * MM
+        found.append(Polygon(walls, fill=False, edgecolor="0.4", label="enclosure"))
+    for patch in found:
+        axes.add_patch(patch)
+
+
+def _device(axes: Axes, device: Device, pose: Pose) -> None:
+    arms = links(device, [float(value) for value in pose]) * MM
+    if np.isfinite(arms).all():
+        for i, arm in enumerate(arms):
+            label = "arms of the device" if i == 0 else None
+            axes.plot(*arm.T, color="0.75", lw=1.5, marker="o", ms=3, zorder=0, label=label)
+
+
+def _rgb(color: str) -> tuple[float, float, float]:
+    from matplotlib.colors import to_rgb
+
+    return to_rgb(color)
+
+
+def _capsule(ends: Pose, radius: float, color: str) -> Any:
+    """The outline of points within `radius` of the axis between `ends`."""
+    from matplotlib.patches import Polygon
+
+    a, b = ends[0], ends[-1]
+    angle = np.arctan2(*(b - a)[::-1]) if len(ends) > 1 else 0.0
+    half = np.linspace(np.pi / 2, 3 * np.pi / 2, 20) + angle
+    turn = np.column_stack([np.cos(half), np.sin(half)]) * radius
+    return Polygon(np.vstack([a + turn, b - turn]), fill=False, ec=color, lw=0.8, zorder=3)
+
+
+def _zigzag(a: Pose, b: Pose) -> Pose:
+    """A spring's line from a to b."""
+    along = b - a
+    length = float(np.linalg.norm(along)) or 1.0
+    across = np.array([-along[1], along[0]]) / length * min(0.04 * length, 6.0)
+    share = np.linspace(0.2, 0.8, 13)
+    waves = np.where(np.arange(13) % 2, 1.0, -1.0)[:, None] * across
+    return np.vstack([a, a + share[:, None] * along + waves, b])
