@@ -65,5 +65,5 @@ def _check_ssp(source: Source) -> None:
         remedy = "the FMUs of an SSP are built already: change its scene and export it again"
         raise SceneFault(source.name, [Finding(".".join(k), remedy) for k in fixed])
     if missing := [n for n in needed if tuple(n[0].split(".")) not in keys]:
-        remedy = "given neither by it nor by the DefaultExperiment of its FMUs: add e.g. --set {}={}"
+        remedy = "given neither by it nor by its FMUs' DefaultExperiment: add e.g. --set {}={}"
         raise SceneFault(source.name, [Finding(key, remedy.format(key, v)) for key, v in missing])
