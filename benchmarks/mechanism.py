@@ -33,7 +33,7 @@ EVALUATIONS = {
     "semi-implicit-euler": 1,
 }
 COLUMNS = ("case", "code", "method", "rate", "round", "seconds", "x", "y")
-LOST = 0.1  # m; an error above is a mechanism that was lost
+LOST = 0.1  # m; with a larger error the run has diverged
 SLOW = 3.0  # s; a run this long is not repeated
 NATIVE, MACHINE = "ours, C", "ours, CasADi VM"
 Run = Callable[[int], tuple[float, float, float]]

@@ -1,1 +1,1 @@
-"""What is simulated: equations only. No FMI, no files, no clocks."""
+"""The equations of all components, without FMI, files or clocks."""

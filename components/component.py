@@ -1,13 +1,13 @@
-"""What every block is: declared variables, a start, a step and an output.
+"""Components: what every block consists of, declared variables and three functions.
 
     x_0     = initialize(u, p)
     x_{k+1} = step(x_k, u_k, p, t_k, h)
     y_k     = output(x_k, u_k, p, t_k)
 
-All three are CasADi functions on flat columns; `Variable` says what each entry is.
-A *continuous* block (a plant) puts out y at the end of its step. A *sampled* block (a
-controller, an observer) started at t_k with the inputs of t_k puts out y_k, stamped t_k
-and valid on [t_k, t_k + h).
+All three are CasADi functions of flat columns, whose entries the `Variable` records describe.
+The outputs of a *continuous* block (a plant) are those at the end of its step. A *sampled* block
+(a controller, an observer) computes y_k from the inputs at t_k; it is stamped t_k and valid on
+[t_k, t_k + h).
 """
 
 from __future__ import annotations
@@ -29,12 +29,15 @@ Variability = Literal["fixed", "tunable"]
 
 @dataclass(frozen=True)
 class Variable:
-    """A named scalar, vector or matrix signal; flat storage is row by row.
+    """A named scalar, vector or matrix signal, stored row by row.
 
-    unit is an SI unit as FMI writes it ("m", "N.m", "rad/s", "1/kg"; "1" has none);
-    start one value for all entries or one for each; variability is for parameters. kind and
-    derivative_of, the output that it is the time derivative of, are for outputs, and max, beyond
-    which (None: there is no such size) it has left what the block models; power for inputs.
+    unit: an SI unit in FMI's notation ("m", "N.m", "rad/s", "1/kg"; "1" for none), or one for each
+    entry. start: one value for all entries or one for each. variability: of parameters. kind: of
+    outputs. derivative_of: the output of which this output is the time derivative. max: the
+    magnitude of an output above which the run has diverged, None without such a bound. power: of
+    inputs, their power port.
+
+    `starts`, `units` and `names` raise ValueError where sizes do not agree.
     """
 
     name: str
@@ -62,7 +65,7 @@ class Variable:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """One unit an entry; a tuple of a row's length repeats for every row."""
+        """One unit per entry; a tuple with the length of a row is repeated for every row."""
         row = self.unit if isinstance(self.unit, tuple) else (self.unit,)
         if not self.size:
             return ()
@@ -93,7 +96,8 @@ MOBILITY = ("1/kg", "1/kg", "1/(kg.m)") * 2 + ("1/(kg.m)", "1/(kg.m)", "1/(kg.m2
 
 
 class Signals(Mapping[str, ca.SX]):
-    """Symbols for a list of variables, by name and as one flat column `.vector`."""
+    """CasADi symbols of a list of variables, by name and as one flat column `vector`. Raises
+    ValueError for a name that is declared twice."""
 
     def __init__(self, prefix: str, variables: Iterable[Variable]) -> None:
         self.variables = tuple(variables)
@@ -141,9 +145,9 @@ def pack(variables: Iterable[Variable], values: Mapping[str, ca.SX]) -> ca.SX:
 
 @dataclass(frozen=True)
 class Component:
-    """An immutable block. `step` is called `substeps` times for each communication step;
-    state_notes say, by its name, what a state that is not finite means; springs are those that its
-    inputs set."""
+    """A complete block. `step` is called `substeps` times for each communication step. springs:
+    spring-dampers whose set positions are inputs. tables: the time tables that the functions look
+    up. state_notes: by the name of a state, the cause to report if it is not finite."""
 
     name: str
     description: str
@@ -163,7 +167,7 @@ class Component:
 
     @cached_property
     def state_texts(self) -> tuple[str, ...]:
-        """Names of the states, with what it means where one is not finite."""
+        """Names of the states, each with the cause to report if it is not finite."""
         names = (name for v in self.states for name in v.names)
         notes = self.state_notes
         return tuple(f"{name} ({notes[name]})" if name in notes else name for name in names)
@@ -178,7 +182,8 @@ class Component:
 
 
 class Block:
-    """Symbols of a block under construction; `component` closes it into a `Component`."""
+    """The symbols from which the expressions of a block are built; `component` returns the finished
+    `Component`."""
 
     def __init__(
         self,
@@ -196,7 +201,8 @@ class Block:
         self.h = ca.SX.sym("h")
 
     def ode(self, derivative: Mapping[str, ca.SX], further: ca.SX | None = None) -> ca.Function:
-        """(x, (u, further), p, t) -> dx/dt, for an integrator."""
+        """The function (x, (u, further), p, t) -> dx/dt, for an integrator. Raises ValueError where
+        `derivative` does not match the states."""
         xdot = pack(self.x.variables, derivative)
         u = self.u.vector if further is None else ca.vertcat(self.u.vector, further)
         arguments = [self.x.vector, u, self.p.vector, self.t]
@@ -218,11 +224,12 @@ class Block:
         shared: bool = False,
         tables: Iterable[TimeTable] = (),
     ) -> Component:
-        """step and output are expressions in this block's symbols; initial in u and p only. tables
-        are those that they look up.
+        """The component with the given expressions: step and output in this block's symbols,
+        initial in u and p only; tables are those that they look up.
 
-        shared: step and initial are built of functions whose common terms are shared already;
-        looking again costs most of the build of a large graph.
+        shared: common subexpressions of step and initial have been eliminated already; doing so
+        again would take most of the time to build a large graph. Raises ValueError where names or
+        shapes do not match the declared variables.
         """
         x, u, p, t, h = self.x.vector, self.u.vector, self.p.vector, self.t, self.h
         x1 = pack(self.x.variables, step) if isinstance(step, Mapping) else ca.densify(step)

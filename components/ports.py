@@ -1,6 +1,6 @@
-"""What a block's ports mean to whoever couples it, beyond name, shape and unit.
+"""Declarations about a block's ports that coupling needs beyond name, shape and unit.
 
-It travels in the FMU, so that it holds under any instance name, in any system.
+They are written to the FMU's annotation, so that they hold under any instance name in any system.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["projector", "semidefinite", "angle", "table"]
-"""What an output is, where its entries must not be held each for itself: an orthogonal projector,
-a symmetric positive semidefinite matrix, angles that wrap, or a table whose rows name things, of
-which there is none between two samples."""
+"""The kind of an output whose entries cannot be extrapolated independently: an orthogonal
+projector, a symmetric positive semidefinite matrix, wrapped angles, or a table, whose rows are
+records and have no values between two samples."""
 
 
 @dataclass(frozen=True)
 class Power:
-    """An input's effort (N, N.m) works on an output of the same block, `displacement` (m, rad):
-    the power into the block is sign * effort . d(displacement)/dt."""
+    """Pairs an effort input (N, N.m) with its conjugate displacement, an output of the same block
+    (m, rad): the power into the block is sign * effort . d(displacement)/dt."""
 
     displacement: str
     sign: float = 1.0
@@ -25,12 +25,12 @@ class Power:
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring-damper within a block, set by its inputs:
+    """A spring-damper within a block, whose far end is set by inputs:
 
         F = stiffness (set_position - position) + damping (set_velocity - velocity)
 
     entry by entry. set_position and set_velocity are inputs, position is an input or an output,
-    stiffness and damping are parameters in the units of these; "" is none.
+    stiffness and damping are parameters in the units of these; "" stands for none.
     """
 
     set_position: str

@@ -1,4 +1,4 @@
-"""Parts by name: the one place that says which integrators, forces, blocks, holds there are."""
+"""Registries: integrators, forces, blocks, holds and other parts by name."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ _REGISTRIES: list[Registry[Any]] = []
 
 
 class Registry(dict[str, Part]):
-    """The parts of one kind ("hold") by the names that a scene gives them.
+    """The parts of one kind ("hold") by the names that a scene uses.
 
-    The package's own stand where the registry is made, one a line; those of a plugin come by
-    `register`. A name that is not there is a ValueError with what is near it.
+    The package's own parts are listed where the registry is created; those of plugins are added by
+    `register`. Looking up an unknown name raises ValueError with the nearest known one.
     """
 
     def __init__(self, kind: str, parts: Mapping[str, Part]) -> None:
         super().__init__(parts)
         self.kind = kind
         self.origins: dict[str, str] = {}
-        """By name, the module that has registered it."""
+        """The module that has registered a part, by the part's name."""
         _REGISTRIES.append(self)
 
     def register(self, name: str, part: Part) -> None:
-        """Add a part. Raises ValueError for a name that another module has given away."""
+        """Add a part. Raises ValueError for a name that another module has registered."""
         # A process of a pool runs the main module under another name.
         module = str(sys._getframe(1).f_globals["__name__"]).replace("__mp_main__", "__main__")
         if name in self and self.origins.get(name) != module:
@@ -41,18 +41,20 @@ class Registry(dict[str, Part]):
         raise ValueError(self.unknown(name))
 
     def unknown(self, name: str, among: Iterable[str] | None = None) -> str:
-        """That no part has this name, or none of those `among` which one is to be chosen."""
-        said = unknown(self.kind, name, self if among is None else among)
-        return said if "did you mean" in said else f"{said}, or those of a plugin"
+        """The message that no part, or none of `among`, has this name."""
+        message = unknown(self.kind, name, self if among is None else among)
+        return message if "did you mean" in message else f"{message}, or those of a plugin"
 
     def names(self, fits: Callable[[Part], bool] = lambda part: True) -> Names[Part]:
-        """The names of the parts that fit, for `Annotated[str, ...]` of a scene's key."""
+        """The names of the parts for which `fits` holds, for `Annotated[str, ...]` of a scene's
+        key."""
         return Names(self, fits)
 
 
 @dataclass(frozen=True, eq=False)
 class Names(Generic[Part]):
-    """Names that a key of a scene may have, as they are when the scene is read."""
+    """The names that are allowed for a key of a scene, evaluated when the scene is read. Iteration
+    raises RuntimeError for a registry that is still empty."""
 
     registry: Registry[Part]
     fits: Callable[[Part], bool]
@@ -63,30 +65,30 @@ class Names(Generic[Part]):
         return (name for name, part in self.registry.items() if self.fits(part))
 
     def checked(self, name: str) -> str:
-        """`name`. Raises ValueError where it is none of these."""
+        """Returns `name`. Raises ValueError if it is none of these."""
         if name not in tuple(self):
             raise ValueError(self.registry.unknown(name, self))
         return name
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
-        """What pydantic, which reads scenes, asks of an annotation."""
-        from pydantic_core import core_schema  # of no use to components by themselves
+        """The hook by which pydantic, which reads scenes, validates the annotated key."""
+        from pydantic_core import core_schema  # not needed by components themselves
 
         return core_schema.no_info_after_validator_function(self.checked, handler(source))
 
 
 def origins(*kinds: str) -> list[str]:
-    """The modules that have registered parts, of `kinds` or of any, sorted."""
+    """The modules that have registered parts of these `kinds`, by default of any, sorted."""
     chosen = (r for r in _REGISTRIES if not kinds or r.kind in kinds)
     return sorted({module for registry in chosen for module in registry.origins.values()})
 
 
 MOST = 100
-"""Names that are searched for one that is near, and shown where none is."""
+"""Largest number of names that are searched and shown, and of characters of a name."""
 
 
 def near(name: str, known: Iterable[str]) -> str:
-    """The nearest of what there is, or all of it."""
+    """A hint with the known name nearest to `name`, or else with the known names."""
     known = list(known)
     found = difflib.get_close_matches(name[:MOST], known[:MOST], 1)
     more = f" and {len(known) - MOST} more" if len(known) > MOST else ""
@@ -95,6 +97,6 @@ def near(name: str, known: Iterable[str]) -> str:
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """That there is no `kind` of this name, with the nearest that there is."""
+    """The message that there is no `kind` of this name, with the hint of `near`."""
     shown = repr(name) if len(name) <= MOST else f"{name[:MOST]!r}..."
     return f"no {kind} {shown}; {near(name, known)}"

@@ -1,14 +1,15 @@
-"""Signals of time from rows (time, values...), linear between rows, the ends held.
+"""Signals given as tables of time: rows (time, values...), linear between rows, constant outside.
 
-The rows are data, not terms of a graph: a graph calls a look-up, which takes log2 of their number
-of comparisons. At an instant it gives y(t) and the rate of the segment that begins there. A method
-that steps over [t, t + h] takes the quadratic through y(t), y(t + h/2) and y(t + h) instead, with
-s = (time - t)/h:
+The rows are data, not terms of a graph: a graph calls a look-up, whose cost is logarithmic in the
+number of rows. At an instant it returns y(t) and the rate of the segment that begins there. An
+integration method that steps over [t, t + h] uses the quadratic through y(t), y(t + h/2) and
+y(t + h) instead, with s = (time - t)/h:
 
     y = y_0 + s (3 d_1 - d_2) + 2 s^2 (d_2 - d_1),   d_1 = y_{1/2} - y_0,  d_2 = y_1 - y_{1/2}
 
-It is the table itself where its rows meet the ends of steps, so that a method keeps its order. A
-row within a step leaves order 2: the rate's integral over the step is right, not its jump.
+It equals the table where rows coincide with the ends of steps, so that a method keeps its order. A
+row within a step reduces the order to 2: the integral of the rate over the step is exact, but not
+its jump.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ Rows = Sequence[tuple[float, ...]]
 
 
 class TimeTable:
-    """Raises ValueError, with `name`, for an empty table, for numbers that are not finite and for
-    times that do not increase."""
+    """A table of k values over time. Raises ValueError, with `name`, for an empty table, for
+    numbers that are not finite and for times that do not increase."""
 
     def __init__(self, rows: Rows, name: str) -> None:
         data = _checked(rows, name)
@@ -38,13 +39,13 @@ class TimeTable:
             self._rate = self._value.jacobian()
 
     def value(self, t: ca.SX) -> ca.SX:
-        """y at t, k x 1."""
+        """y(t), k x 1."""
         if len(self.rows) == 1:
             return ca.SX(ca.DM(self.rows[0][1:]))
         return self._value(ca.fmin(ca.fmax(t, self.rows[0][0]), self.rows[-1][0]))
 
     def at(self, t: ca.SX) -> ca.SX:
-        """(y, y') at t, 2k x 1; at a row's time y' is that of the segment which begins there."""
+        """(y, y') at t, 2k x 1; at the time of a row y' is that of the segment beginning there."""
         rate = ca.SX(self.size, 1)
         if len(self.rows) > 1:
             inside = ca.logic_and(t >= self.rows[0][0], t < self.rows[-1][0])
@@ -78,12 +79,13 @@ def at(tables: Iterable[TimeTable], t: ca.SX) -> ca.SX:
 
 
 def over(tables: Iterable[TimeTable], t: ca.SX, h: ca.SX) -> ca.SX:
-    """t and the quadratics of each table over [t, t + h], stacked: what `within` takes."""
+    """t and the quadratics of each table over [t, t + h], stacked, for `within`."""
     return ca.vertcat(t, *(table.over(t, h) for table in tables))
 
 
 def within(tables: Iterable[TimeTable], over: ca.SX, t: ca.SX) -> ca.SX:
-    """As `at`, from the quadratics of the step that t is in."""
+    """(y, y') of each table at t, stacked, from the quadratics `over` of the step that contains
+    t."""
     s, found, place = t - over[0], [], 1
     for table in tables:
         k = table.size
@@ -94,5 +96,5 @@ def within(tables: Iterable[TimeTable], over: ca.SX, t: ca.SX) -> ca.SX:
 
 
 def size_over(tables: Iterable[TimeTable]) -> int:
-    """Entries of `over`."""
+    """The number of entries of `over`."""
     return 1 + sum(3 * table.size for table in tables)

@@ -1,4 +1,4 @@
-"""How a component becomes an FMU, and how that FMU is checked."""
+"""Builds FMUs from components, and checks them."""
 
 from hapticlink.fmus.build import build, build_native
 from hapticlink.fmus.cache import cached

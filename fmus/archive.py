@@ -1,12 +1,11 @@
-"""What a Python FMU holds, as bytes by name.
+"""The files of a Python FMU, as bytes by name.
 
-pythonfmu gives the slave's base class and the binaries. Its FmuBuilder is left aside: it
-takes a Python file of the model, leaves sys.path and sys.modules changed, and writes files
-in random order, with dates and a random GUID, where the same component has to give the same
-bytes.
+pythonfmu provides the slave's base class and the binaries. Its FmuBuilder is not used: it needs a
+Python file of the model, leaves sys.path and sys.modules changed, and writes files in random order
+with dates and a random GUID, whereas the same component has to give the same bytes here.
 
-resources/ is put on sys.path for good by every load, so nothing in it can be imported but
-pythonfmu's own copy and the slave, whose module name carries a hash of the content.
+Each load of an FMU adds its resources/ to sys.path permanently. Therefore the only modules in it
+are pythonfmu's own copy and the slave, whose name contains a hash of the content.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
 def require_platform() -> None:
-    """Raise UnsupportedPlatform where pythonfmu ships no binary."""
+    """Raises UnsupportedPlatform if pythonfmu ships no binary for this platform."""
     if sys.platform in ("linux", "win32") and platform.machine().lower() in ("x86_64", "amd64"):
         return
     raise UnsupportedPlatform(
@@ -46,7 +45,9 @@ def require_platform() -> None:
 
 
 def entries(component: Component, *, stop_time: float, step_size: float) -> dict[str, bytes]:
-    """Every file of the FMU. The GUID and the slave's name are a hash of all of them."""
+    """All files of the FMU; GUID and name of the slave contain a hash of them. stop_time and
+    step_size (s) are the default experiment. Raises FmuError where the component's functions and
+    variables do not fit."""
     check_functions(component)
 
     def describe(guid: str) -> bytes:
@@ -80,12 +81,14 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
 
 
 def icon(timing: str) -> bytes:
-    """model.png: a smooth wave for a continuous block, its samples held for a sampled one."""
+    """model.png: a smooth wave for a continuous block, a sampled and held one for a sampled
+    block."""
     return (Path(__file__).parent / "icons" / f"{timing}.png").read_bytes()
 
 
 def write(files: Mapping[str, bytes], target: BinaryIO) -> None:
-    """A zip archive whose bytes depend on `files` only: sorted names, one date, one system."""
+    """Writes a zip archive whose bytes depend on `files` only: sorted names, a fixed date and
+    system."""
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files):
             info = zipfile.ZipInfo(name, EPOCH)
@@ -98,7 +101,8 @@ _ROLES = ("initialize", "step", "output")
 
 
 def check_functions(component: Component) -> None:
-    """Raise FmuError where a function does not fit the declared variables."""
+    """Raises FmuError if the component's name is no C identifier, a function does not fit the
+    declared variables, or a variable is declared twice."""
     if not component.name.isidentifier() or not component.name.isascii():
         raise FmuError(f"`{component.name}` is no C identifier; an FMU is named by one")
     u, p, x, y = (
@@ -136,7 +140,7 @@ def _names(variables: tuple[Variable, ...]) -> list[str]:
 
 
 def _about(component: Component) -> dict[str, object]:
-    """What the slave needs to know beside the functions."""
+    """The data that the slave needs besides the functions."""
     variability = ["tunable"] * len(component.start_inputs)
     variability += [v.variability for v in component.parameters for _ in v.names]
     return {
@@ -154,7 +158,7 @@ def _about(component: Component) -> dict[str, object]:
 
 
 def digest(content: Mapping[str, bytes]) -> str:
-    """sha256 of names and bytes."""
+    """SHA-256 of names and contents."""
     sha = hashlib.sha256()
     for name in sorted(content):
         sha.update(f"{name}\0{len(content[name])}\0".encode() + content[name])

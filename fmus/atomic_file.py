@@ -1,4 +1,4 @@
-"""A file that is there whole or not at all, whoever reads it and whenever the writer dies."""
+"""Writes a file atomically: readers see it complete or not at all, even if the writer dies."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pathlib import Path
 
 @contextmanager
 def atomic_file(target: Path) -> Iterator[Path]:
-    """Within, the path of an unfinished file beside `target`, with the same suffix, to be written;
-    at the end it is renamed to `target`, or removed where something was raised."""
+    """Gives the path of an unfinished file beside `target`, with the same suffix. At the end of the
+    context it is renamed to `target`, or removed if an exception was raised."""
     unfinished = target.with_name(f".{target.stem}.{uuid.uuid4().hex}{target.suffix}")
     try:
         yield unfinished

@@ -1,4 +1,4 @@
-"""The FMU of a block by its name in `components.blocks.BLOCKS`, from the cache if it can."""
+"""The FMU of a block by its name in `components.blocks.BLOCKS`, from the cache or built."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ Packaging = Literal["python", "native"]
 def component(
     name: str, settings: Settings, step_size: float, starts: Starts = MappingProxyType({})
 ) -> Component:
-    """The block `name` of `settings`; `starts` go before the start values of its parameters.
-    Raises FmuError where they give no component."""
+    """The component of the block `name` with `settings`; step_size (s) is its communication step
+    size, `starts` replace start values of its parameters. Raises FmuError if the settings give no
+    component."""
     try:
         made = BLOCKS[name](step_size, **settings)
     except (ValueError, ArithmeticError) as error:
@@ -45,10 +46,12 @@ def build_block(
     platforms: Sequence[str] = (),
     starts: Starts = MappingProxyType({}),
 ) -> Path:
-    """The path of the block's FMU: in the cache, or made in `room` where the cache is off.
+    """The path of the block's FMU: in the cache, or built in `room` where the cache is off.
 
-    settings are the block's own, by name, and `starts` of its parameters; step_size (s) is its
-    communication step. platforms are those of a native FMU, this machine's where none is named.
+    settings: the block's own, by name; starts: start values that replace those of its parameters.
+    stop_time (s): of the default experiment. step_size (s): the communication step size. platforms:
+    those of a native FMU, by default this machine's. Raises FmuError if the settings give no FMU,
+    CompilerError if it cannot be compiled.
     """
     experiment = {"stop_time": stop_time, "step_size": step_size}
 

@@ -1,4 +1,4 @@
-"""A component becomes an FMU on disk."""
+"""Builds the FMU of a component as a file."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ def build(
 ) -> Path:
     """Write the Python FMU `<folder>/<component.name>.fmu` and return its path.
 
-    stop_time and step_size (s) are the FMU's default experiment. The same component gives
-    the same bytes. The file appears whole or not at all, and only if FMPy's validation has
-    no finding; otherwise FmuError lists the findings. UnsupportedPlatform is raised where
-    pythonfmu has no binary.
+    stop_time and step_size (s) are the FMU's default experiment. The same component gives the same
+    bytes. The file is written atomically, and only if FMPy's validation has no finding. Raises
+    FmuError with the findings, and UnsupportedPlatform where pythonfmu has no binary.
     """
     require_platform()
     return _publish(
@@ -41,10 +40,11 @@ def build_native(
     stop_time: float = 1.0,
     step_size: float = 1 / 512,
 ) -> Path:
-    """As `build`, but with the component compiled for each of `platforms`, of
-    `hapticlink.fmus.native.PLATFORMS`, by default for this machine. Needs no Python to run.
+    """As `build`, with the component compiled for each of `platforms` (names of
+    `hapticlink.fmus.native.PLATFORMS`), by default for this machine. The FMU needs no Python.
 
-    Raises FmuError where ziglang is not installed or has no such platform.
+    Raises FmuError if ziglang is not installed or a platform is unknown, CompilerError if the
+    source does not compile.
     """
     from hapticlink.fmus.native import archive, host_platform
 

@@ -1,4 +1,4 @@
-"""Built FMUs, kept by what they were made from."""
+"""Cache of built FMUs, by a hash of everything that they are built from."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ import hapticlink.fmus
 from hapticlink.components import registry
 
 LONGEST = 3600.0
-"""Seconds that no copy takes."""
+"""Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
 VERSIONS = ("hapticlink", "casadi", "pythonfmu")
 
 
 def folder() -> Path | None:
-    """HAPTICLINK_CACHE, or the user's cache folder; None where HAPTICLINK_CACHE is "off"."""
+    """The cache folder: HAPTICLINK_CACHE, by default in the user's cache folder; None if
+    HAPTICLINK_CACHE is "off"."""
     chosen = os.environ.get("HAPTICLINK_CACHE")
     if chosen == "off":
         return None
@@ -47,8 +48,8 @@ def folder() -> Path | None:
 
 
 def key(material: Mapping[str, Any]) -> str:
-    """sha256 of the JSON `material`, the versions in VERSIONS and the sources of the equations,
-    those of plugins too."""
+    """SHA-256 of the JSON `material`, the versions in VERSIONS and the sources of the equations,
+    also those of plugins."""
     plugins = registry.origins("block", "force", "integrator")
     whole = {
         "material": material,
@@ -61,7 +62,7 @@ def key(material: Mapping[str, Any]) -> str:
 
 @cache
 def sources(*packages: ModuleType) -> str:
-    """sha256 of the Python and C files of `packages`, and of the icons."""
+    """SHA-256 of the Python files, C files and icons of `packages`."""
     sha = hashlib.sha256()
     for package in packages:
         root = Path(next(iter(package.__path__)))
@@ -72,8 +73,8 @@ def sources(*packages: ModuleType) -> str:
 
 @cache
 def source(module: str) -> str:
-    """sha256 of the package that an imported module is in, or of its own file. One without a file
-    (a notebook) is another in every process, since nobody knows whether it has changed."""
+    """SHA-256 of the package of an imported module, or of its file. A module without a file (in a
+    notebook) has another hash in every process, since it cannot be known whether it has changed."""
     found = sys.modules[module]
     if found.__package__:
         return sources(sys.modules[found.__package__])
@@ -84,11 +85,11 @@ def source(module: str) -> str:
 def cached(
     key_material: Mapping[str, Any], build_function: Callable[[Path], Path], room: Path
 ) -> Path:
-    """The FMU for `key_material`, made by `build_function(folder) -> path` if it is not there.
+    """The cached FMU for `key_material`, built by `build_function(folder) -> path` if necessary.
 
-    Runs that race build each their own, and the last rename wins: the bytes are the same. A
-    cached file that is damaged is built again. It is built in `room`, which is the caller's to
-    remove, and stays there where the cache is off or cannot be written, which is told.
+    Concurrent runs each build their own, and the last rename wins, with the same bytes. A damaged
+    file in the cache is built again. It is built in `room`, which the caller has to remove, and
+    stays there if the cache is off or cannot be written; the latter is logged as a warning.
     """
     root = folder()
     if root is not None:
@@ -128,10 +129,10 @@ def _kept(built: Path, root: Path, place: Path) -> Path:
 
 
 def _clear(root: Path) -> None:
-    """Remove what was left of a copy by a process that was killed, on whichever machine that shares
-    the cache."""
+    """Removes unfinished copies of killed processes, also on other machines that share the
+    cache."""
     for left in root.glob(".*"):
-        with suppress(OSError):  # another process removes its own
+        with suppress(OSError):  # another process has removed it
             if time.time() - left.stat().st_mtime > LONGEST:
                 left.unlink()
 

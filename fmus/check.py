@@ -1,7 +1,7 @@
-"""The contract that every FMU of the project meets, Python or native.
+"""Checks that every FMU of the project, Python or native, has to pass.
 
-A run sets inputs near their start values, steps and gets all reals. Every way to the same
-run has to give the same bits.
+A run sets inputs near their start values, steps and gets all reals. Runs that should be equal,
+after loading again, reset, in a second instance, or from a saved state, have to agree to the bit.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Trace = list[bytes]
 
 
 class Session:
-    """An extracted FMU and instances of it, all freed at the end."""
+    """An extracted FMU and its instances, all of which `close` frees."""
 
     def __init__(self, path: Path | str) -> None:
         self.description = fmpy.read_model_description(str(path), validate=False)
@@ -38,7 +38,7 @@ class Session:
         self._instances: list[FMU2Slave] = []
 
     def instance(self, name: str = "instance") -> FMU2Slave:
-        """Instantiated, before initialisation; its log goes to `messages`."""
+        """A new instance, before initialisation; its log is collected in `messages`."""
         slave = FMU2Slave(
             guid=self.description.guid,
             unzipDirectory=self.folder,
@@ -61,7 +61,7 @@ class Session:
         slave.freeInstance()
 
     def close(self) -> None:
-        """Free what is left and remove the extracted files."""
+        """Free all instances and remove the extracted files."""
         for slave in list(self._instances):
             self.free(slave)
         shutil.rmtree(self.folder)
@@ -69,7 +69,7 @@ class Session:
 
 @contextmanager
 def session(path: Path | str) -> Iterator[Session]:
-    """A Session, closed whatever happens."""
+    """A Session that is closed at the end of the context."""
     opened = Session(path)
     try:
         yield opened
@@ -88,7 +88,7 @@ def run(slave: FMU2Slave, at: Session, first: int = 0, count: int = STEPS) -> Tr
     references = [v.valueReference for v in at.inputs]
     trace = []
     for k in range(first, first + count):
-        # Small, all different, changing: a value lost or swapped shows.
+        # Small values, all different and changing, so that lost or swapped ones are found.
         nudged = [float(v.start or 0.0) + 1e-4 * (i + 1 + k) for i, v in enumerate(at.inputs)]
         if references:
             slave.setReal(references, nudged)
@@ -98,7 +98,7 @@ def run(slave: FMU2Slave, at: Session, first: int = 0, count: int = STEPS) -> Tr
 
 
 def check_fmu(path: Path | str) -> list[str]:
-    """What is wrong with the FMU at `path`; empty where it meets the contract."""
+    """The findings of all checks of the FMU at `path`; empty if it passes."""
     findings = [f"validation: {finding}" for finding in validate_fmu(str(path))]
     if findings:
         return findings
@@ -122,7 +122,7 @@ def check_fmu(path: Path | str) -> list[str]:
 
 
 def _alone(path: Path | str, step_size: float) -> list[str]:
-    """Under FMPy with nothing but its start values it has to run and stay finite."""
+    """Simulated by FMPy with its start values, the FMU has to run and stay finite."""
     stop = STEPS * step_size
     try:
         result = fmpy.simulate_fmu(str(path), stop_time=stop, output_interval=step_size)
@@ -183,7 +183,7 @@ def _save_and_restore(at: Session, reference: Trace) -> str | None:
 
 
 def _deserialize(at: Session, saved: bytes, reference: Trace) -> str | None:
-    """Into another instance, which then goes on as the first one did."""
+    """A state restored into another instance has to continue as the first one did."""
     slave = at.instance("other")
     initialize(slave)
     state = slave.deSerializeFMUstate(saved)

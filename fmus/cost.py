@@ -1,4 +1,4 @@
-"""What a block costs: operations of its graphs, and the signals at its ports."""
+"""Computational cost of a block: operations of its graphs, and signals at its ports."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hapticlink.fmus.blocks import component
 
 @dataclass(frozen=True)
 class Cost:
-    """Instructions of one communication step (all substeps) and of one reading of the outputs;
+    """Instructions of one communication step (all substeps) and of one evaluation of the outputs;
     sizes of the ports by name."""
 
     step: int
@@ -21,7 +21,8 @@ class Cost:
 
 
 def cost(name: str, settings: Mapping[str, Any], step_size: float) -> Cost:
-    """Of the block `name` of `settings`. Raises FmuError where they give no component."""
+    """The cost of the block `name` with `settings`; step_size (s) is its communication step size.
+    Raises FmuError if they give no component."""
     made = component(name, settings, step_size)
     return Cost(
         step=made.step.n_instructions() * made.substeps,

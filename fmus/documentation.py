@@ -22,7 +22,7 @@ TIMING = {
 
 
 def documentation(component: Component) -> bytes:
-    """One HTML page without outside references."""
+    """One HTML page without external references."""
     steps = component.substeps
     times = "once" if steps == 1 else f"in {steps} equal substeps"
     body = [
@@ -45,7 +45,8 @@ def documentation(component: Component) -> bytes:
 
 
 def _paragraphs(text: str) -> list[str]:
-    """Blank lines part paragraphs; one that is indented is shown as it is, as equations are."""
+    """Paragraphs of a docstring, separated by blank lines; indented ones, such as equations, are
+    preformatted."""
     blocks = [block.strip("\n") for block in text.split("\n\n") if block.strip()]
     return [
         f"<pre>{escape(block)}</pre>" if block.startswith("  ") else f"<p>{escape(block)}</p>"
@@ -74,5 +75,5 @@ def _table(title: str, variables: Sequence[Variable]) -> list[str]:
 
 
 def _short(values: tuple[str, ...]) -> str:
-    """One value where all are the same."""
+    """The values as text, a single one if all are the same."""
     return values[0] if len(set(values)) == 1 else ", ".join(values)

@@ -1,16 +1,16 @@
-"""What can go wrong between a component and its FMU."""
+"""Exceptions raised while an FMU is built from a component."""
 
 
 class FmuError(Exception):
-    """A component cannot become an FMU, or a built FMU fails its checks."""
+    """No FMU can be built from a component, or a built FMU fails validation."""
 
 
 class UnknownOperation(FmuError):
-    """A CasADi operation has no straight-line Python form."""
+    """A CasADi operation cannot be written as straight-line Python."""
 
 
 class CompilerError(FmuError):
-    """The compiler does not compile."""
+    """The compiler reports an error."""
 
 
 class UnsupportedPlatform(FmuError):

@@ -1,7 +1,7 @@
 """Scalar functions with the IEEE 754 results of C, where Python's `math` raises.
 
-1/0 is inf, log(-1) is nan, exp(1000) is inf. This file's text is put before generated
-straight-line code, which must run without this package: it needs only the standard library.
+1/0 is inf, log(-1) is nan, exp(1000) is inf. This file's text precedes generated straight-line
+code, which must run without this package; therefore it only needs the standard library.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def div(a: float, b: float) -> float:
 
 
 def power(a: float, b: float) -> float:
-    """C's pow: a pole for 0 to a negative power, odd whole powers keep the sign."""
+    """C's pow: infinite for 0 to a negative power; odd whole powers keep the sign."""
     try:
         return math.pow(a, b)
     except OverflowError:
@@ -37,7 +37,7 @@ def power(a: float, b: float) -> float:
 
 
 def _overflowing(function: Function) -> Function:
-    """An odd or positive function that leaves the range of floats only by overflow."""
+    """A function, odd or positive, whose only error is overflow, made to return inf there."""
 
     def guarded(a: float) -> float:
         try:
@@ -49,7 +49,7 @@ def _overflowing(function: Function) -> Function:
 
 
 def _with_domain(function: Function) -> Function:
-    """nan outside the domain."""
+    """The function, made to return nan outside its domain."""
 
     def guarded(*arguments: float) -> float:
         try:
@@ -61,7 +61,7 @@ def _with_domain(function: Function) -> Function:
 
 
 def _with_pole(function: Function, pole: float) -> Function:
-    """-inf at the pole of a logarithm, nan beyond it."""
+    """A logarithm, made to return -inf at its pole and nan beyond it."""
 
     def guarded(a: float) -> float:
         try:
@@ -97,7 +97,7 @@ def sign(a: float) -> float:
 
 
 def fmin(a: float, b: float) -> float:
-    """The number where one of the two is nan."""
+    """The smaller one; the other one if one of the two is nan."""
     return a if a < b or isnan(b) else b if not isnan(b) else a
 
 
@@ -106,12 +106,12 @@ def fmax(a: float, b: float) -> float:
 
 
 def if_else_zero(condition: float, value: float) -> float:
-    """0 where the condition is 0, whatever the value, even nan."""
+    """0 where the condition is 0, even if the value is nan."""
     return 0.0 if condition == 0.0 else value
 
 
 def erfinv(a: float) -> float:
-    """Inverse of erf: CasADi's rational start (calculus.hpp), polished by two Newton steps."""
+    """Inverse of erf: CasADi's rational approximation (calculus.hpp) and two Newton steps."""
     if fabs(a) >= 1.0:
         return copysign(inf, a) if fabs(a) == 1.0 else nan
     if isnan(a):
@@ -131,8 +131,8 @@ def erfinv(a: float) -> float:
 
 
 def look_up(times: Sequence[float], rows: Sequence[Sequence[float]]) -> tuple[LookUp, LookUp]:
-    """CasADi's linear interpolant on `rows` and its slope, in its order of operations
-    (casadi_interpn.hpp): t -> one value a column."""
+    """CasADi's linear interpolant of `rows` and its slope, in its order of operations
+    (casadi_interpn.hpp): functions of t that return one value per column."""
 
     def left(t: float) -> int:
         return min(max(bisect_right(times, t) - 1, 0), len(times) - 2)

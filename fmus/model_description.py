@@ -3,14 +3,13 @@
 Value references count [inputs | parameters | outputs] from 0 in flat order; the index in
 ModelStructure is the value reference + 1.
 
-Dependencies are structural, from CasADi's sparsity. For `Outputs` FMI asks which inputs
-an output reads at a communication point (section 2.2.8). A continuous block answers with
-the inputs that y = output(x, u, p, t) reads. A sampled block's y_k is made inside the
-doStep that starts at t_k, from the inputs of t_k: it lists those inputs, which is what the
-order of blocks within a tick has to know; set after the doStep they have no effect, so for
-a strict reading the list is longer than need be, which FMI allows. `InitialUnknowns` lists
-inputs and parameters, through x0 = initialize(u, p). Outputs of sampled blocks have
-variability "discrete".
+Dependencies are structural, from CasADi's sparsity. `Outputs` lists the inputs on which an output
+depends at a communication point (section 2.2.8). For a continuous block these are the inputs that
+y = output(x, u, p, t) depends on. A sampled block computes y_k in the doStep that starts at t_k,
+from the inputs at t_k: it lists these inputs, which determine the order of blocks within a tick.
+Inputs set after the doStep have no effect, so that strictly the list is longer than necessary,
+which FMI allows. `InitialUnknowns` lists inputs and parameters, through x0 = initialize(u, p).
+Outputs of sampled blocks have variability "discrete".
 """
 
 from __future__ import annotations
@@ -47,9 +46,10 @@ LOG_CATEGORIES = {
 def model_description(
     component: Component, guid: str, *, stop_time: float, step_size: float, needs_tool: bool = True
 ) -> bytes:
-    """The XML text, the same bytes for the same arguments (it carries no date).
+    """The XML text, without a date, so that the same arguments give the same bytes.
 
-    needs_tool: the FMU runs only where Python is.
+    needs_tool: whether the FMU needs Python (needsExecutionTool). Raises FmuError for a declared
+    derivative that is not of the shape of its output, InvalidUnit for a unit.
     """
     root = ET.Element(
         "fmiModelDescription",
@@ -81,7 +81,7 @@ def model_description(
 
 
 def _annotation(root: ET.Element, component: Component) -> None:
-    """What couples blocks beyond FMI: timing, and the meaning of ports (`components.ports`)."""
+    """The vendor annotation: timing, and declarations about ports (`components.ports`)."""
     tool = ET.SubElement(ET.SubElement(root, "VendorAnnotations"), "Tool", name="hapticlink")
     about = {"timing": component.timing, "substeps": str(component.substeps)}
     block = ET.SubElement(tool, "Block", about)
@@ -111,7 +111,7 @@ def _unit_definitions(root: ET.Element, component: Component) -> None:
 
 
 def scalars(variables: Iterable[Variable]) -> Iterator[tuple[Variable, str, str, float]]:
-    """(variable, name, unit, start) of each scalar in flat order."""
+    """Variable, name, unit and start value of each scalar in flat order."""
     for v in variables:
         for name, unit, start in zip(v.names, v.units, v.starts, strict=True):
             yield v, name, unit, start
@@ -145,7 +145,7 @@ def _model_variables(root: ET.Element, component: Component) -> None:
 
 
 def _derivatives(variables: ET.Element, component: Component) -> None:
-    """Which output is the derivative of which (FMI 2.0.5 section 2.2.7)."""
+    """Adds the attribute `derivative` to outputs that are derivatives (FMI 2.0.5 section 2.2.7)."""
     index = {scalar.get("name"): i for i, scalar in enumerate(variables)}
     outputs = {v.name: v for v in component.outputs}
     for v in (v for v in component.outputs if v.derivative_of):
@@ -174,12 +174,12 @@ def _model_structure(root: ET.Element, component: Component) -> None:
 
 
 def feed_through(component: Component) -> list[list[int]]:
-    """For each flat output the flat inputs that y = output(x, u, p, t) reads."""
+    """For each flat output, the flat inputs that y = output(x, u, p, t) depends on."""
     return _rows(component.output.jac_sparsity(0, 1))
 
 
 def initial_dependencies(component: Component) -> list[list[int]]:
-    """For each flat output the places in [inputs | parameters] that it reads at t = 0."""
+    """For each flat output, the indices in [inputs | parameters] that it depends on at t = 0."""
     n_u, n_p = len(component.start_inputs), len(component.start_parameters)
     known, t = ca.SX.sym("known", n_u + n_p), ca.SX.sym("t")
     u, p = known[:n_u], known[n_u:]

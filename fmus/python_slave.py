@@ -1,19 +1,19 @@
 """The slave of every Python FMU: a component's functions behind pythonfmu's interface.
 
-Its text is copied into the FMU's resources/ under a name that carries a hash of the FMU's
-content: all Python FMUs of a process share one interpreter, and a second module of the
-same name would silently be the first. It needs the standard library and pythonfmu; casadi
-is used where it is there. pythonfmu runs the body twice and takes for the slave the class
-that it finds in it, so the body does nothing and imports no other class.
+Its text is copied into the FMU's resources/ under a name with a hash of the FMU's content: all
+Python FMUs of a process share one interpreter, in which a second module of the same name would
+silently be the first one. It needs the standard library and pythonfmu, and uses casadi if that is
+installed. pythonfmu executes the module's body twice and takes the class that it finds in it for
+the slave, so the body has no side effects and imports no other class.
 
-All reals stand in one array [inputs | parameters | outputs]; a place is a value reference.
+All reals are in one array [inputs | parameters | outputs], whose indices are the value references.
 
     continuous   doStep: substeps times x <- step(x, u, p, t, h/substeps);
-                 get: y = output(x, u, p, t), evaluated when asked for
+                 get: y = output(x, u, p, t), evaluated on demand
     sampled      doStep: y <- output(x, u, p, t_k), then x <- step(...); get: that y
 
-Up to the end of initialisation mode both kinds answer a get with y = output(x0, u, p, t),
-x0 = initialize(u, p), of the values set so far.
+Until the end of initialisation mode a get of either kind returns y = output(x0, u, p, t) with
+x0 = initialize(u, p), from the values set so far.
 
 A call out of order (FMI 2.0.5 section 4.2.4) and a time that is not finite are refused.
 """
@@ -37,11 +37,11 @@ INSTANTIATED, INITIALIZATION, STEP, TERMINATED = MODES
 
 
 def _surviving(method: typing.Callable) -> typing.Callable:
-    """A method whose exceptions leave the process whole.
+    """A method whose exceptions do not crash the process.
 
-    pythonfmu 0.7 answers an exception with fmi2Fatal and drops its references to the class,
-    the instance and its log, and then drops them again when it frees the instance: the
-    process crashes. So each gets the reference that will be missing.
+    pythonfmu 0.7 reports an exception as fmi2Fatal and releases its references to the class, the
+    instance and its log, and then releases them again when it frees the instance, which crashes
+    the process. So an additional reference to each is added here.
     """
 
     @functools.wraps(method)
@@ -73,7 +73,7 @@ class HapticlinkSlave(Fmi2Slave):
         self._settable, self._n_inputs = n_u + n_p, n_u
         self._fixed = frozenset(about["fixed"])
         self._sampled, self._substeps = about["timing"] == "sampled", about["substeps"]
-        # due: to be computed before it is read
+        # due: to be computed before the next read
         self._mode, self._start_due, self._output_due = INSTANTIATED, True, True
         t, h = _doubles([0.0]), _doubles([0.0])
         x, trial, after = (_doubles([0.0] * n_x) for _ in range(3))
@@ -98,12 +98,12 @@ class HapticlinkSlave(Fmi2Slave):
                     raise ValueError(f"the guid of {path} is not that of this FMU, {guid}")
 
     def _release_at_exit(self) -> None:
-        """Have pythonfmu's library let go of its interpreter before its own destructors run.
+        """Makes pythonfmu's library release its interpreter before the library's destructors run.
 
-        pythonfmu 0.7 destroys the static that holds the interpreter and then, in the library's
-        destructor, drops it once more: memory is corrupted as the process ends. Dropped while
-        Python still runs, it is null by then. In a process that is no Python program, where
-        the library owns the interpreter, there is nothing to let go of.
+        pythonfmu 0.7 destroys the static object that holds the interpreter and then releases it
+        again in the library's destructor, which corrupts memory as the process ends. If it is
+        released while Python is still running, it is null by then. In a process that is no Python
+        program the library owns the interpreter, and nothing is to be done.
         """
         if os.name != "posix" or self._released or not getattr(sys, "orig_argv", None):
             return
@@ -114,13 +114,13 @@ class HapticlinkSlave(Fmi2Slave):
                 library = ctypes.CDLL(path, mode=os.RTLD_NOLOAD | os.RTLD_LAZY)
                 atexit.register(library.finalizePythonInterpreter)
                 self._released.append(library)
-        except OSError:  # not loaded from there: nothing of ours to let go of
+        except OSError:  # loaded from elsewhere: nothing to release
             return
 
     # --- the component's functions ------------------------------------------------------
 
     def _bind(self, name: str, arguments: tuple, result: memoryview) -> typing.Callable:
-        """A call without arguments that reads and writes these arrays in place."""
+        """A function without arguments that evaluates `name` on these arrays in place."""
         function = self._functions()[name]
         if not hasattr(function, "buffer"):
             return functools.partial(function, *arguments, result)
@@ -138,7 +138,8 @@ class HapticlinkSlave(Fmi2Slave):
         return self._loaded[pure]
 
     def _read_casadi(self) -> dict:
-        """The CasADi functions; the same in plain Python where casadi is missing or refuses."""
+        """The CasADi functions, or those in plain Python if casadi is missing or cannot read its
+        files."""
         try:
             import casadi
 
@@ -215,7 +216,8 @@ class HapticlinkSlave(Fmi2Slave):
             self._output_due = True
 
     def _block(self, vrs: list) -> tuple:
-        """(slice where the value references are a run, else None; the largest), remembered."""
+        """The value references as a slice, None if they are not consecutive, and the largest one;
+        cached. Raises ValueError for an unknown value reference."""
         key = tuple(vrs)
         found = self._blocks.get(key)
         if found is None:
@@ -242,7 +244,7 @@ class HapticlinkSlave(Fmi2Slave):
                 )
 
     def _refresh(self) -> None:
-        """Bring x0 and y up to date with what was set."""
+        """Update x0 and y after values were set."""
         if self._start_due:
             self._evaluate_x0()
             self._start_due = False
@@ -251,7 +253,7 @@ class HapticlinkSlave(Fmi2Slave):
             self._output_due = False
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """True is fmi2OK, False fmi2Discard; nothing is raised. State and outputs move on
+        """True is fmi2OK, False fmi2Discard; raises nothing. State and outputs change only on
         success."""
         try:
             return self._advance(current_time, step_size)
@@ -294,7 +296,8 @@ class HapticlinkSlave(Fmi2Slave):
         return True
 
     def _not_finite(self, found: memoryview, time: float, outputs: bool = False) -> str:
-        """Which of the states, or of the outputs, is not finite, and the likely cause."""
+        """The message which state, or with `outputs` which output, is not finite, with the likely
+        cause."""
         about = self._about
         names = about["names"][self._settable :] if outputs else about["states"]
         i = next(i for i, value in enumerate(found) if not math.isfinite(value))
@@ -331,7 +334,7 @@ class HapticlinkSlave(Fmi2Slave):
             part[:] = array.array("d", state[offset:end])
             offset = end
 
-    # There are none of these; asked for all the same, the answer must not crash.
+    # There are no variables of these types, but importers may call these functions.
     get_integer = _surviving(Fmi2Slave.get_integer)
     get_boolean = _surviving(Fmi2Slave.get_boolean)
     get_string = _surviving(Fmi2Slave.get_string)
@@ -349,5 +352,5 @@ class HapticlinkSlave(Fmi2Slave):
 
 
 def _doubles(values: list) -> typing.Any:
-    """Doubles in memory of our own; slices of it share that memory."""
+    """An array of doubles, whose slices share its memory."""
     return memoryview(array.array("d", values))

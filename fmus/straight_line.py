@@ -1,15 +1,15 @@
-"""A CasADi function as straight-line Python text that needs nothing but `math`.
+"""Writes a CasADi function as straight-line Python text that only needs `math`.
 
-An importer's Python need not have casadi (277 MB), or has one that cannot read this one's files: a
-Python FMU runs there all the same, only slower.
+The Python of an importer may lack casadi (277 MB), or have a version that cannot read this one's
+files: a Python FMU runs there as well, only slower.
 
-Each instruction of CasADi's virtual machine becomes one assignment, in its order, so both
-ways of evaluating do the same operations on the same numbers. A generated function reads
-its arguments and writes its results in place:
+Each instruction of CasADi's virtual machine becomes one assignment, in the same order, so that both
+evaluations do the same operations on the same numbers. A generated function reads its arguments and
+writes its results in place:
 
     def step(a0, a1, r0):        # r0[i] = ...
 
-A time table is looked up by a function of its own, on rows that stand once in the text.
+A time table is looked up by a function of its own, with its rows written once in the text.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from hapticlink.components.time_tables import TimeTable
 from hapticlink.fmus import ieee
 from hapticlink.fmus.errors import UnknownOperation
 
-# One of `UNARY` and `BINARY` is a function of ieee.py by the same name.
+# A name in `UNARY` and `BINARY` is a function of ieee.py.
 UNARY = """exp expm1 log log1p sqrt sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh
            floor ceil fabs sign erf erfinv"""
 BINARY = "atan2 fmod remainder copysign fmin fmax hypot if_else_zero"
 
-# Plain arithmetic stays an operator; division and powers raise in Python, so they do not.
+# Plain arithmetic uses operators; division and powers do not, since they raise in Python.
 TEMPLATES: dict[int, str] = {
     ca.OP_ASSIGN: "{0}",
     ca.OP_ADD: "{0} + {1}",
@@ -59,10 +59,10 @@ _NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
 
 
 def straight_line(function: ca.Function) -> str:
-    """The text of a Python function of the same name.
+    """The text of a Python function with the same name.
 
     Raises UnknownOperation for an instruction that is neither scalar arithmetic nor the look-up of
-    a table (an external call, a solver) and for a free variable.
+    a table (such as an external call or a solver), and for a free variable.
     """
     if not function.is_a("SXFunction"):
         function = function.expand()
@@ -97,7 +97,7 @@ def _instruction(function: ca.Function, k: int) -> str:
 
 
 def _called(function: ca.Function, k: int) -> str:
-    """The name of the look-up that instruction k is."""
+    """The name of the look-up that instruction k calls."""
     called = function.instructions_sx()[k].which_function()
     if called.class_name() not in ("LinearInterpolant", "LinearInterpolantJac"):
         raise UnknownOperation(
@@ -108,13 +108,13 @@ def _called(function: ca.Function, k: int) -> str:
 
 
 def _literal(value: float) -> str:
-    """repr gives the same double back; inf and nan have no literal."""
+    """A Python literal of the same double; inf and nan are names."""
     return repr(float(value)) if math.isfinite(value) else f"float({str(value)!r})"
 
 
 def program(functions: Iterable[ca.Function], tables: Iterable[TimeTable] = ()) -> str:
-    """One text, to be executed in an empty namespace, that defines all `functions` and the `tables`
-    that they look up."""
+    """A text that defines all `functions` and the `tables` that they look up; it is to be executed
+    in an empty namespace."""
     helpers = Path(ieee.__file__).read_text(encoding="utf-8")
     data = (
         f"{t.called}, jac_{t.called} = look_up({[r[0] for r in t.rows]}, "

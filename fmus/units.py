@@ -25,10 +25,10 @@ _UNIT = re.compile(rf"(?P<top>1|{_PRODUCT})(?:/(?:(?P<one>[A-Za-z]+\d*)|\((?P<lo
 
 
 def base_unit(unit: str) -> dict[str, int]:
-    """Exponents of the base units, zeros left out; {} for "1".
+    """Exponents of the base units, without zeros; {} for "1".
 
-    One fraction bar; a denominator of several factors stands in parentheses. Raises
-    InvalidUnit naming the part that is not understood.
+    A unit may have one fraction bar, with a denominator of several factors in parentheses. Raises
+    InvalidUnit with the part that is not understood.
     """
     match = _UNIT.fullmatch(unit)
     if match is None:

@@ -1,4 +1,4 @@
-"""One experiment from scene to folder: build, run, `run.json`."""
+"""Runs an experiment from scene to result folder: build, run, write `run.json`."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from hapticlink.orchestrator.system.system import System
 
 @dataclass(frozen=True)
 class Experiment:
-    """A finished run and how it ended. `run` is what run.json says: in `folder`, unless the run had
-    no row and left there those of an earlier one."""
+    """A finished run. `run` is the content of its run.json, which is in `folder` unless the run had
+    no row and results of an earlier run were kept there."""
 
     scene: Scene
     system: System
@@ -45,6 +45,7 @@ class Experiment:
 
     @property
     def results(self) -> Results:
+        """The results of the run, with empty tables if it had no row."""
         if self.outcome.published:
             return load(self.folder)
         none: dict[str, Table] = {}
@@ -55,7 +56,7 @@ class Experiment:
 
 
 def _columns(system: System) -> dict[str, list[str]]:
-    """By clock."""
+    """The column names of each clock's table."""
     signals = SignalVector(system)
     return {clock.name: signals.columns(clock.name) for clock in system.timeline.clocks}
 
@@ -66,11 +67,11 @@ def simulate(
     options: Options = (),
     progress: Progress | None = None,
 ) -> Experiment:
-    """Run a scene (a name, a path, or a Scene), changed by `options`, into `folder`.
+    """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
-    Raises InputFault before anything runs, Interrupted where a signal comes before that; a fault of
-    the run itself is in the outcome, and its results are kept. Those of an earlier run in `folder`
-    go when the first rows of this one are there.
+    Raises InputFault before the run for invalid input, and Interrupted for a signal before the run.
+    A fault during the run is in the outcome, and its results up to then are kept. Results of an
+    earlier run in `folder` are removed once the first rows of this one are written.
     """
     with interrupt.held():
         return _simulated(scene, Path(folder), options, progress)

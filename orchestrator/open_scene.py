@@ -1,4 +1,4 @@
-"""A scene by its name or path: a shipped one, a TOML file, an SSP; or with further options."""
+"""Opens a scene by its name or path: a shipped one, a TOML file, or an SSP."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.faults import Finding, SceneFault
-from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # by which scenes are checked
+from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find import find, folder_of
@@ -18,10 +18,13 @@ from hapticlink.orchestrator.scene.source import Source
 
 
 def load(scene: str | FilePath | Scene, options: Options = ()) -> Scene:
-    """Find, change by `options` and check a scene: a file, a shipped one, an SSP. A Scene that was
-    read from one is read again with its own options and those given; one that was made or changed
-    in Python is checked. Raises SceneFault with every finding, InputFault for an option that cannot
-    be applied."""
+    """Find a scene, change it by `options` and check it.
+
+    scene: the name of a shipped one, the path of a TOML file or SSP, or a Scene. A Scene that was
+    read from a file is read again with its own options and the given ones; one that was created or
+    changed in Python is checked. Raises SceneFault with every finding, InputFault for a scene that
+    is not found and for an option that cannot be applied.
+    """
     plugins.load_installed()
     further = overrides.written(options)
     if isinstance(scene, Scene) and scene.source and not further:
@@ -35,7 +38,7 @@ def load(scene: str | FilePath | Scene, options: Options = ()) -> Scene:
 
 def _find(scene: str) -> Source:
     if scene.endswith(".ssp"):
-        # Its XML parsers take a while to load.
+        # Imported here, since its XML parsers are slow to load.
         from hapticlink.orchestrator.ssp import read as ssp
 
         return Source(scene, ssp.tables(FilePath(scene)), {})
@@ -59,8 +62,8 @@ def _check_ssp(source: Source) -> None:
     needed = [("duration", "3")] * ("duration" not in source.tables)
     needed += [("haptics.rate", "100")] * ("haptics" not in source.tables)
     if fixed := sorted(k for k in keys if names.is_fixed(k)):
-        say = "the FMUs of an SSP are made: change its scene and export that again"
-        raise SceneFault(source.name, [Finding(".".join(k), say) for k in fixed])
+        remedy = "the FMUs of an SSP are built already: change its scene and export it again"
+        raise SceneFault(source.name, [Finding(".".join(k), remedy) for k in fixed])
     if missing := [n for n in needed if tuple(n[0].split(".")) not in keys]:
-        say = "neither it nor the DefaultExperiment of its FMUs gives one: write e.g. --set {}={}"
-        raise SceneFault(source.name, [Finding(key, say.format(key, v)) for key, v in missing])
+        remedy = "given neither by it nor by its FMUs' DefaultExperiment: add e.g. --set {}={}"
+        raise SceneFault(source.name, [Finding(key, remedy.format(key, v)) for key, v in missing])

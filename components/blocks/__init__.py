@@ -1,8 +1,8 @@
-"""The blocks, one FMU a file; `BLOCKS` names them as a scene does.
+"""The blocks, one FMU a file; `BLOCKS` holds them by the names that a scene uses.
 
-A block is a function that gives a component. Its first argument is the communication step (s), the
-others are its settings: what a scene may say of it, by their names and annotations. Those here
-import their equations when they are called, so that a scene is read without them.
+A block is a function that returns a component. Its first argument is the communication step size
+(s); the others are its settings, whose names and annotations define the keys of a scene. The
+functions here import their equations when they are called, so that reading a scene does not.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The user's hand: a constant wrench, a wrench from a table, or an arm behind a grip.
+"""The user's hand: a constant wrench, a wrench from a table, an arm behind a grip, or a spring.
 
-Sampled: F of t_k from the handle's x and v of t_k, with + on the handle.
+Sampled: F(t_k) from the handle's x and v at t_k; F acts with + on the handle.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _V = Variable("v", (3,), TWIST, description="velocity of the handle")
 
 
 def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
-    """F = F(t) - B v, the damper to ground where the spec has one."""
+    """F = F(t) - B v, with a damper to ground if the spec has one."""
     parameters, inputs = [], []
     if isinstance(spec, specs.ConstantHand):
         parameters += [Variable("wrench", (3,), WRENCH, spec.wrench, "wrench on the handle")]
@@ -54,7 +54,7 @@ def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
 
 
 def _arm(spec: specs.ArmHand) -> Component:
-    """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F, the grip
+    """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F, with the grip's
     F = K_gr (x_a - x) + B_gr (x_a' - v)."""
     block = Block(
         inputs=[_X, _V],
@@ -119,9 +119,9 @@ def hand(spec: specs.Hand) -> Component:
     """The hand that `spec` describes.
 
     Constant or profile: F = F(t) - B v; x is no input, and v only where there is damping.
-    Arm: a mass held to a target path, F through the spring and damper of the grip, the
-    handle's x and v held over each step. It starts at the handle's x and v with F = 0.
-    Spring: an arm without a mass.
+    Arm: a mass that a spring and damper pull to a target path; F acts through the spring and damper
+    of the grip, with the handle's x and v held over each step. It starts at the handle's x and v
+    with F = 0. Spring: F = K (x_t - x) + B (x_t' - v), without a mass.
     """
     if isinstance(spec, specs.ArmHand):
         return _arm(spec)

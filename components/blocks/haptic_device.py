@@ -2,8 +2,8 @@
 
     M_d(x) v' + C_d(x, v) v = J_q' tau + F_hand + stops        (4.5)
 
-tau, the least-norm torques of F_motor at the pose measured at t_k, saturated, is held
-over the communication step [t_k, t_k + h).
+tau, the torques of least norm for F_motor at the pose measured at t_k, saturated, is held over the
+communication step [t_k, t_k + h).
 """
 
 from __future__ import annotations
@@ -78,18 +78,18 @@ def _plant(block: Block) -> ca.Function:
 
 
 def _quantised(angles: ca.SX, resolution: ca.SX) -> ca.SX:
-    """The nearest whole number of encoder counts, in rad."""
+    """The angles (rad) rounded to whole encoder counts."""
     return resolution * ca.floor(angles / resolution + 0.5)
 
 
 def haptic_device(device: specs.Device) -> Component:
-    """The device as `device` describes it.
+    """The FMU `haptic_device`, with the parameters of `device`.
 
-    sensing "ideal": x, v and F_hand_observed are the true ones. "encoders": x is the pose
-    of the quantised base angles, v and F_hand_observed are the observer's. M and
-    c = C_d v are at the measured pose and velocity; workspace_margin is the true one.
-    Every number of the device is assumed, the report gives none but the 0.09 degrees.
-    At t = 0 the handle rests at x_start and the observed force is zero.
+    sensing "ideal": x, v and F_hand_observed are the true values. "encoders": x is the pose that
+    belongs to the quantised base angles, v and F_hand_observed come from the observer. M and
+    c = C_d v are evaluated at the measured pose and velocity, workspace_margin at the true pose.
+    All dimensions are assumed, since the report only gives the 0.09 degrees of an encoder count.
+    At t = 0 the handle is at rest at x_start and the observed force is zero.
     """
     encoders = device.sensing == "encoders"
     states = [

@@ -1,11 +1,11 @@
 """The virtual environment (the report's graphics block): a copy of the linkage at graphics rate.
 
-It follows the mechanism by its coordinates, moved onto the closures, or is pulled by a PD graphics
+It takes the mechanism's coordinates, projected onto the closures, or is pulled by a PD graphics
 controller as in section 4.2.2 (`follow_mechanism`).
 
-It computes what the haptic side is too busy for: Lambda^-1 (B.13), the projector on the resisted
-directions (in place of B.14) and their number, the contact geometry, and whether it is on the
-mechanism's branch.
+It computes what would take too long at the haptic rate: Lambda^-1 (B.13), the projector on the
+constrained directions (in place of B.14) and their number, the contact geometry, and whether it is
+on the mechanism's branch.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hapticlink.components.contact import contact_forces
 from hapticlink.components.dynamics import follow_mechanism
 from hapticlink.components.dynamics import local_model as held_matrices
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
-from hapticlink.components.dynamics.constrained_directions import resisted_directions
+from hapticlink.components.dynamics.constrained_directions import constrained_directions
 from hapticlink.components.dynamics.massless_bodies import require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import (
@@ -46,8 +46,9 @@ def virtual_environment(
     mobility: bool = True,
     local_model: bool = False,
 ) -> Component:
-    """The FMU `virtual_environment`, of what is asked: `mobility` is Lambda_inv, `directions` P_c
-    and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h (B.15).
+    """The FMU `virtual_environment` with the outputs that are requested: `mobility` Lambda_inv,
+    `directions` P_c and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h
+    (B.15).
 
     Raises AssemblyError where a loop does not close, MasslessError where a massless body is free.
     """
@@ -63,7 +64,7 @@ def virtual_environment(
             *(_direction_parameters(linkage, directions) if directions else []),
             *(contact_forces.detection_parameters(linkage, contacts) if contacts else []),
         ],
-        states=[*states(linkage), *([Variable("n_resisted")] if directions else [])],
+        states=[*states(linkage), *([Variable("n_constrained")] if directions else [])],
         outputs=[
             *_outputs(linkage, units),
             *([mobility_output()] if mobility else []),
@@ -82,9 +83,9 @@ def virtual_environment(
     if mobility:
         output["Lambda_inv"] = space.Lambda_inv
     if directions:
-        resisted = resisted_directions(block, space, q0, q1)
-        initial["n_resisted"], step["n_resisted"] = resisted.first, resisted.after
-        output |= resisted.output
+        found = constrained_directions(block, space, q0, q1)
+        initial["n_constrained"], step["n_constrained"] = found.first, found.after
+        output |= found.output
     if linkage.loop:
         output |= _branch(block, model)
     if contacts:

@@ -3,9 +3,9 @@
     D qdd + C qd = Q + J_h' (F_hand - F_drift) + W' lambda,   W qdd + w_stab = 0   (B.6)
     w_stab = w + 2 alpha beta W qd + alpha^2 h                                  (B.5) as corrected
 
-Contacts add Q = sum_i J_i' F_i (contact.py). Closures are kept by the stabilisation that the scene
-names: none, Baumgarte, or projection of position and velocity after each step. The start pose is
-assembled in initialisation.
+Contacts add Q = sum_i J_i' F_i (contact_forces.py). The scene chooses how the closures are
+stabilised: not at all, by Baumgarte's method, or by projection of position and velocity after each
+step. The start pose is assembled in initialisation mode.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from hapticlink.components.dynamics import (
 )
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
-from hapticlink.components.dynamics.constrained_directions import resisted_directions
+from hapticlink.components.dynamics.constrained_directions import constrained_directions
 from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.projection import projection
@@ -60,13 +60,13 @@ def virtual_mechanism(
     length_scale: float | None = None,
     frame_s: float | None = None,
 ) -> Component:
-    """The FMU `virtual_mechanism`. With `directions` it puts out its own Lambda_inv and P_c;
-    frame_s (s) makes it the local model (B.15), with D, W, w and J_h as inputs, held for a frame.
+    """The FMU `virtual_mechanism`. With `directions` it has its own Lambda_inv and P_c as outputs;
+    with frame_s (s) it is the local model (B.15), with D, W, w and J_h as inputs, held for a frame.
 
-    step_s (s), the communication step, sets the default Baumgarte alpha; length_scale (m) makes
-    rotations comparable where `directions` does not say so. Raises AssemblyError where a loop
-    does not close, MasslessError where a massless body is free, ValueError for an unknown method,
-    and for a formulation that does not fit.
+    step_s (s), the communication step size, sets the default Baumgarte alpha; length_scale (m) is L
+    where `directions` does not give it. Raises AssemblyError where a loop does not close,
+    MasslessError where a massless body is free to move, ValueError for an unknown method and for a
+    formulation that does not fit the other settings.
     """
     independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
     if contacts and not contact_forces.places(linkage, contacts):
@@ -116,10 +116,10 @@ def virtual_mechanism(
     q1, qd1 = ca.vertsplit(_step(block, model, mechanism, applied, space, tables), model.q.numel())
     stepped = ca.vertcat(carried(model, q1, qd1, block.h), qd1)
     if directions:
-        resisted = resisted_directions(block, space, q0, q1)
-        initial["n_resisted"] = resisted.first
-        stepped = ca.vertcat(stepped, resisted.after)
-        output |= {"Lambda_inv": space.Lambda_inv, **resisted.output}
+        constrained = constrained_directions(block, space, q0, q1)
+        initial["n_constrained"] = constrained.first
+        stepped = ca.vertcat(stepped, constrained.after)
+        output |= {"Lambda_inv": space.Lambda_inv, **constrained.output}
     if tables:
         now = time_tables.at(tables, block.t)
         output = {name: ca.substitute(value, tabled, now) for name, value in output.items()}
@@ -143,7 +143,7 @@ def virtual_mechanism(
 
 @dataclass(frozen=True)
 class _Parts:
-    """What the mechanism has."""
+    """The parts of the mechanism."""
 
     linkage: Linkage
     mechanism: Mechanism
@@ -186,7 +186,7 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
         if contacts.detection == "graphics":
             inputs.append(contact_forces.contact_port(linkage, contacts))
     if directions:
-        memory.append(Variable("n_resisted"))
+        memory.append(Variable("n_constrained"))
         parameters += direction_parameters(directions)
         outputs += [mobility_output(), *direction_outputs()]
     return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
@@ -200,8 +200,8 @@ def _step(
     space: OperationalSpace,
     tables: list[TimeTable],
 ) -> ca.SX:
-    """(q, qd) after h: the method on the stabilised equations, then projection if chosen; or the
-    method in independent coordinates."""
+    """(q, qd) after h: integration of the stabilised equations, followed by projection if chosen;
+    or integration in independent coordinates."""
     n = model.q.numel()
     efforts = space.terms.efforts + applied
     x, u, p, t = ca.vertcat(model.q, model.qd), block.u.vector, block.p.vector, block.t

@@ -1,9 +1,9 @@
-"""Which bodies can never touch an obstacle: they need no narrow phase.
+"""Broad phase: pairs of a body and an obstacle that can never touch and need no narrow phase.
 
-A chain of revolute joints keeps every point of a body within the sum of its links' lengths of
-the joint on the ground. A prismatic or free joint on the way has no such bound. Loops only make
-the reach smaller. Lengths are those of the scene: this is structure, settled once. Pairs within
-reach are evaluated at every pose.
+A chain of revolute joints keeps every point of a body within the sum of its links' lengths of the
+joint on the ground. A prismatic or free joint in the chain has no such bound. Loops only reduce the
+reach. Lengths are those of the scene, so the result is fixed when the FMU is built; all other pairs
+are evaluated at every pose.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ ORIGIN = (0.0, 0.0)
 
 
 def reach(linkage: Linkage, body: str) -> tuple[Point, float]:
-    """(centre, radius) in m of a disc that the body's shape never leaves; the radius may be inf."""
+    """Centre and radius (m) of a disc that the body's shape never leaves; the radius may be inf."""
     by_child = {j.child: j for j in linkage.joint}
     shape = next(b for b in linkage.body if b.name == body)
     joint = by_child[body]
@@ -35,13 +35,13 @@ def reach(linkage: Linkage, body: str) -> tuple[Point, float]:
 
 
 def near(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
-    """The pairs that can touch."""
+    """The pairs of a body and an obstacle that can touch."""
     far = set(out_of_reach(linkage, contacts))
     return tuple(pair for pair in pairs(linkage, contacts) if pair not in far)
 
 
 def out_of_reach(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
-    """The pairs that can never touch, and are left out."""
+    """The pairs that can never touch; none if the scene turns the broad phase off."""
     if not contacts.broad_phase:
         return ()
     return tuple(p for p in pairs(linkage, contacts) if not _can_touch(linkage, contacts, p))
@@ -62,7 +62,7 @@ def _can_touch(linkage: Linkage, contacts: Contacts, pair: Pair) -> bool:
 
 
 def counterclockwise(corners: tuple[Point, ...]) -> tuple[Point, ...]:
-    """The corners with the inside on the left of every edge."""
+    """The corners in counterclockwise order, with the inside on the left of every edge."""
     area = sum(a[0] * b[1] - b[0] * a[1] for a, b in edges(corners))
     return corners if area > 0 else corners[::-1]
 

@@ -1,4 +1,4 @@
-"""Closest points and separating axes of points, segments and convex polygons, by bounded work.
+"""Closest points and separating axes of points, segments and convex polygons, with bounded work.
 
 Ericson, Real-Time Collision Detection (2005), sections 5.1.2, 5.1.9 and 5.2.1. Corners are
 counterclockwise, k x 2 (m).
@@ -12,7 +12,7 @@ TINY = 1e-300
 
 
 def edges(corners: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
-    """(start, end, normal to the right) of each edge."""
+    """Start, end and outward normal (to the right) of each edge."""
     number = corners.shape[0]
     found = []
     for k in range(number):
@@ -27,7 +27,8 @@ def select(condition: ca.SX, one: list[ca.SX], other: list[ca.SX]) -> list[ca.SX
 
 
 def along(ends: list[ca.SX], world: list[ca.SX], target: ca.SX) -> ca.SX:
-    """Share of the way from the first end to the second that is nearest to `target`, unclamped."""
+    """Parameter s of the point on the line from the first end (0) to the second (1) that is nearest
+    to `target`, not clamped."""
     if len(ends) == 1:
         return ca.SX(0)
     span = world[1] - world[0]
@@ -39,7 +40,8 @@ def between(ends: list[ca.SX], s: ca.SX) -> ca.SX:
 
 
 def nearest_on_boundary(walls: list[tuple[ca.SX, ca.SX, ca.SX]], at: ca.SX) -> list[ca.SX]:
-    """[point, normal] of the boundary nearest to a point: the edge's normal, or off a corner."""
+    """The boundary's point nearest to a given one, and its normal: that of the edge, or from a
+    corner to the given point."""
     best: list[ca.SX] = []
     for a, b, outward in walls:
         s = ca.dot(at - a, b - a) / ca.dot(b - a, b - a)
@@ -56,8 +58,8 @@ def nearest_on_boundary(walls: list[tuple[ca.SX, ca.SX, ca.SX]], at: ca.SX) -> l
 def way_out(
     world: list[ca.SX], corners: ca.SX, side: ca.SX, heights: list[ca.SX]
 ) -> tuple[ca.SX, ca.SX]:
-    """(distance, direction) of the axis along which a segment is farthest from a convex polygon,
-    negative where they overlap: separating axes, Ericson section 5.2.1."""
+    """Distance and direction of the separating axis along which a segment is farthest from a convex
+    polygon, negative where they overlap (Ericson, section 5.2.1)."""
     best = [-ca.mmax(ca.vertcat(*heights)), -side]
     over = ca.mmin(ca.vertcat(*heights))
     best = select(over > best[0], [over, side], best)

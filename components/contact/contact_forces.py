@@ -1,10 +1,10 @@
-"""Penalty contact of capsule-shaped links, without pulling (k_contact, b_contact of section B.6).
+"""Penalty contact of capsule-shaped links that never pulls (k_contact, b_contact of section B.6).
 
     g  = n . (x - x_plane) - r,   g' = n . v          gap (m) and its rate at the contact point
     F  = n max(0, -k g - b g')  where g < 0, else 0
     Q  = sum_i J_i' F_i
 
-At the operational point all contacts together act as F_env (2.18), which has their effect there
+F_env (2.18) is the wrench at the operational point that has the same effect there as all contacts,
 and the least norm in the scaled metric S = diag(1, 1, L):
 
     Lambda^-1 F_env = J D^-1 (I - W' (W D^-1 W')^-1 W D^-1) sum_i J_i' F_i
@@ -31,25 +31,26 @@ from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
 
 FAR = 1e9  # m
-# Share of the largest eigenvalue below which a direction takes no part in F_env; nor does one
-# that the loops lock.
+# Directions with an eigenvalue below this share of the largest one are left out of F_env, and so
+# are those that the loops lock.
 RANK = 1e-6
 
 
 def places(linkage: Linkage, contacts: Contacts) -> int:
-    """Number of places where a link can touch an obstacle."""
+    """Number of potential contact places of all pairs."""
     return sum(pair.places for pair in near(linkage, contacts))
 
 
 def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
-    """The contact geometry that the virtual environment hands to the mechanism, a row a place."""
+    """The port for the contact geometry from the virtual environment to the mechanism, one row per
+    place."""
     rows = places(linkage, contacts)
     text = "active, point in the body, point and normal of the obstacle's plane, a row a contact"
     return Variable("contacts", (rows, len(COLUMNS)), COLUMNS, description=text, kind="table")
 
 
 def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
-    """Of the side that evaluates the forces."""
+    """Parameters of the block that evaluates the contact forces."""
     return [
         *detection_parameters(linkage, contacts, contacts.detection == "haptics"),
         Variable("k_contact", (), "N/m", contacts.stiffness, "stiffness of a contact"),
@@ -60,7 +61,7 @@ def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
 def detection_parameters(
     linkage: Linkage, contacts: Contacts, obstacles: bool = True
 ) -> list[Variable]:
-    """Radii of the links, and the obstacles where they are searched."""
+    """Radii of the links, and the obstacles in the block that detects contacts."""
     radii = {b.name: b.radius for b in linkage.body if b.radius is not None}
     found = shape_parameters(near(linkage, contacts), radii)
     return found + (obstacle_parameters(contacts) if obstacles else [])
@@ -74,13 +75,13 @@ def contact_outputs() -> list[Variable]:
 
 
 def gap(model: LinkageModel, touch: Touch) -> ca.SX:
-    """g, m."""
+    """Gap g (m)."""
     at = model.frames[touch.body].point(touch.point)
     return ca.dot(touch.normal, at - touch.plane) - model.p[f"{touch.body}.radius"]
 
 
 def detected(model: LinkageModel, contacts: Contacts) -> ca.SX:
-    """The `contacts` rows at the model's pose; active within the margin."""
+    """The rows of the `contacts` port at the model's pose; a place is active within the margin."""
     rows = []
     for touch in touches(model, contacts, model.p):
         active = ca.logic_and(touch.active, gap(model, touch) < contacts.margin)
@@ -89,7 +90,7 @@ def detected(model: LinkageModel, contacts: Contacts) -> ca.SX:
 
 
 def held(linkage: Linkage, contacts: Contacts, rows: ca.SX) -> list[Touch]:
-    """The places that the `contacts` rows tell of."""
+    """The places given by the rows of the `contacts` port."""
     bodies = [pair.body for pair in near(linkage, contacts) for _ in range(pair.places)]
     return [
         Touch(body, row[0] > 0.5, row[1:3].T, row[3:5].T, row[5:7].T)
@@ -99,7 +100,8 @@ def held(linkage: Linkage, contacts: Contacts, rows: ca.SX) -> list[Touch]:
 
 @dataclass(frozen=True)
 class ContactForces:
-    """Q (n x 1) of all contacts, the energy (J) stored in them, and the smallest gap (m)."""
+    """Generalised forces Q (n x 1) of all contacts, the energy (J) stored in them, and the smallest
+    gap (m)."""
 
     Q: ca.SX
     energy: ca.SX
@@ -109,7 +111,8 @@ class ContactForces:
 def contact_forces(
     model: LinkageModel, contacts: Contacts, p: Signals, found: list[Touch]
 ) -> ContactForces:
-    """Forces at the model's pose and velocity; the touching point counts as one of the body."""
+    """Contact forces at the model's pose and velocity, acting on the touching point as a material
+    point of the body."""
     wrenches: dict[str, ca.SX] = {}
     energy, least = ca.SX(0), ca.SX(FAR)
     for touch in found:
@@ -135,8 +138,8 @@ def contact_forces(
 def equivalent_wrench(
     Lambda_inv: ca.SX, open_mobility: ca.SX, acceleration: ca.SX, length_scale: ca.SX
 ) -> ca.SX:
-    """F of least scaled norm with Lambda^-1 F = a: S (S Lambda^-1 S)^+ S a; open_mobility is
-    J D^-1 J' of the open linkage."""
+    """The wrench F of least scaled norm with Lambda^-1 F = a, F = S (S Lambda^-1 S)^+ S a (3 x 1).
+    open_mobility is J D^-1 J' of the linkage with open loops."""
     S = constrained_directions.scaling(length_scale)
     values, vectors = constrained_directions.eigen(S @ Lambda_inv @ S)
     least = constrained_directions.locked(open_mobility, length_scale)

@@ -1,16 +1,16 @@
-"""Where a link is nearest to what it can touch: point, normal and gap, by bounded work.
+"""Narrow phase: point, normal and gap where a link is nearest to an obstacle, with bounded work.
 
 A link is a capsule, the points within `radius` of a segment. Each place of a pair is a `Touch`: a
-point on the segment, and the plane of the obstacle that faces it. There is always a fixed number
-of places, each with a flag: no iteration, no branch.
+point on the segment, and the plane of the obstacle that faces it. The number of places is fixed,
+each with a flag whether it is active, so that there is no iteration and no branch.
 
     enclosure   each end against its two nearest walls
     disc        the segment's point nearest to the centre
     polygon     each end's nearest point of the boundary, and the corner that is nearest to
                 the inside of the segment
 
-A link that sinks in deeper than its radius is still pushed back by the way that it came, up to the
-middle of the obstacle, where another way out is as short (closest.py).
+A link that penetrates deeper than its radius is still pushed back out on the side where it entered,
+up to the middle of the obstacle, where another side is as near (closest_points.py).
 """
 
 from __future__ import annotations
@@ -34,12 +34,13 @@ from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts, Pair
 
 COLUMNS = ("1", "m", "m", "m", "m", "1", "1")
-"""A row of the `contacts` port: active, point in the body (x, y), point and normal of the plane."""
+"""Units of a row of the `contacts` port: active, point in the body (x, y), point of the plane
+(x, y), normal of the plane (x, y)."""
 
 
 @dataclass(frozen=True)
 class Touch:
-    """A place where a link may touch: in the body's frame the point, in the world the plane."""
+    """A potential contact: a point in the body's frame, and a plane in the world."""
 
     body: str
     active: ca.SX
@@ -75,7 +76,7 @@ def obstacle_parameters(contacts: Contacts) -> list[Variable]:
 
 
 def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) -> list[Variable]:
-    """Radii of the bodies that can touch something, by body name."""
+    """Radii of the bodies that can touch something, as parameters."""
     names = dict.fromkeys(pair.body for pair in pairs)
     return [
         Variable(f"{n}.radius", (), "m", model_bodies[n], f"radius of {n}", "fixed") for n in names
@@ -83,7 +84,7 @@ def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) ->
 
 
 def touches(model: LinkageModel, contacts: Contacts, p: Signals) -> list[Touch]:
-    """Every place of every pair within reach, in the order of `reach.near`."""
+    """Every place of every pair within reach, in the order of `broad_phase.near`."""
     found = []
     for pair in near(model.linkage, contacts):
         ends = _ends(model, pair.body)
@@ -121,7 +122,7 @@ def _on_disc(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) -> 
     s = ca.fmin(ca.fmax(along(ends, world, center), 0), 1)
     away = between(world, s) - center
     distance = ca.norm_2(away)
-    # A link's axis through the very centre has no way out of its own: across is the shortest.
+    # If the link's axis passes through the centre the direction is undefined: take its normal.
     span = world[-1] - world[0] if len(world) == 2 else ca.SX([1.0, 0.0])
     across = ca.vertcat(-span[1], span[0]) / ca.norm_2(span)
     normal = ca.if_else(distance > 0, away / (distance + TINY), across)
@@ -141,10 +142,10 @@ def _on_polygon(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) 
 
 
 def _nearest_corner(body: str, ends: list[ca.SX], world: list[ca.SX], corners: ca.SX) -> Touch:
-    """The corner nearest to the inside of the segment, not active where none faces it.
+    """The corner nearest to the segment between its ends; not active where none faces it.
 
-    The plane stands along the segment. Its normal points to the segment; where the segment has
-    sunk in past the corner, no deeper than its way out, to the side where it gets out.
+    The plane is parallel to the segment. Its normal points to the segment, or, if the segment has
+    penetrated past the corner by no more than its distance to the outside, to that side.
     """
     span = world[1] - world[0]
     side = ca.vertcat(-span[1], span[0]) / ca.norm_2(span)

@@ -1,4 +1,4 @@
-"""Impedance control (report, section 4.2.1): the device moves as the mechanism would."""
+"""Impedance control (report, section 4.2.1): the device moves as the mechanism would move."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import casadi as ca
 
 
 def desired_acceleration(Lambda_inv: ca.SX, force: ca.SX) -> ca.SX:
-    """Lambda^-1 force, (4.4): zero along the directions that the mechanism resists."""
+    """Lambda^-1 force (m/s2, m/s2, rad/s2), (4.4): zero along the constrained directions."""
     return Lambda_inv @ force
 
 
 def motor_wrench(M: ca.SX, acceleration: ca.SX, c: ca.SX, F_hand: ca.SX) -> ca.SX:
-    """u = M_d a + C_d v - F_h (N, N, N.m): with (4.5) the device accelerates by a exactly.
+    """u = M_d a + C_d v - F_h (N, N, N.m): with (4.5) the device's acceleration is exactly a.
 
-    (4.6) written out and corrected. Printed, it holds F_h both in M_d Lambda^-1 F_HD, by
-    (4.3), and in (M_d Lambda^-1 - I) F_h: the hand would count twice.
+    This is (4.6), corrected: as printed, F_h occurs both in M_d Lambda^-1 F_HD, by (4.3), and in
+    (M_d Lambda^-1 - I) F_h, so that the hand's wrench would count twice.
     """
     return M @ acceleration + c - F_hand

@@ -10,7 +10,8 @@ import casadi as ca
 
 
 def drift_wrench(error: ca.SX, error_rate: ca.SX, K_pc: ca.SX, B_pc: ca.SX) -> ca.SX:
-    """F_drift = K_pc (x_S - x_D) + B_pc (v_S - v_D) (N, N, N.m), gains entry by entry.
+    """The virtual coupling F_drift = K_pc (x_S - x_D) + B_pc (v_S - v_D) (N, N, N.m), with gains
+    entry by entry.
 
     It acts with + on the device and with - on the mechanism.
     """

@@ -1,7 +1,7 @@
-"""Topology (joint-constraint) controller: a stiff PD along the constrained directions alone.
+"""Topology (joint-constraint) controller: a stiff PD controller along the constrained directions.
 
-Report, section 4.2.4 and (B.14). With S = diag(1, 1, L) lengths and angles compare; P_c
-projects on null(S Lambda^-1 S), the constrained directions.
+Report, section 4.2.4 and (B.14). S = diag(1, 1, L) makes lengths and angles comparable; P_c is the
+orthogonal projector on null(S Lambda^-1 S), the constrained directions.
 """
 
 from __future__ import annotations
@@ -14,23 +14,21 @@ from hapticlink.components.dynamics.constrained_directions import scaling
 def constraint_wrench(pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX) -> ca.SX:
     """F_T = S (P_c M_s^-1 P_c)^+ S pull, with M_s = S^-1 M_d S^-1 (N, N, N.m).
 
-    pull = k_j e + b_j edot (m/s2, m/s2, rad/s2) is the acceleration that the device gets
-    along the constrained directions: k_j and b_j are per kilogram of the device's inertia
-    constrained to them. The map is symmetric and positive semidefinite, does no work on
-    free motion and does not depend on L. For a projector P,
+    pull = k_j e + b_j edot (m/s2, m/s2, rad/s2) is the acceleration of the device along the
+    constrained directions: k_j and b_j are per kilogram of the device's inertia along them. The map
+    is symmetric and positive semidefinite, does no work on free motion and does not depend on L.
+    The pseudoinverse takes bounded work for any rank, since for a projector P
 
-        (P A P)^+ = (P A P + I - P)^-1 P,
-
-    bounded work, whatever the rank.
+        (P A P)^+ = (P A P + I - P)^-1 P.
     """
     S = scaling(length_scale)
     mobility = S @ ca.inv(M) @ S
-    resisted = P_c @ mobility @ P_c + ca.SX.eye(3) - P_c
-    return S @ ca.solve(resisted, P_c @ S @ pull)
+    regular = P_c @ mobility @ P_c + ca.SX.eye(3) - P_c
+    return S @ ca.solve(regular, P_c @ S @ pull)
 
 
 def plain_wrench(pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX) -> ca.SX:
-    """M_d P pull with P = S^-1 P_c S, for comparison only: it leaks onto free motion and
-    depends on L."""
+    """M_d P pull with P = S^-1 P_c S, for comparison only: it does work on free motion and depends
+    on L."""
     S = scaling(length_scale)
     return M @ ca.inv(S) @ P_c @ S @ pull

@@ -20,16 +20,16 @@ WEIGHT = {"forward": 0.0, "backward": 1.0, "trapezoidal": 0.5}
 
 
 def weight(rule: str) -> float:
-    """gamma of the rule; ValueError for a name that is none of the three."""
+    """gamma of the rule. Raises ValueError for an unknown rule."""
     if rule not in WEIGHT:
         raise ValueError(f"`rule`: {rule!r} is unknown; take one of {', '.join(WEIGHT)}")
     return WEIGHT[rule]
 
 
 def pole(rule: str, sT: Any) -> Any:
-    """z = (1 + (1 - gamma) sT) / (1 - gamma sT), where the rule sends a pole s (figure 1.4).
+    """z = (1 + (1 - gamma) sT) / (1 - gamma sT), the discrete pole of a pole s (figure 1.4).
 
-    sT: number or array, complex; the rule keeps a stable pole stable iff |z| < 1.
+    sT: complex number or array. The discrete system is stable iff |z| < 1.
     """
     gamma = weight(rule)
     return (1 + (1 - gamma) * sT) / (1 - gamma * sT)

@@ -1,4 +1,4 @@
-"""Nicosia observer: device velocity and hand force from pose and motor torques.
+"""Nicosia observer: estimates device velocity and hand force from pose and motor torques.
 
 The report's section 4.2.1 names it (after Nicosia & Tomei 1990) without equations or gains:
 
@@ -9,8 +9,8 @@ For constant M and C = 0 the observed force follows
 
     F_observed / F = K_p / (M s^2 + k_D M s + K_p).
 
-M and C are frozen over a step, so that any rule of `rules` applies to the linear system.
-At the start x1 is the measured pose and x2 zero: no velocity, no force.
+M and C are constant over a step, so that any rule of `discretisation` applies to the linear system.
+At t = 0 x1 is the measured pose and x2 zero: no velocity, no force.
 """
 
 from __future__ import annotations
@@ -43,9 +43,10 @@ def step(
     k_D: ca.SX,
     period: ca.SX,
 ) -> State:
-    """The state at the end of a period (s) with the pose measured at both ends.
+    """The state at the end of a `period` (s), with the pose measured at both ends.
 
-    F_motor is the wrench held between; M and C are (n, n), the rest (n,) or scalar.
+    F_motor is the wrench held over the period; M and C are (n, n), the others (n,) or scalar.
+    Raises ValueError for an unknown rule.
     """
     n = x1.numel()
     identity, zero = ca.SX.eye(n), ca.SX(n, n)
@@ -72,6 +73,6 @@ def force(*, x1: ca.SX, pose: ca.SX, M: ca.SX, omega_n: ca.SX) -> ca.SX:
 def velocity(*, x1: ca.SX, x2: ca.SX, pose: ca.SX, k_D: ca.SX) -> ca.SX:
     """Observed velocity x1' = x2 + k_D e (m/s, m/s, rad/s).
 
-    Not x2, which a force that the observer is not told of biases by k_D K_p^-1 F.
+    x2 itself is biased by k_D K_p^-1 F, with F the hand's wrench, which is no input.
     """
     return x2 + k_D * (pose - x1)

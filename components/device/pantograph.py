@@ -4,7 +4,7 @@ Two five-bars in parallel planes, A and B, hold the ends of a crank at p -+ (cra
 (cos theta, sin theta). Each five-bar is two arms (proximal and distal link) from a base
 joint to its crank end, plane A reaching toward +y and plane B toward -y, elbows outward:
 arms 1 to 4 are A left, A right, B left, B right. Every angle is explicit in the pose
-(x m, y m, theta rad), so the rest follows by differentiation; theta may turn for ever.
+(x m, y m, theta rad), so the rest follows by differentiation; theta is not wrapped.
 
 `p` maps the names of `specs.Device` to symbols or numbers.
 """
@@ -32,15 +32,15 @@ class Arm(NamedTuple):
 
 
 def arms(pose: ca.SX, p: Parameters) -> Iterator[Arm]:
-    """Inverse kinematics of the four arms, each a triangle base, elbow, crank end.
+    """Inverse kinematics of the four arms, each a triangle of base, elbow and crank end.
 
     With reach r and heading phi of the crank end from the base, by the law of cosines
 
         proximal = phi + s acos((l1^2 + r^2 - l2^2) / (2 l1 r))
         distal   = phi - s acos((l2^2 + r^2 - l1^2) / (2 l2 r))
 
-    s = +-1 puts the elbow outward. phi is counted from +-y, which no arm leaves by half
-    a turn, so no angle jumps inside the workspace. NaN where r leaves [|l1 - l2|, l1 + l2].
+    s = +-1 puts the elbow outward. phi is measured from +-y, from which no arm turns by half a
+    turn, so that no angle jumps inside the workspace. NaN where r is outside [|l1 - l2|, l1 + l2].
     """
     l1, l2 = p["proximal_length"], p["distal_length"]
     half_crank = p["crank"] / 2 * ca.vertcat(ca.cos(pose[2]), ca.sin(pose[2]))
@@ -60,7 +60,7 @@ def arms(pose: ca.SX, p: Parameters) -> Iterator[Arm]:
 
 
 def base_angles(pose: ca.SX, p: Parameters) -> ca.SX:
-    """q(pose), the four base angles (rad) that motors and encoders see, shape (4,)."""
+    """q(pose), the four base angles (rad) at the motors and encoders, shape (4,)."""
     return ca.vertcat(*(arm.proximal for arm in arms(pose, p)))
 
 
@@ -120,7 +120,7 @@ def dynamics(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
 
 
 def motion(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
-    """M_d and the vector C_d v = J' m (Jdot v) of `dynamics`, for less work than C_d."""
+    """M_d and the vector C_d v = J' m (Jdot v) of `dynamics`, which takes less work than C_d."""
     at = ca.SX.sym("pose", 3)
     J, m = _every_rate(at, p)
     bias = ca.jtimes(J @ v, at, v)
@@ -156,7 +156,7 @@ def stop_wrench(pose: ca.SX, v: ca.SX, p: Parameters) -> ca.SX:
 def motor_torques(wrench: ca.SX, pose: ca.SX, p: Parameters) -> ca.SX:
     """Torques (N.m, four) of least norm that give the wrench, tau = J_q (J_q' J_q)^-1 wrench.
 
-    Where one would exceed torque_limit all four are scaled alike: the direction stays.
+    If one would exceed torque_limit all four are scaled by one factor, which keeps the direction.
     """
     J = jacobian(pose, p)
     tau = J @ ca.solve(J.T @ J, wrench)
@@ -165,11 +165,11 @@ def motor_torques(wrench: ca.SX, pose: ca.SX, p: Parameters) -> ca.SX:
 
 
 def pose_from_angles(angles: ca.SX, guess: ca.SX, p: Parameters, iterations: int = 2) -> ca.SX:
-    """Pose whose base angles are nearest to the four given, from a guess nearby, shape (3,).
+    """Forward kinematics: the pose whose base angles are nearest to the four given, shape (3,).
 
-    Least squares weighted by 1/variance, which is the same for four equal encoders, by
-    Gauss-Newton. theta stays on the turn of the guess. Two iterations from a guess 5 mm
-    away leave less than 1 % of one encoder count.
+    Least squares with equal weights, as the four encoders are equal, by Gauss-Newton from a nearby
+    guess. theta stays within half a turn of the guess. Two iterations from a guess 5 mm away leave
+    less than 1 % of one encoder count.
     """
     pose = guess
     for _ in range(iterations):

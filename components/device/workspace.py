@@ -1,4 +1,4 @@
-"""Where the handle of the twin pantograph can be: the poses at which no arm is at its stops."""
+"""Workspace of the twin pantograph: the poses of the handle at which no arm is at its stops."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ Range = tuple[float, float]
 
 
 def margin(device: Device, poses: Field) -> Field:
-    """Least distance (m) of an arm to its stops, shape (n,), at poses (x m, y m, theta rad) of
-    shape (n, 3); negative beyond them."""
+    """Smallest distance (m) of an arm to its stops, shape (n,), at poses (x m, y m, theta rad) of
+    shape (n, 3); negative outside the workspace."""
     pose = ca.SX.sym("pose", 3)
     least = ca.Function("margin", [pose], [ca.mmin(pantograph.margins(pose, numbers(device)))])
     given, found = np.ascontiguousarray(poses, float), np.zeros(len(poses))
@@ -35,8 +35,8 @@ def margin(device: Device, poses: Field) -> Field:
 
 
 def links(device: Device, pose: Sequence[float]) -> Field:
-    """Base joint, elbow and crank end (x, y m) of the four arms at a pose, shape (4, 3, 2); NaN
-    elbows where an arm does not reach."""
+    """Base joint, elbow and crank end (x, y m) of the four arms at a pose, shape (4, 3, 2); the
+    elbow is NaN where an arm does not reach."""
     p, at = numbers(device), ca.SX.sym("pose", 3)
     rows = []
     for arm in pantograph.arms(at, p):
@@ -57,31 +57,31 @@ class Workspace:
 
     @property
     def some(self) -> Field:
-        """Not negative where the handle can be at some theta, shape (x, y)."""
+        """Largest margin over theta, shape (x, y): not negative where some theta is reachable."""
         return np.asarray(self.margin.max(axis=2))
 
     @property
     def every(self) -> Field:
-        """Not negative where the handle can be at every theta, shape (x, y)."""
+        """Smallest margin over theta, shape (x, y): not negative where every theta is reachable."""
         return np.asarray(self.margin.min(axis=2))
 
     def extent(self, margin: Field) -> tuple[Range, Range] | None:
-        """The least and the largest x and y (m) at which a margin of shape (x, y) is not negative,
-        linear between grid points; None where it is negative everywhere."""
+        """The smallest and the largest x and y (m) at which a margin of shape (x, y) is not
+        negative, interpolated linearly between grid points; None if it is negative everywhere."""
         if margin.max() < 0:
             return None
         return _ends(self.x, margin.max(axis=1)), _ends(self.y, margin.max(axis=0))
 
     @property
     def turns(self) -> list[Range]:
-        """The ranges of theta (rad) at which the handle can be anywhere, to a step of the grid."""
+        """The ranges of theta (rad) that are reachable at some position, to one grid step."""
         inside = np.flatnonzero((self.margin >= 0).any(axis=(0, 1)))
         runs = np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1)
         return [(float(self.theta[run[0]]), float(self.theta[run[-1]])) for run in runs if run.size]
 
 
 def workspace(device: Device) -> Workspace:
-    """On a grid over all that the four arms can reach together (rising in y or falling)."""
+    """The workspace on a grid over the common reach of the four arms."""
     reach = device.reach_limit * (device.proximal_length + device.distal_length) + device.crank / 2
     across = abs(reach - device.base_half_width)
     x = device.base_x + np.linspace(-across, across, POINTS)

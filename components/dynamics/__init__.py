@@ -1,1 +1,1 @@
-"""Equations of motion of a linkage with loops, and what the hand feels of them."""
+"""Equations of motion of a linkage with loops, and its operational-space dynamics."""

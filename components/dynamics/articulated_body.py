@@ -1,9 +1,9 @@
-"""Products with D and D^-1 of a tree in linear work: the articulated-body recursion.
+"""Products with D and D^-1 of a tree in O(n): the articulated-body recursion.
 
 Featherstone, Rigid Body Dynamics Algorithms (2008), sections 5.3 and 7.3, in the plane. Spatial
-vectors (omega, v_x, v_y) stand in the world's axes at the coordinate's own joint point; X carries
-them from the parent's point, forces go back by X' (so a revolute S is (1, 0, 0), and nothing is
-lost to rounding in a mechanism far from the origin):
+vectors (omega, v_x, v_y) are expressed in the world's axes at the coordinate's own joint point; X
+transforms them from the parent's point, and X' transforms forces back (so a revolute S is
+(1, 0, 0), and a mechanism far from the origin loses no accuracy):
 
     leaf to root   U_i = I_i S_i,  d_i = S_i' U_i,  I_parent += X_i' (I_i - U_i U_i'/d_i) X_i
     inward b       u_i = b_i - S_i' p_i,  p_parent += X_i' (p_i + U_i u_i/d_i)
@@ -26,12 +26,12 @@ import casadi as ca
 from hapticlink.components.dynamics.light_bodies import added_inertia
 from hapticlink.components.linkage.model import LinkageModel
 
-FLOOR = 1e-40  # of what a light coordinate gets beside it: massless, it has a D^-1 too
+FLOOR = 1e-40  # share of added_inertia in D, so that D^-1 exists for massless coordinates
 
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One column of motion: its index in q, the one it stands on, its twist and inertia."""
+    """A coordinate: its index in q, its parent coordinate, its twist and inertia."""
 
     index: int
     parent: int | None
@@ -51,12 +51,13 @@ def _shift(r: ca.SX) -> ca.SX:
 
 
 def symmetric(A: ca.SX) -> ca.SX:
-    """A symmetric matrix by its lower triangle: the upper one's operations are never made."""
+    """A symmetric matrix from its lower triangle, so that the upper one is not computed."""
     return ca.tril2symm(ca.tril(A))
 
 
 def _coordinates(model: LinkageModel, extra: Mapping[str, tuple[ca.SX, ca.SX]]) -> list[Coordinate]:
-    """From the ground outward; a body's inertia stands on the last coordinate of its joint."""
+    """The coordinates from the ground outward; a body's inertia belongs to the last coordinate of
+    its joint."""
     found: list[Coordinate] = []
     tip: dict[str, tuple[int | None, ca.SX]] = {"ground": (None, ca.SX(2, 1))}
     bodies = {b.name: b for b in model.linkage.body}
@@ -82,9 +83,9 @@ def _coordinates(model: LinkageModel, extra: Mapping[str, tuple[ca.SX, ca.SX]]) 
 
 
 class TreeInertia:
-    """D + sum over bodies of J_b' K_b J_b, as an operator on n x r columns.
+    """D + sum over bodies of J_b' K_b J_b, as an operator on n x r matrices.
 
-    extra: by body, a point (m, in the world) and a symmetric K_b on (v_x, v_y, omega) there.
+    extra: for a body, a point (m, in the world) and the symmetric K_b for (v_x, v_y, omega) there.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class TreeInertia:
         self._tree = _coordinates(model, extra or {})
         articulated = [c.inertia for c in self._tree]
         self.k = added_inertia(model, model.W)
-        # U/d, and d in the order of q.
+        # U/d by coordinate, and d in the order of q.
         self._gain: list[ca.SX] = [ca.SX(3, 1)] * self.n
         d: list[ca.SX] = [ca.SX(0)] * self.n
         for i in reversed(range(self.n)):
@@ -114,7 +115,7 @@ class TreeInertia:
         return self.outward(ca.diag(1 / self.d) @ u)
 
     def inward(self, b: ca.SX) -> ca.SX:
-        """Efforts left at each coordinate when those farther out move freely, n x r."""
+        """Remaining effort at each coordinate if those outward of it move freely, n x r."""
         p = [ca.SX(3, b.shape[1])] * self.n
         rows = [ca.SX(1, b.shape[1])] * self.n
         for i in reversed(range(self.n)):
@@ -123,13 +124,14 @@ class TreeInertia:
             rows[c.index] = u
             if c.parent is not None:
                 passed = p[i] + self._gain[i] @ u
-                if c.S.nnz() == 1:  # S' passed = b: a joint hands on its own effort
+                if c.S.nnz() == 1:  # S' passed = b: a joint transmits its own effort
                     passed = _across(c.S, passed) + c.S @ b[c.index, :]
                 p[c.parent] = p[c.parent] + c.X.T @ passed
         return ca.vertcat(*rows)
 
     def outward(self, u: ca.SX) -> ca.SX:
-        """Accelerations from each coordinate's own, as if it stood still, n x r."""
+        """Accelerations from those of each coordinate relative to an inertially fixed parent, n x
+        r."""
         A: list[ca.SX] = []
         rows = [ca.SX(1, u.shape[1])] * self.n
         for i, c in enumerate(self._tree):
@@ -157,7 +159,7 @@ class TreeInertia:
 
 
 def _across(S: ca.SX, forces: ca.SX) -> ca.SX:
-    """Forces that are zero along S: where S is a unit vector, zero in structure."""
+    """Removes the entry of forces along S, which is zero, if S is a unit vector."""
     if S.nnz() == 1:
         forces = ca.SX(forces)
         forces[S.row()[0], :] = 0

@@ -1,11 +1,12 @@
-"""Assembly of a start pose, and of the start velocity that the loops allow.
+"""Assembly of a consistent start pose and start velocity.
 
     q_{k+1} = q_k - W' (W W')^-1 h(q_k)               Newton steps of least norm
     qd_{k+1} = qd_k - Z W' (W Z W')^-1 W qd_k         Z = diag(0 where a rate is given, else 1)
 
-Rates that the scene gives are kept and the others follow; where the loops leave some of these free,
-by the least change. The number of steps is fixed, so that an FMU can assemble again, with changed
-geometry, in initialisation mode. Where W loses rank the step is that of the regularised system.
+Rates given by the scene are kept and the others follow from the loops; those that the loops leave
+free change as little as possible. The number of steps is fixed, so that an FMU can assemble again
+in initialisation mode after its geometry has changed. Where W loses rank the step is that of the
+regularised system.
 """
 
 from __future__ import annotations
@@ -23,19 +24,19 @@ from hapticlink.components.linkage.parameters import COORDINATES, coordinates, l
 from hapticlink.components.specs.linkage import Linkage
 
 STEPS = 12
-RATE_STEPS = 3  # each leaves a share of about MU
+RATE_STEPS = 3  # each step reduces the error by a factor of about MU
 MU = 1e-9  # as in closed_loop_solver.py
-TOLERANCE = 1e-9  # of the start pose's gap, m, and of a given rate, as a share of the largest
+TOLERANCE = 1e-9  # for the gap at the start pose (m), and for given rates relative to the largest
 
 
 class AssemblyError(ValueError):
-    """A loop that does not close from the start pose that the scene gives, or start rates that the
-    loops do not allow together."""
+    """A loop that cannot be closed from the scene's start pose, or start velocities that are not
+    consistent with the loops."""
 
 
 def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
-    """(q, qd) that satisfy h = 0 and W qd = 0, as expressions: q closest to the model's own, qd
-    with the rates that `start_velocity` gives, or closest to these where they do not agree."""
+    """Expressions of q and qd with h = 0 and W qd = 0: q by least-norm steps from the model's own,
+    qd with the rates of `start_velocity`, or the nearest ones if these are not consistent."""
     q, qd = model.q, model.qd
     if not model.linkage.loop:
         return q, qd
@@ -66,15 +67,15 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
 
 
 def _given(linkage: Linkage) -> NDArray[np.bool_]:
-    """Of each coordinate, whether `start_velocity` gives its rate."""
+    """Whether `start_velocity` gives the rate of each coordinate, (n,)."""
     named = {j.name: (1.0,) * COORDINATES[j.type] for j in linkage.joint}
     given = {name: value for name, value in named.items() if name in linkage.start_velocity}
     return np.array(coordinates(linkage, given), dtype=bool)
 
 
 def require_assembled(component: Component, model: LinkageModel) -> None:
-    """Raises AssemblyError naming each loop that stays open from the default start pose, and start
-    rates that were not kept, with the nearest that the loops allow."""
+    """Raises AssemblyError for a loop that does not close from the default start pose, and for
+    given start rates that are not consistent, with the nearest rates that are."""
     n = model.q.numel()
     start = component.initialize(component.start_inputs, component.start_parameters)
     q, qd = start[:n], np.array(start[n : 2 * n]).ravel()

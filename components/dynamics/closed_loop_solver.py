@@ -1,20 +1,21 @@
-"""Linear solve of closed-loop dynamics, with bounded work at every pose.
+"""Solution of the closed-loop equations of motion, with the same bounded work at every pose.
 
     D a - W' lambda = b,   W a = c        (B.6) with lambda as in (2.3)
 
-The coordinates are eliminated before the constraints that touch them, leaf to root (tree.py);
-what remains, S = W D^-1 W', is made definite by mu (quasi-definite: Vanderbei, SIAM J. Optim.
-5, 1995); a refinement on the unregularised system or proximal steps take mu out of the answer
-again. No pivoting, no branch: redundant and singular closures cost the same as regular ones.
+The coordinates are eliminated before the constraints, leaf to root (articulated_body.py); the Schur
+complement that remains, S = W D^-1 W', is made definite by mu (quasi-definite: Vanderbei, SIAM J.
+Optim. 5, 1995), and iterative refinement on the unregularised system or proximal steps remove the
+effect of mu again. There is no pivoting and no branch: redundant and singular closures cost the
+same as regular ones.
 
-mu is relative to the mean of S_ii over the two rows of each loop, so that a loop of heavy links
-beside light ones counts as much as they do, in whatever frame. Where an eigenvalue sigma^2 of S, so
-scaled, is below mu its direction is cut: the closure does not act along it. Which mu is right near
-a singular pose depends on the right-hand side. W D^-1 b lies in the range of W by construction, and
-cutting it lets the linkage go with the acceleration that b alone would give: there mu is zero, and
-pivots of S have a floor at its rounding instead, which redundant closures rest on. c = -Wdot qd
-does so only for rates on the branch; what the rates are off is divided by sigma. `follow` therefore
-cuts c early, and is for accelerations that are integrated.
+mu is relative to the mean of S_ii over the two rows of each loop, so that loops of heavy and of
+light links count alike, independently of the frame. Where an eigenvalue sigma^2 of S, scaled so, is
+below mu, the closure does not act along its direction. The right mu near a singular pose depends on
+the right-hand side. W D^-1 b is in the range of W by construction, and cutting it would leave the
+linkage the acceleration of the open tree: there mu is zero, and the pivots of S have a floor at its
+rounding instead, for redundant closures. c = -Wdot qd is in the range of W only for rates that
+satisfy the closures; the error of other rates is divided by sigma. `follow` therefore cuts c early,
+and is meant for accelerations that are integrated.
 """
 
 from __future__ import annotations
@@ -26,20 +27,20 @@ import casadi as ca
 
 from hapticlink.components.dynamics.articulated_body import symmetric
 
-ROUNDING = 1e-16  # of S: a loop whose rows are all below it says nothing
+ROUNDING = 1e-16  # of S: a loop whose rows are all below it is ignored
 TINY = 1e-200
 
 # Relative to the mean of S_ii over a loop's rows.
 PIVOT = 1e-15
-MU_FOLLOWING = 1e-6  # of c in `follow`
-MU_MULTIPLIERS = 1e-9  # of multipliers of least norm: rounding along null(W') is divided by it
+MU_FOLLOWING = 1e-6  # for c in `follow`
+MU_MULTIPLIERS = 1e-9  # for multipliers of least norm: rounding along null(W') is divided by it
 PROXIMAL_STEPS = 2
 
 
 class Inertia(Protocol):
-    """D as an operator on n x r columns, D^-1 = outward diag(d)^-1 inward with outward = inward'.
+    """D as an operator on n x r matrices, D^-1 = outward diag(d)^-1 inward with outward = inward'.
 
-    k (n x 1) is added to d in the metric of the closures; it has entries for light bodies alone."""
+    k (n x 1) is added to d in the metric of the closures; it is zero except for light bodies."""
 
     n: int
     d: ca.SX
@@ -51,7 +52,7 @@ class Inertia(Protocol):
 
 
 class UnitInertia:
-    """D = 1: changes of least norm."""
+    """The identity D = 1, for changes of least Euclidean norm."""
 
     def __init__(self, n: int) -> None:
         self.n = n
@@ -65,7 +66,7 @@ class UnitInertia:
 
 
 def loop_scale(S: ca.SX) -> ca.SX:
-    """Mean of S_ii over the rows of each loop, two by two; m x 1. Turning the frame leaves it."""
+    """Mean of S_ii over the two rows of each loop, m x 1; independent of the frame's rotation."""
     m = S.shape[0]
     least = ROUNDING * ca.trace(S) / m + TINY
     pairs = [ca.diag(S)[i : i + 2] for i in range(0, m, 2)]
@@ -74,7 +75,8 @@ def loop_scale(S: ca.SX) -> ca.SX:
 
 
 class Factored:
-    """L diag(d) L' of a symmetric matrix, without pivoting; each d at least `least`, if given."""
+    """Factorisation L diag(d) L' of a symmetric matrix without pivoting; pivots d below `least` are
+    raised to it, if given."""
 
     def __init__(self, A: ca.SX, least: ca.SX | None = None) -> None:
         m, nonzero = A.shape[0], A.sparsity().has_nz
@@ -105,15 +107,15 @@ class Factored:
 
 
 class Regularised(Factored):
-    """S + diag(shift) for a symmetric, positive semi-definite S."""
+    """Factorisation of S + diag(shift) for a symmetric, positive semidefinite S."""
 
     def __init__(self, S: ca.SX, shift: ca.SX) -> None:
         self.shift = ca.diag(shift)
         super().__init__(S + self.shift)
 
     def proximal(self, b: ca.SX) -> ca.SX:
-        """S y = b with mu taken out: S_mu y_{k+1} = b + mu y_k (Parikh & Boyd, Proximal
-        Algorithms, 2014, section 4.1.2)."""
+        """y with S y = b by proximal steps S_mu y_{k+1} = b + mu y_k, which remove the effect of mu
+        (Parikh & Boyd, Proximal Algorithms, 2014, section 4.1.2)."""
         y = self.solve(b)
         for _ in range(PROXIMAL_STEPS):
             y = self.solve(b + self.shift @ y)
@@ -121,7 +123,7 @@ class Regularised(Factored):
 
 
 class ClosedLoopSolver:
-    """Factors of D and W (m x n); m = 0 leaves D^-1 alone."""
+    """Factors of D and W (m x n); for m = 0 it applies D^-1."""
 
     def __init__(self, inertia: Inertia, W: ca.SX, mu: float | None = None) -> None:
         self.inertia, self.W, self.m = inertia, W, W.shape[0]
@@ -142,7 +144,7 @@ class ClosedLoopSolver:
 
     @cached_property
     def _left_free(self) -> Factored:
-        """Inertia of the light coordinates with the loops closed."""
+        """Factorised inertia of the light coordinates with the loops closed."""
         d, k, Z = (v[self._light, :] for v in (self.inertia.d, self.inertia.k, self._Z))
         return Factored(symmetric(ca.diag(d * (d + k) / k) + Z @ self._sharp.solve(Z.T)))
 
@@ -159,8 +161,9 @@ class ClosedLoopSolver:
         return v, y
 
     def _shortest(self, multipliers: ca.SX) -> ca.SX:
-        """Their part in the range of W, which columns of unit length leave free of units and
-        masses, and an equal mu for all rows free of weights."""
+        """The part of the multipliers in the range of W: the least-norm solution. Columns of W are
+        scaled to unit length, so that it does not depend on units and masses; mu is equal for all
+        rows."""
         columns = ca.sum1(self.W**2).T
         A = symmetric(self.W @ ca.diag(1 / (columns + TINY)) @ self.W.T)
         equal = MU_MULTIPLIERS * ca.SX.ones(self.m)
@@ -174,7 +177,7 @@ class ClosedLoopSolver:
         v, y = self._closed(beta, c)
         u = v + self._Y @ y
         a = inertia.outward(u)
-        # What the closures miss, then what the light coordinates' efforts miss, is solved again.
+        # Refinement: the residual of the closures, then that of the light coordinates' efforts.
         none = ca.SX(*beta.shape)
         v, also = self._closed(none, c - self.W @ a)
         more, y = v + self._Y @ also, y + also
@@ -187,7 +190,8 @@ class ClosedLoopSolver:
         return a + inertia.outward(more), self._shortest(y)
 
     def follow(self, b: ca.SX, c: ca.SX, *, refined: bool = False) -> ca.SX:
-        """a as in `solve`, for rates that are near the branch: n x r; refined once if asked."""
+        """The accelerations a as in `solve` (n x r), for rates that nearly satisfy the closures;
+        with one step of refinement if `refined`."""
         inertia, beta = self.inertia, self.inertia.inward(b)
         if not self.m:
             return inertia.outward(self._d_inv @ beta)
@@ -199,6 +203,6 @@ class ClosedLoopSolver:
         return inertia.outward(v + self._Y @ (y + particular))
 
     def constrain(self, c: ca.SX) -> ca.SX:
-        """The least change a, in the metric of d + k, with W a = c, unrefined: for iterations
-        that correct themselves."""
+        """The smallest change a in the metric of d + k with W a = c, without refinement: for
+        iterations that correct themselves."""
         return self.inertia.outward(self._Y @ self._sharp.solve(c))

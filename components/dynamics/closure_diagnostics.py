@@ -1,15 +1,15 @@
-"""Rank and condition of the loop closures, by bounded work.
+"""Rank and condition of the loop closures, with bounded work.
 
-S = W D^-1 W' is factored as L diag(d) L' without pivoting. d_i is what is left of S_ii once the
-closures before i hold: next to nothing for a closure that they say already, at this pose or at
-all. Such a one does not count. With B = diag(d)^1/2 L' of the others,
+S = W D^-1 W' is factored as L diag(d) L' without pivoting. The pivot d_i is what remains of S_ii
+when the closures before i are satisfied: about zero for a closure that depends on these, at this
+pose or at all poses. Such a closure is not counted. With B = diag(d)^1/2 L' of the others,
 
     S = B' B,   G = B B'
 
-have the same eigenvalues, of S those that are not zero. The condition is the largest of them over
-the least, by Rayleigh quotients of a fixed number of power and of inverse iterations on G (Golub &
+have the same nonzero eigenvalues. The condition is the ratio of the largest to the smallest of
+them, from Rayleigh quotients after a fixed number of power and of inverse iterations on G (Golub &
 Van Loan, Matrix Computations, section 8.2). A quotient lies between the eigenvalues: the condition
-is never overstated, and understated only where others lie close to the one sought.
+is never overestimated, and underestimated only where other eigenvalues are close to these.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hapticlink.components.dynamics.closed_loop_solver import TINY, ClosedLoopSo
 
 # Relative to the mean of S_ii over a loop's rows.
 TOLERANCE = 1e-9
-MU = 1e-13  # what a dependent closure's pivot is made of, far below TOLERANCE
+MU = 1e-13  # replaces the pivot of a dependent closure, far below TOLERANCE
 ITERATIONS = 30
 GOLDEN = 0.6180339887498949
 
@@ -44,7 +44,7 @@ def values(solver: ClosedLoopSolver) -> dict[str, ca.SX]:
     B = ca.diag(counted * ca.sqrt(ca.fmax(pivots, 0))) @ (upper + ca.SX.eye(m))
     G = symmetric(B @ B.T)
     factor = ca.ldl(ca.sparsify(G + ca.diag((1 - counted) * scale)), False)
-    # Any start will do that is at right angles to no eigenvector.
+    # Any start vector works that is not orthogonal to an eigenvector.
     start = counted * ca.DM([0.5 + (i * GOLDEN) % 1 for i in range(1, m + 1)])
     largest = _rayleigh(lambda v: G @ v, start)
     inverse = _rayleigh(lambda v: ca.ldl_solve(v, *factor), start)
@@ -53,7 +53,7 @@ def values(solver: ClosedLoopSolver) -> dict[str, ca.SX]:
 
 
 def _rayleigh(apply: Callable[[ca.SX], ca.SX], v: ca.SX) -> ca.SX:
-    """The largest eigenvalue of a symmetric, positive semi-definite operator."""
+    """The largest eigenvalue of a symmetric, positive semidefinite operator."""
     for _ in range(ITERATIONS):
         v = v / ca.sqrt(ca.dot(v, v) + TINY)
         before, v = v, apply(v)

@@ -1,13 +1,14 @@
-"""Directions that the joints resist at the hand, in bounded time.
+"""Constrained directions at the operational point, in bounded time.
 
-Null directions of Lambda^-1 are wrenches, and its entries mix units. With S = diag(1, 1, L)
-the scaled mobility S Lambda^-1 S is in 1/kg throughout; its small eigenvalues are resisted.
+Null directions of Lambda^-1 are wrenches, and its entries have different units. With
+S = diag(1, 1, L) all entries of the scaled mobility S Lambda^-1 S are in 1/kg; the eigenvectors of
+its small eigenvalues are the constrained directions.
 The report takes an SVD (B.14) at the graphics rate since SVDs have no guaranteed run time; a
 fixed number of cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, section 8.5)
 has one, and a 3 x 3 matrix is diagonal to rounding after five sweeps.
 
-Small is against the largest of them, and against the same linkage's with its loops open: where
-the loops lock the hand in all directions, what is left of Lambda^-1 is rounding.
+Small is relative to the largest eigenvalue, and to those of the same linkage with open loops: where
+the loops lock the operational point in all directions, Lambda^-1 consists of rounding errors.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from hapticlink.components.dynamics.operational_space import OperationalSpace
 
 SWEEPS = 5
 TINY = 1e-300
-LOCKED = 1e-10  # share of the open linkage's mobility that is rounding
+LOCKED = 1e-10  # relative to the open linkage's mobility, below which Lambda^-1 is rounding
 
 
 def scaling(length_scale: ca.SX) -> ca.SX:
@@ -30,7 +31,7 @@ def scaling(length_scale: ca.SX) -> ca.SX:
 
 
 def eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """(eigenvalues 3 x 1, eigenvectors in columns 3 x 3) of a symmetric 3 x 3 matrix."""
+    """Eigenvalues (3 x 1) and eigenvectors (columns, 3 x 3) of a symmetric 3 x 3 matrix."""
     A, V = ca.SX(A), ca.SX.eye(3)
     V = ca.densify(V)
     for _ in range(SWEEPS):
@@ -48,7 +49,7 @@ def eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def locked(open_mobility: ca.SX, length_scale: ca.SX) -> ca.SX:
-    """The eigenvalue below which a direction is locked, 1/kg; open_mobility: J D^-1 J'."""
+    """The eigenvalue (1/kg) below which a direction is locked; open_mobility is J D^-1 J'."""
     S = scaling(length_scale)
     return LOCKED * ca.trace(S @ open_mobility @ S)
 
@@ -58,7 +59,7 @@ def largest(eigenvalues: ca.SX) -> ca.SX:
 
 
 def _ranks(eigenvalues: ca.SX) -> list[ca.SX]:
-    """Places in ascending order (0 the smallest, ties by index)."""
+    """The rank of each eigenvalue in ascending order (0 is the smallest, ties by index)."""
     ranks = []
     for i in range(3):
         below = [
@@ -77,8 +78,9 @@ def count(
     hysteresis: ca.SX,
     least: ca.SX | float = TINY,
 ) -> ca.SX:
-    """Number of constrained directions: below `least`, or with a share of the largest below
-    `tolerance`, times `hysteresis` for the `before` smallest, which were resisted before."""
+    """Number of constrained directions: those with an eigenvalue below `least` or below `tolerance`
+    times the largest one; for the `before` smallest, which were constrained before, `tolerance` is
+    multiplied by `hysteresis`."""
     most, number = largest(eigenvalues), ca.SX(0)
     for i, rank in enumerate(_ranks(eigenvalues)):
         share = tolerance * ca.if_else(rank < before, hysteresis, 1)
@@ -87,25 +89,27 @@ def count(
 
 
 def projector(eigenvalues: ca.SX, vectors: ca.SX, number: ca.SX) -> ca.SX:
-    """P_c, orthogonal projector (3 x 3, dimensionless) on the `number` smallest directions."""
+    """P_c, the orthogonal projector (3 x 3, dimensionless) on the eigenvectors of the `number`
+    smallest eigenvalues."""
     chosen = ca.vertcat(*(ca.if_else(r < number, 1, 0) for r in _ranks(eigenvalues)))
     return vectors @ ca.diag(chosen) @ vectors.T
 
 
 @dataclass(frozen=True)
-class ResistedDirections:
-    """n_resisted at the start and after a step, and the outputs."""
+class ConstrainedDirections:
+    """The state n_constrained at the start and after a step, and the outputs."""
 
     first: ca.SX
     after: ca.SX
     output: dict[str, ca.SX]
 
 
-def resisted_directions(
+def constrained_directions(
     block: Block, space: OperationalSpace, q0: ca.SX, q1: ca.SX
-) -> ResistedDirections:
-    """For a block with state n_resisted that starts at q0 and steps from q to q1."""
-    p, before, q = block.p, block.x["n_resisted"], space.model.q
+) -> ConstrainedDirections:
+    """The constrained directions of a block with the state n_constrained that starts at q0 and
+    steps from q to q1."""
+    p, before, q = block.p, block.x["n_constrained"], space.model.q
     S = scaling(p["length_scale"])
     least = locked(space.open_mobility, p["length_scale"])
     scaled = ca.Function(
@@ -118,7 +122,7 @@ def resisted_directions(
         return count(eigen(mobility)[0], before, tolerance, hysteresis, least)
 
     now, vectors = eigen(scaled(q, block.u.vector, p.vector)[0])
-    return ResistedDirections(
+    return ConstrainedDirections(
         first=number(q0, ca.SX(0)),
         after=number(q1, before),
         output={

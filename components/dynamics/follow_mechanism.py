@@ -1,17 +1,17 @@
-"""How the graphics copy follows the mechanism over a frame: three ways, `graphics.sync`.
+"""How the graphics copy follows the mechanism over a frame, by `graphics.sync`:
 
-exact        The mechanism's q and qd are moved onto the closures (`projection`), once: the copy is
-             where the mechanism was when the frame began. It cannot fold, whatever the rate.
+exact        The mechanism's q and qd are projected onto the closures once: the copy is where the
+             mechanism was when the frame began. It cannot fold, at any rate.
 operational  A PD graphics controller pulls the copy at the operational point (section 4.2.2). With
-             the report's gains, B_g on an inertia of about 0.002 kg.m2 is stiff far beyond any
-             explicit step of 10 to 60 Hz, so the pull is integrated linearly implicitly (h substep,
-             velocity terms explicit):
+             the report's gains, B_g on an inertia of about 0.002 kg.m2 is too stiff for explicit
+             steps at 10 to 60 Hz, so the motion is integrated linearly implicitly (h is a substep,
+             velocity terms are explicit):
 
     (D + h J'B_g J + h^2 J'K_g J) qd+
         = D qd + h (J'(K_g (x_ref - x) + B_g v_ref) - C qd + W' lambda)
     W qd+ = 0,   q+ = q + h qd+, then projected on the closures
 
-             Links that the operational point does not see can fold to the other assembly.
+             Links whose motion does not move the operational point can fold to the other assembly.
 joint        The same with every coordinate pulled, by an acceleration K_g (q_ref - q) + B_g qd_ref.
 """
 
@@ -29,7 +29,7 @@ from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
 
 
 def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
-    """What the copy is told of the mechanism; q_ref also where only its branch is compared."""
+    """The copy's inputs from the mechanism; q_ref also where it only serves to compare branches."""
     units = coordinate_units(linkage)
     n, rates = len(units), tuple(f"{u}/s" for u in units)
     x_ref = Variable("x_ref", (3,), POSE, description="pose of the mechanism's operational point")
@@ -86,7 +86,7 @@ def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX,
         weight = ca.SX(1)
     momentum = D.apply(qd) + h * (pull - model.C_qd)
     qd1, _ = solver.solve(momentum / weight, ca.SX(solver.m, 1))
-    # Twice: a frame's motion is large for one chord of the closures.
+    # Projected twice, since a frame's motion is large for one factorisation of W.
     project = projection(model, D)
     closed, rate = project(*project(q + h * qd1, qd1, p.vector), p.vector)
     return closed, rate

@@ -1,8 +1,9 @@
-"""Further operational points: each takes a hand of its own, and tells its pose and mobility.
+"""Further operational points: each has an input for a hand's wrench, and its pose, velocity and
+mobility as outputs.
 
     x = x_k(q),   v = J_k qd,   Lambda_k^-1 = J_k D^-1 (J_k' - W' (W D^-1 W')^-1 W D^-1 J_k')
 
-Their wrenches act on the linkage beside that at the (first) operational point: Q += J_k' F_k.
+Their wrenches act on the linkage in addition to that at the operational point: Q += J_k' F_k.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
-"""Bodies far lighter than those that their loops link them to, down to zero mass.
+"""Bodies that are much lighter than the others of their loops, down to zero mass.
 
-A light body that its loops leave no freedom follows the others, and its mass hardly matters; yet in
-S = W D^-1 W' there is nothing else to be seen. In the metric that closures are solved in
-(closed_loop_solver.py) a coordinate whose own body has next to no inertia therefore gets more,
+A light body whose motion is determined by its loops follows the others, and its mass hardly
+matters; yet it dominates S = W D^-1 W'. In the metric in which closures are solved
+(closed_loop_solver.py) a coordinate whose own body has almost no inertia is therefore given an
+additional one,
 
     k = M  (sliding)  or  M a^2  (turning),     M = mean m + mean I / a^2
 
-means over the bodies that its loops move, a^2 that of the turning columns of W, the loops' arms.
-Linkages that share no loop do not feel each other. Which coordinates are light is settled by the
-scene's masses; how light, by the FMU's.
+means over the bodies that its loops move, with a^2 the mean square of the rotational columns of W,
+the lever arms of the loops. Groups of bodies that share no loop do not affect each other. Which
+coordinates are light follows from the scene's masses; k follows from the FMU's parameters.
 """
 
 from __future__ import annotations
@@ -21,11 +22,12 @@ from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import UNITS, mean_link_length
 from hapticlink.components.specs.linkage import Body, Joint, Linkage
 
-LIGHT = 1e-2  # of the mean
+LIGHT = 1e-2  # relative to the mean
 
 
 def groups(linkage: Linkage) -> list[list[Joint]]:
-    """The joints of loops that share any; each joint of a loop is in one group."""
+    """Groups of joints whose loops are connected by shared joints; each joint of a loop is in one
+    group."""
     found: list[set[str]] = []
     for loop in linkage.loop:
         cycle = _way(linkage, loop.bodies[0]) ^ _way(linkage, loop.bodies[1])
@@ -35,7 +37,7 @@ def groups(linkage: Linkage) -> list[list[Joint]]:
 
 
 def _way(linkage: Linkage, body: str) -> set[str]:
-    """Joints from the ground to a body."""
+    """Names of the joints from the ground to a body."""
     joints = {j.child: j for j in linkage.joint}
     way: set[str] = set()
     while body != "ground":
@@ -45,7 +47,7 @@ def _way(linkage: Linkage, body: str) -> set[str]:
 
 
 def own_inertia(joint: Joint, body: Body) -> list[float]:
-    """The least inertia that a body leaves at each coordinate of its joint, kg or kg.m2."""
+    """The smallest inertia of a body at each coordinate of its joint (kg or kg.m2)."""
     arm = math.dist(body.center or (0.0, 0.0), joint.at_child or (0.0, 0.0))
     turning = body.inertia + body.mass * arm**2
     if joint.type == "free":
@@ -55,7 +57,7 @@ def own_inertia(joint: Joint, body: Body) -> list[float]:
 
 
 def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
-    """k, n x 1, with an entry for each light coordinate alone; kg or kg.m2."""
+    """k (n x 1; kg or kg.m2), zero except for light coordinates."""
     linkage, p, k = model.linkage, model.p, ca.SX(W.shape[1], 1)
     bodies, length = {b.name: b for b in linkage.body}, mean_link_length(linkage)
     for group in groups(linkage):

@@ -3,9 +3,9 @@
     Dh qdd = sum_i J_i' F_i + J_hh' F_h + Q + Wh' lambda
     Wh qdd = -(wh + 2 alpha beta h' + alpha^2 h)
 
-with a trailing h for the values of the last frame. Coriolis terms are left out, as the report does.
-The closures h(q), their rate, applied forces Q and contacts are the mechanism's own at every step,
-or the loop opens between frames.
+with a trailing h for values held from the last frame. Coriolis terms are left out, as in the
+report. The closures h(q), their rate, applied forces Q and contacts are evaluated by the mechanism
+at every step, since otherwise the loop would open between frames.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from hapticlink.components.specs.linkage import Linkage
 
 
 def ports(linkage: Linkage) -> list[Variable]:
-    """D n x n, W m x n, w m, J_h 3 x n; they start as those of the assembled start pose."""
+    """The inputs D (n x n), W (m x n), w (m) and J_h (3 x n); their start values are those of the
+    assembled start pose."""
     units, m = coordinate_units(linkage), 2 * len(linkage.loop)
     n = len(units)
     lengths = tuple("m" if unit == "rad" else "1" for unit in units)
@@ -46,7 +47,7 @@ def ports(linkage: Linkage) -> list[Variable]:
 
 
 def values(model: LinkageModel) -> dict[str, ca.SX]:
-    """The values of the ports at the model's pose."""
+    """The values of these ports at the model's pose, for the virtual environment."""
     found = {"D": model.D, "J_h": model.J_h}
     return found | {"W": model.W, "w": model.w} if model.linkage.loop else found
 
@@ -69,8 +70,9 @@ def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
 
 
 class DenseInertia:
-    """D from its entries, eliminated in an order (leaf to root, as in articulated_body.py):
-    D = L diag(d) L', so D^-1 = L'^-1 diag(d)^-1 L^-1. k: n x 1 (light_bodies.py)."""
+    """D from its entries, factored in an order of elimination (leaf to root, as in
+    articulated_body.py): D = L diag(d) L', so D^-1 = L'^-1 diag(d)^-1 L^-1. k: n x 1, see
+    light_bodies.py."""
 
     def __init__(self, D: ca.SX, k: ca.SX, order: list[int]) -> None:
         self.n, self.k, self._order = D.shape[0], k, order

@@ -1,11 +1,11 @@
-"""Massless bodies: refused at a start pose where one can move and nothing that has mass with it,
-and told where the loops lead to such a pose.
+"""Massless bodies: detects poses at which one can move without moving any mass, where the equations
+of motion are singular; at the start such a pose is an error, during a run it ends the run.
 
-With M^ the masses and inertias of the scene, each of one size or zero, J of all bodies and N a
-basis of null(W), N' J' M^ J N is singular where D is on the closed loops, and nowhere else: how
-light the others are does not matter. Near such a pose rates grow without bound (a massless crank
-whose rocker has come to its end), so no step can pass it: a massless coordinate that turns by more
-than 1 rad in a step, or slides by more than the mean link length, ends the run.
+With M^ the masses and inertias of the scene, replaced by 0 or equal sizes, J of all bodies and N a
+basis of null(W), N' J' M^ J N is singular exactly where D restricted to the closed loops is,
+independently of how light the other bodies are. Near such a pose rates grow without bound (a
+massless crank whose rocker has reached its end), and no step can pass it: a massless coordinate
+that turns by more than 1 rad in a step, or slides by more than the mean link length, ends the run.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from hapticlink.components.dynamics.light_bodies import groups, own_inertia
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import UNITS, mean_link_length
 
-SINGULAR = 1e-10  # of the same with mass and inertia everywhere
+SINGULAR = 1e-10  # relative to the same matrix with mass and inertia everywhere
 
 
 class MasslessError(ValueError):
-    """A body without mass or inertia that its loops leave free to move."""
+    """A body without mass or inertia that can move without moving any mass."""
 
 
 def require_inertia(component: Component, model: LinkageModel) -> None:
-    """Raises MasslessError naming a massless body that is free at the default start pose."""
+    """Raises MasslessError for a massless body that is free to move at the default start pose."""
     bodies, n = model.linkage.body, model.q.numel()
     if all(b.mass and b.inertia for b in bodies):
         return
@@ -53,7 +53,8 @@ def require_inertia(component: Component, model: LinkageModel) -> None:
 
 
 def massless_coordinates(model: LinkageModel) -> dict[int, tuple[str, float]]:
-    """Of loops, by index in q: the body, and the most that one step may move it, rad or m."""
+    """The massless coordinates of loops: by index in q, the body and the largest change in one step
+    (rad or m)."""
     bodies = {b.name: b for b in model.linkage.body}
     most = {"rad": 1.0, "m": mean_link_length(model.linkage)}
     return {
@@ -68,7 +69,7 @@ def massless_coordinates(model: LinkageModel) -> dict[int, tuple[str, float]]:
 
 
 def carried(model: LinkageModel, q: ca.SX, qd: ca.SX, h: ca.SX) -> ca.SX:
-    """q, with no finite value where a massless coordinate moves too far in h."""
+    """q, made NaN or infinite where a massless coordinate moves too far within h."""
     q = ca.SX(q)
     for i, (_, most) in massless_coordinates(model).items():
         q[i] = q[i] / (ca.fabs(h * qd[i]) < most)
@@ -76,7 +77,7 @@ def carried(model: LinkageModel, q: ca.SX, qd: ca.SX, h: ca.SX) -> ca.SX:
 
 
 def notes(model: LinkageModel) -> dict[str, str]:
-    """What a state that is not finite means, by its name."""
+    """By the name of a state, the cause to report if it is not finite."""
     return {
         f"q[{i + 1}]": f"massless body `{body}`, which its loops no longer carry"
         for i, (body, _) in massless_coordinates(model).items()

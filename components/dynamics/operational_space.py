@@ -1,10 +1,10 @@
-"""The linkage as the hand feels it: mobility and bias acceleration at the operational point.
+"""Operational-space dynamics: mobility and bias acceleration at the operational point.
 
     Lambda^-1 = J_h D^-1 (J_h' - W' (W D^-1 W')^-1 W D^-1 J_h')      (B.13); (5.4) without loops
     a_bias    = J_h qdd|_{F=0} + Jdot_h qd
 
-The bias is what (B.7) to (B.13) call negligible: the operational acceleration at zero hand
-and drift wrench, from velocities, gravity, springs and drives.
+a_bias is what (B.7) to (B.13) neglect: the operational acceleration at zero hand and drift wrench,
+caused by velocities, gravity, springs and drives.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ class Terms:
 
 
 def own_terms(model: LinkageModel) -> Terms:
-    """At the model's own pose and velocity."""
+    """The terms at the model's own pose and velocity."""
     efforts = forces.efforts(model) - model.C_qd
     return Terms(TreeInertia(model), model.W, model.w, model.J_h, model.Jdot_qd, efforts)
 
 
 class OperationalSpace:
-    """Shares one factorisation of the linkage's D and W among all that the hand needs."""
+    """Operational-space quantities that share one factorisation of the linkage's D and W."""
 
     def __init__(self, model: LinkageModel, terms: Terms | None = None) -> None:
         self.model = model
@@ -47,7 +47,8 @@ class OperationalSpace:
         self.solver = ClosedLoopSolver(self.terms.inertia, self.terms.W)
 
     def mobility(self, J: ca.SX) -> ca.SX:
-        """J D^-1 (J' - W' (W D^-1 W')^-1 W D^-1 J') of the points whose Jacobian is J, k x k."""
+        """The mobility J D^-1 (J' - W' (W D^-1 W')^-1 W D^-1 J') of points with Jacobian J (k x n),
+        k x k."""
         forced, _ = self.solver.solve(J.T, ca.SX(self.solver.m, J.shape[0]))
         mobility = J @ forced
         return 0.5 * (mobility + mobility.T)
@@ -58,26 +59,26 @@ class OperationalSpace:
 
     @cached_property
     def Lambda_inv(self) -> ca.SX:
-        """3 x 3, symmetric; 1/kg, 1/(kg.m), 1/(kg.m2)."""
+        """Lambda^-1, 3 x 3 and symmetric; 1/kg, 1/(kg.m), 1/(kg.m2)."""
         return self.mobility(self.terms.J_h)
 
     @cached_property
     def open_mobility(self) -> ca.SX:
-        """J_h D^-1 J_h' of the linkage with its loops open and no body light, 3 x 3."""
+        """J_h D^-1 J_h' (3 x 3) of the linkage with open loops, light bodies with added inertia."""
         inertia = self.terms.inertia
         passed = inertia.inward(self.terms.J_h.T)
         return passed.T @ ca.diag(1 / (inertia.d + inertia.k)) @ passed
 
     @cached_property
     def a_bias(self) -> ca.SX:
-        """3 x 1: m/s2, m/s2, rad/s2."""
+        """The bias acceleration a_bias, 3 x 1 (m/s2, m/s2, rad/s2)."""
         return self.terms.J_h @ self._bias[0] + self.terms.Jdot_qd
 
     def response(self, Q: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """What generalised forces Q (n x 1) add to (qdd, lambda)."""
+        """The change of qdd and lambda by generalised forces Q (n x 1)."""
         return self.solver.solve(Q, ca.SX(self.solver.m, 1))
 
     def motion(self, Q: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """(qdd, lambda) under generalised forces Q beside the linkage's own (B.6)."""
+        """qdd and lambda under generalised forces Q in addition to the linkage's own (B.6)."""
         qdd, multipliers = self.response(Q)
         return self._bias[0] + qdd, self._bias[1] + multipliers

@@ -2,12 +2,13 @@
 
     q <- q - A h(q)  (repeated),   qd <- qd - A W(q) qd (repeated),   A = D^-1 W' (W D^-1 W')^-1
 
-A is factored once, at the pose that the integrator left, and used as a chord: each repeat
-multiplies the closure error by about the size of the correction itself.
+A is factored once, at the pose after integration (chord method): each repetition multiplies the
+closure error by about the size of the correction itself.
 
-Near a singular pose a gap that is rounding (1e-16 m) would move the pose by 1e-16/sigma, and its
-rate by 1e-16/sigma^2, along the direction that W is losing, onto another branch. So mu is large
-here, as it may be: what one step leaves, away from the singular pose the next one closes.
+Near a singular pose, where sigma, a singular value of W, goes to zero, a gap of rounding size
+(1e-16 m) would move the pose by 1e-16/sigma and its rate by 1e-16/sigma^2 along the corresponding
+direction, onto another branch. mu is therefore large here. It may be, since the gap that one step
+leaves is closed by the next ones, away from the singular pose.
 """
 
 from __future__ import annotations
@@ -18,15 +19,14 @@ from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.linkage.model import LinkageModel
 
-REPEATS = 3  # of the pose
+REPEATS = 3  # for the pose
 RATE_REPEATS = 2
-MU = 1e-6  # as in closure.py
+MU = 1e-6  # as in closed_loop_solver.py
 
 
 def projection(model: LinkageModel, inertia: TreeInertia) -> ca.Function:
-    """(q, qd, p) -> (q, qd) moved onto h(q) = 0 and W(q) qd = 0; unchanged without a loop.
-
-    inertia: the model's own."""
+    """The function (q, qd, p) -> (q, qd) that projects onto h(q) = 0 and W(q) qd = 0; the identity
+    for a linkage without loops. inertia: the model's own."""
     p, closed, rate = model.p.vector, model.q, model.qd
     if model.linkage.loop:
         h = ca.Function("h", [model.q, p], [model.h])

@@ -1,12 +1,13 @@
 """Baumgarte's stabilisation of (3.3), hddot + 2 alpha beta hdot + alpha^2 h = 0: default gains.
 
 The roots of the closure error times the step T are z = alpha T (-beta +- sqrt(beta^2 - 1)). A
-Runge-Kutta method multiplies them by its stability polynomial R(z), so alpha T has a limit, and
-the error that the terms bring grows with it. Limits at beta = 1, and why the defaults:
+Runge-Kutta method multiplies its modes by the stability polynomial R(z) in each step, so alpha T
+has a limit, and the error that the terms introduce grows with it. Limits at beta = 1, and the
+reason for each default:
 
     semi-implicit-euler   .83, 2 (sqrt(beta^2 + 1) - beta)    dead beat: both roots are 0
     heun                  2.0                                 dead beat: 1 + z + z^2/2 = 0
-    rk4                   2.79                                least error of the tip, .02 to .05
+    rk4                   2.79                                smallest error of the tip, .02 to .05
     dormand-prince-8      6.4                                 gap at rounding from .05 to .2
     linearly-implicit     none                                error of the tip grows from .1 on
 
@@ -38,15 +39,15 @@ GAINS = {
     "heun": Baumgarte(math.sqrt(2), math.sqrt(0.5)),
     "dormand-prince-8": Baumgarte(0.1, 1.0),
 }
-"""Of the integrators for which better ones are known than those of any, `ANY`."""
+"""Gains of the integrators for which better ones than `ANY` are known."""
 
 ANY = Baumgarte(0.05, 1.0)
 
 HELD = Baumgarte(0.4, 1.0)
-"""Of the local model, T the frame's period: W is stale by up to a frame, and a faster correction
-overshoots. Projection with the held matrices diverges for the same reason."""
+"""Gains of the local model, with T the frame period: W is up to a frame old, so that a faster
+correction overshoots. Projection with held matrices diverges for the same reason."""
 
 
 def gains(integrator: str) -> Baumgarte:
-    """The default ones for an integrator."""
+    """The default gains for an integrator."""
     return GAINS.get(integrator, ANY)

@@ -15,14 +15,15 @@ from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 
 
 def parameters(linkage: Linkage) -> tuple[Variable, ...]:
-    """Masses and geometry of the linkage, and what its forces need."""
+    """Parameters of the linkage: masses, geometry, and those of its forces."""
     return (*body_parameters(linkage), *forces.parameters(linkage))
 
 
 def mechanism_parameters(
     linkage: Linkage, mechanism: Mechanism, default: Baumgarte, period_s: float
 ) -> list[Variable]:
-    """`default` are the gains for steps of period_s."""
+    """Parameters of the virtual mechanism; `default` are the Baumgarte gains for steps of period_s
+    (s), for alpha and beta that the scene does not give."""
     found = [*parameters(linkage), *start_parameters(linkage)]
     if linkage.loop and mechanism.stabilization == "baumgarte":
         alpha = default.alpha_T / period_s if mechanism.alpha is None else mechanism.alpha
@@ -33,7 +34,7 @@ def mechanism_parameters(
 
 
 def start_parameters(linkage: Linkage) -> list[Variable]:
-    """Start pose before assembly, and start velocity before its projection."""
+    """Parameters for the start pose before assembly and the start velocity before projection."""
     units = coordinate_units(linkage)
     rates = tuple(f"{u}/s" for u in units)
     q, qd = (tuple(coordinates(linkage, s)) for s in (linkage.start, linkage.start_velocity))
@@ -45,13 +46,13 @@ def start_parameters(linkage: Linkage) -> list[Variable]:
 
 
 def length_parameter(linkage: Linkage, length: float | None) -> Variable:
-    """L; None takes the mean link length."""
+    """The parameter L (m); by default the mean link length."""
     length = mean_link_length(linkage) if length is None else length
     return Variable("length_scale", (), "m", length, "L of S = diag(1, 1, L)")
 
 
 def direction_parameters(directions: Directions) -> list[Variable]:
-    """Tolerance and hysteresis of the test for constrained directions."""
+    """Parameters of the detection of constrained directions: tolerance and hysteresis."""
     return [
         Variable("rank_tolerance", (), "1", directions.rank_tolerance, "share that counts as none"),
         Variable("hysteresis", (), "1", directions.hysteresis, "factor to leave a direction free"),
@@ -91,7 +92,7 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
     if m:
         found.append(Variable("lambda", (m,), "N", description="Lagrange multipliers of the loops"))
         gap = "largest gap over the loops"
-        apart = mean_link_length(linkage)  # a loop that is open by a link is none
+        apart = mean_link_length(linkage)  # a loop that is open by a link's length has diverged
         found.append(Variable("closure_error", (), "m", description=gap, max=apart))
     return found
 

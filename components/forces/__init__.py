@@ -1,10 +1,10 @@
-"""Applied forces of a linkage, one kind a file; a kind that a scene lacks adds no term.
+"""Applied forces of a linkage, one kind a file; a kind that a scene does not use adds no term.
 
-Those of the linkage's own keys are modules with
+Forces of the linkage's own keys are modules with
     parameters(linkage) -> list[Variable]
     efforts(model)      -> generalised forces (n x 1), or None
     energy(model)       -> potential energy (J), or None
-and those that [[linkage.force]] names by its `type` are classes in `FORCES`.
+and forces that [[linkage.force]] selects by its `type` are classes in `FORCES`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FORCES: Registry[type[Force]] = Registry("force", {})
 
 
 def named(linkage: Linkage) -> tuple[Force, ...]:
-    """Those of [[linkage.force]]. Raises ValueError for what is no record of `FORCES`."""
+    """The forces of [[linkage.force]]. Raises ValueError for an entry that is no `Force`."""
     for force in linkage.force:
         if not isinstance(force, Force):
             raise ValueError(f"`linkage.force`: {force!r} is no record of a force")
@@ -35,15 +35,15 @@ def named(linkage: Linkage) -> tuple[Force, ...]:
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
-    """Those of the forces alone."""
+    """The parameters of all forces."""
     own = [v for kind in KINDS for v in kind.parameters(linkage)]
     return own + [v for force in named(linkage) for v in force.parameters()]
 
 
 def efforts(model: LinkageModel) -> ca.SX:
-    """Sum of all generalised forces, n x 1: gravity (-g of (2.3)), springs, friction, drives, and
-    those of [[linkage.force]]. Raises ValueError for one of another size, or that asks for what the
-    linkage has not."""
+    """Sum of all generalised forces (n x 1): gravity (-g of (2.3)), springs, friction, drives, and
+    those of [[linkage.force]]. Raises ValueError for a force of another size, or one that refers to
+    a frame, joint or parameter that the linkage does not have."""
     found = [Q for kind in KINDS if (Q := kind.efforts(model)) is not None]
     n = model.q.numel()
     for force in named(model.linkage):
@@ -58,6 +58,6 @@ def efforts(model: LinkageModel) -> ca.SX:
 
 
 def energy(model: LinkageModel) -> ca.SX:
-    """Sum of all potential energies, J."""
+    """Sum of all potential energies (J)."""
     found = [V for kind in KINDS if (V := kind.energy(model)) is not None]
     return sum([*found, *(f.energy(model) for f in named(model.linkage))], start=ca.SX(0))

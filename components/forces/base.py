@@ -1,4 +1,4 @@
-"""What a force is that a scene names in [[linkage.force]]."""
+"""The base class of forces that a scene selects in [[linkage.force]]."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Force(ABC):
-    """One entry of [[linkage.force]]: its fields are the keys of that table, its methods the
-    equations. `type` is its name in `FORCES`; `name` comes first in those of its parameters."""
+    """An entry of [[linkage.force]]: its fields are the keys of that table, its methods the
+    equations. `type` is its name in `FORCES`; `name` is the prefix of its parameters' names."""
 
     type: str
     name: str
 
     def parameters(self) -> list[Variable]:
-        """Those that the FMU has for it, such as `<name>.stiffness`; none by default."""
+        """Its parameters in the FMU, such as `<name>.stiffness`; none by default."""
         return []
 
     @abstractmethod
@@ -31,5 +31,5 @@ class Force(ABC):
         """Generalised forces, n x 1, in q, qd, t and the parameters `model.p`."""
 
     def energy(self, model: LinkageModel) -> ca.SX:
-        """Potential energy (J), 0 by default: a force that stores none."""
+        """Potential energy (J); 0 by default."""
         return ca.SX(0)

@@ -1,4 +1,4 @@
-"""Joint drives: the active linkages of the report's future work (chapter 7).
+"""Joint drives, for active linkages (future work in the report's chapter 7):
 
 constant  Q = effort
 profile   Q = effort(t), from a table (time_tables.py)
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
-    """Raises ValueError for a drive on a free joint, which has three coordinates."""
+    """The parameters of the drives. Raises ValueError for a drive on a free joint, which has three
+    coordinates."""
     found = []
     for j in linkage.joint:
         if j.drive is not None and j.type == "free":
@@ -48,7 +49,7 @@ def parameters(linkage: Linkage) -> list[Variable]:
 
 
 def energy(model: LinkageModel) -> None:
-    """A drive stores nothing: what it gives is work done on the linkage."""
+    """None: a drive stores no energy, it does work on the linkage."""
     return None
 
 
@@ -63,7 +64,7 @@ def efforts(model: LinkageModel) -> ca.SX | None:
 
 
 def tables(linkage: Linkage) -> list[TimeTable]:
-    """Those of the drives, in the order of the joints."""
+    """The time tables of the drives, in the order of the joints."""
     return [
         TimeTable(j.drive.table, f"{j.name}.drive.table")
         for j in linkage.joint
@@ -72,7 +73,8 @@ def tables(linkage: Linkage) -> list[TimeTable]:
 
 
 def _effort(model: LinkageModel, joint: Joint, tabled: Iterator[ca.SX]) -> ca.SX:
-    """`tabled` gives (y, y') of each table in its turn; a model that is at no instant has NaN."""
+    """The effort of a joint's drive; `tabled` yields (y, y') of the tables in turn, which are NaN
+    in a model without an instant t."""
     drive, p = joint.drive, model.p
     if isinstance(drive, ConstantDrive):
         return p[f"{joint.name}.effort"]

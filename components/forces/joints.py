@@ -2,7 +2,8 @@
 
     Q = -k (q - q_rest) - b qd - f tanh(qd / v_f)
 
-Coulomb's jump at zero speed is smoothed over v_f: a fixed step has no event to find it by.
+The discontinuity of Coulomb friction at zero speed is smoothed over v_f, since fixed-step methods
+locate no events.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ _UNITS = {
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
-    """Raises ValueError for such a term on a free joint, which has three coordinates."""
+    """The parameters of these terms. Raises ValueError for a term on a free joint, which has three
+    coordinates."""
     found = []
     for j in linkage.joint:
         fields = ("stiffness", "rest", "damping", "friction")

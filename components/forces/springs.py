@@ -1,7 +1,7 @@
 """Springs and dampers between two points: force k (d - d_0) + b d' along their distance d.
 
-V = 1/2 k (d - d_0)^2. Without a free length, V = 1/2 k d^2 has no square root, and so no
-singularity where the points meet. With one, the force has no direction there, and is none.
+V = 1/2 k (d - d_0)^2. Without a free length, V = 1/2 k d^2 has no singularity where the points
+coincide. With one, the direction of the force is undefined there, and the force is zero.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hapticlink.components.linkage.model import LinkageModel
 
 
-MET = 1e-200  # m2, of d^2: the points are in one place
+MET = 1e-200  # m2: below this d^2 the points coincide
 
 
 def _name(linkage: Linkage, index: int) -> str:
@@ -71,7 +71,7 @@ def efforts(model: LinkageModel) -> ca.SX | None:
             continue
         span = _span(model, i)
         rate = model.rate(span)
-        if s.length is not None:  # along the distance only
+        if s.length is not None:  # damps along the distance only
             rate = span * ca.dot(span, rate) / ca.fmax(ca.dot(span, span), MET)
         b = model.p[f"{_name(model.linkage, i)}.damping"]
         found.append(-ca.jacobian(span, model.q).T @ (b * rate))

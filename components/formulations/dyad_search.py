@@ -1,8 +1,8 @@
-"""Which dyad closes each loop of a linkage, if one does.
+"""Finds a dyad for each loop of a linkage, if there is one.
 
-A loop with a dyad beside its cut joint is a four-bar (one coordinate left in it) or a five-bar
-(two), sliders included. The cut joint is the middle one (the links of its two bodies meet), or an
-end (a body and the one that carries it reach for the cut's other body).
+A loop that contains a dyad at its cut joint is a four-bar (with one independent coordinate) or a
+five-bar (with two), sliders included. The cut joint is the dyad's middle joint (the links of its
+two bodies meet there), or an end (a body and its parent reach for the cut's other body).
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ OTHERS = 'take mechanism.formulation = "partitioning" or "multipliers"'
 
 
 def find_dyads(model: LinkageModel, start: np.ndarray) -> list[Dyad]:
-    """One for each loop in turn, at start (q, p); of several one that can never fold (all links in
-    line, where its branches meet), and of these the one farthest from it at the start.
+    """A dyad for each loop in turn, at the start (q, p). Of several, one that can never fold (all
+    links in line, where its branches meet) is preferred, and of these the one farthest from folding
+    at the start.
 
-    A dyad may stand on those of earlier loops. Raises ValueError for a loop without one, with the
-    reason for each that it might have been.
+    A dyad may depend on those of earlier loops. Raises ValueError for a loop without a dyad, with
+    the reason for each candidate.
     """
     linkage, n = model.linkage, model.q.numel()
     taken: dict[str, str] = {}
@@ -44,10 +45,10 @@ def find_dyads(model: LinkageModel, start: np.ndarray) -> list[Dyad]:
             share = abs(float(side(start[:n], start[n:])))
             fit.append((_never_folds(model, start, i, dyad), share, (dyad, known)))
         if not fit:
-            told = "; ".join(dict.fromkeys(reasons)) or "it joins one body to the ground"
+            why = "; ".join(dict.fromkeys(reasons)) or "it joins one body to the ground"
             raise ValueError(
                 f"loop `{name}` ({loop.bodies[0]} to {loop.bodies[1]}) has no closed form, as no "
-                f"two links beside its cut joint make a dyad: {told}; {OTHERS}"
+                f"two links at its cut joint form a dyad: {why}; {OTHERS}"
             )
         dyad, known = max(fit, key=lambda each: each[:2])[2]
         taken = {j: f"loop `{name}` stands on it" for j in known} | taken
@@ -88,13 +89,13 @@ def _chain(linkage: Linkage, body: str) -> list[Joint]:
 
 
 def _candidates(linkage: Linkage, index: int) -> Iterator[Candidate]:
-    """Dyads of a loop, and the joints that each must stand on."""
+    """Candidate dyads of a loop, with the joints that each depends on."""
     name, bodies = loop_name(linkage, index), linkage.loop[index].bodies
     chains = [_chain(linkage, body) for body in bodies]
     ends = [f"{name}.at1", f"{name}.at2"]
     if all(chains):
         arms = [Arm(chain[0], end) for chain, end in zip(chains, ends, strict=True)]
-        # A slide comes second; two of them are found unfit.
+        # A slide is the second joint; two slides are rejected by `_unfit`.
         first, second = sorted(arms, key=lambda arm: arm.joint.type == "prismatic")
         slides = second.joint.type == "prismatic"
         dyad = TwoPivotsAndSlide(first, second) if slides else ThreePivots(first, second, None)

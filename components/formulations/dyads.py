@@ -1,7 +1,7 @@
-"""Dyads: the two links beside a loop's cut joint, posed in closed form.
+"""Dyads: the position of the two links at a loop's cut joint in closed form.
 
-d leads from the pivot P of the first link, of length l1, to what is known at the other end, and the
-joint between the two links is at X. sigma, +1 or -1, is the branch.
+d is the vector from the pivot P of the first link, of length l1, to the known point at the other
+end; X is the joint between the two links; sigma = +1 or -1 is the branch.
 
 Three pivots, the second link of length l2 (law of cosines):
 
@@ -31,27 +31,29 @@ class Dyad(Protocol):
     def joints(self) -> tuple[Joint, Joint]: ...
 
     def side(self, model: LinkageModel) -> ca.SX:
-        """In [-1, 1]: its sign is the branch, 0 where branches meet."""
+        """A value in [-1, 1] whose sign is the branch; 0 where the branches meet."""
 
     def close(self, at: Posed, q: ca.SX, sigma: ca.SX) -> ca.SX:
-        """q with the dyad's two coordinates moved, by the least turn, to where the loop closes."""
+        """q with the dyad's two coordinates replaced so that the loop closes; angles change by at
+        most half a turn."""
 
 
 @dataclass(frozen=True)
 class Arm:
-    """The link that `joint` carries, seen to the point of its body that parameter `end` gives."""
+    """The link carried by `joint`, up to the point of its body given by the parameter `end`."""
 
     joint: Joint
     end: str
 
     def vector(self, model: LinkageModel) -> ca.SX:
-        """From the pivot to the end, in the world, m."""
+        """The vector from the pivot to the end in the world (m)."""
         zero, p = ca.SX(2, 1), model.p
         along = p.get(self.end, zero) - p.get(f"{self.joint.name}.at_child", zero)
         return model.frames[self.joint.child].rotation @ along
 
     def turned(self, at: Posed, q: ca.SX, goal: ca.SX) -> ca.SX:
-        """q with this arm along `goal`; the angle is counted on from that in q."""
+        """q with this arm in the direction of `goal`; the angle stays within half a turn of its
+        value in q."""
         model = at(q)
         arm, i = self.vector(model), model.coordinate(self.joint.name)
         after = ca.SX(q)
@@ -61,8 +63,8 @@ class Arm:
 
 @dataclass(frozen=True)
 class ThreePivots:
-    """`second` turns about a pivot that is known, or stands on the first and reaches for `target`,
-    a point (body, parameter) that is known."""
+    """A dyad with three revolute joints: `second` turns about a known pivot, or is carried by the
+    first link and reaches for the known point `target` (body, parameter)."""
 
     first: Arm
     second: Arm
@@ -96,7 +98,8 @@ class ThreePivots:
 
 @dataclass(frozen=True)
 class TwoPivotsAndSlide:
-    """`first` turns about a pivot that is known, `second` slides along a line that is known."""
+    """A dyad with two revolute joints and a slide: `first` turns about a known pivot, `second`
+    slides along a known line."""
 
     first: Arm
     second: Arm

@@ -4,11 +4,11 @@ Each loop's dyad in closed form (dyads.py) gives q(z). With G = dq/dz, by substi
 
     q = q(z),   qd = G zd,   G' D G zdd = G' (Q - C qd - D Gdot zd)
 
-and W' lambda drops out, since W G = 0. The branch is that of the pose before the step; z from
-which no pose closes gives NaN.
+and W' lambda vanishes, since W G = 0. The branch is that of the pose before the step; a z for which
+the loops cannot close gives NaN.
 
-No shipped scene asks for it: it is the family of section B.2 that was found too slow for haptics,
-and `hapticlink bench mechanism` sets it beside the other two.
+No shipped scene uses it: it is the family of section B.2 that was found too slow for haptics;
+`hapticlink bench mechanism` compares it with the other two.
 """
 
 from __future__ import annotations
@@ -24,9 +24,11 @@ from hapticlink.components.linkage.model import LinkageModel
 
 
 class Embedding:
-    """Of a model at its start pose (q, p); efforts: (x, u, p, t) -> Q - C qd with what is applied.
+    """The formulation of a model, with dyads chosen at its start pose (q, p).
 
-    Raises ValueError for a loop that is no dyad."""
+    efforts: the function (x, u, p, t) -> Q - C qd, applied wrenches included. Raises ValueError for
+    a loop without a dyad.
+    """
 
     def __init__(
         self,
@@ -62,7 +64,7 @@ class Embedding:
     def _pose(
         self, model: LinkageModel, p: Signals, dyads: list[Dyad], z: ca.SX, near: ca.SX
     ) -> ca.SX:
-        """q(z); angles are counted on from those of `near`."""
+        """q(z), with angles within half a turn of those of `near`."""
         linkage, still = model.linkage, ca.SX(near.numel(), 1)
         before = LinkageModel(linkage, p, near, still)
         q = ca.SX(near)

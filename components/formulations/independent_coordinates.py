@@ -1,9 +1,9 @@
-"""Motion in independent coordinates z, part of q: the families of section B.2 beside multipliers.
+"""Motion in independent coordinates z, a part of q: alternatives to multipliers in section B.2.
 
-A formulation gives, from z, zd and a pose `near` on the branch meant, the q and qd that close every
-loop, and zdd. Only (z, zd) is integrated, so closures need no stabilisation. Which coordinates are
-independent is settled at the start pose: where the others meet a singularity of their own the
-formulation fails, though the linkage need not.
+A formulation computes, from z, zd and a pose `near` on the same branch, the q and qd that close
+every loop, and zdd. Only (z, zd) is integrated, so that closures need no stabilisation. The
+independent coordinates are chosen at the start pose: where the dependent ones become singular the
+formulation fails, even if the linkage itself is not singular there.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from hapticlink.components.specs.linkage import Mechanism
 
 
 class Formulation(Protocol):
-    """independent: indices in q of z (k); ode: ((z, zd), (u, near), p, t) -> (zd, zdd);
-    complete: ((z, zd), near, p) -> (q, qd)."""
+    """independent: indices in q of z (k entries). ode: function ((z, zd), (u, near), p, t) ->
+    (zd, zdd). complete: function ((z, zd), near, p) -> (q, qd)."""
 
     independent: list[int]
     ode: ca.Function
@@ -30,23 +30,22 @@ class Formulation(Protocol):
 
 
 def require_fitting(mechanism: Mechanism, held: bool) -> None:
-    """Raises ValueError for settings that independent coordinates have no use for.
-
-    held: the matrices come from outside (local_model)."""
+    """Raises ValueError for settings that do not fit independent coordinates; held: the matrices
+    are inputs (local_model)."""
     if mechanism.formulation == "multipliers":
         return
     name = f'`mechanism.formulation` = "{mechanism.formulation}"'
     if mechanism.stabilization == "baumgarte":
         raise ValueError(
-            f"{name} closes its loops by itself: Baumgarte's terms do not appear; "
+            f"{name} satisfies the closures exactly and has no Baumgarte terms; "
             "leave `mechanism.stabilization` out, or take multipliers"
         )
     if held:
-        raise ValueError(f"{name} needs the linkage at its own pose: `local_model` = false, please")
+        raise ValueError(f"{name} needs the matrices at its own pose: take `local_model` = false")
 
 
 def start_pose(model: LinkageModel, parameters: Signals) -> tuple[np.ndarray, np.ndarray]:
-    """(q, p): the assembled start pose and the parameters' defaults."""
+    """The assembled start pose q and the default parameters p."""
     p = np.array([s for v in parameters.variables for s in v.starts])
     q0, _ = assemble(
         LinkageModel(model.linkage, parameters, parameters["q_start"], parameters["qd_start"])

@@ -4,8 +4,9 @@ q = (z, y) with a regular block W_y of W at the start pose, by elimination with 
 
     y <- y - W_y^-1 h(z, y)   repeated,   yd = -W_y^-1 W_z zd,   zdd = rows of qdd in (B.6)
 
-The accelerations are those of the multipliers; of them only zdd is integrated. Newton starts at the
-pose before the step, and squares its error (about h |yd|) with each of a fixed number of repeats.
+The accelerations are those of the formulation by multipliers, of which only zdd is integrated.
+Newton's method starts at the pose before the step, with an error of about h |yd| that each of a
+fixed number of iterations squares.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ REPEATS = 4
 
 
 class Partitioning:
-    """Of a model at its start pose (q, p); ode: (x, u, p, t) -> (qd, qdd) by multipliers."""
+    """The formulation of a model, partitioned at its start pose (q, p); ode is the function
+    (x, u, p, t) -> (qd, qdd) by multipliers."""
 
     def __init__(
         self,

@@ -1,7 +1,8 @@
-"""Fixed-step methods for plants, one a file; `METHODS` names them as a scene does.
+"""Fixed-step integration methods for plants, one a file; `METHODS` holds them by the names that a
+scene uses.
 
-A method advances x' = f(x, u, p, t) by h with u held. `positions` lists the entries of x
-that are positions: methods that treat positions and velocities apart need to know.
+A method advances x' = f(x, u, p, t) by h with constant u. `positions` lists the entries of x that
+are positions, for methods that treat positions and velocities differently.
 """
 
 from __future__ import annotations
@@ -40,5 +41,5 @@ def step(
     h: ca.SX,
     positions: Sequence[int],
 ) -> ca.SX:
-    """x(t + h) by the named method. Raises ValueError for a name that is not in METHODS."""
+    """x(t + h) by the named method. Raises ValueError for an unknown name."""
     return METHODS[method].step(ode, x, u, p, t, h, positions)

@@ -1,4 +1,4 @@
-"""What an integrator is."""
+"""The base class of integration methods."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ if TYPE_CHECKING:
 
 
 class Integrator(ABC):
-    """One method. `order` is the global one; a step is a pure expression in x, u, p, t, h.
+    """An integration method; a step is a pure expression in x, u, p, t, h.
 
-    extrapolates: stages weigh earlier ones by far more than 1, and their rounding with them."""
+    order: order of the global error. extrapolates: whether coefficients of earlier stages are much
+    larger than 1, so that their rounding errors are amplified."""
 
     order: int
     extrapolates: bool = False

@@ -3,9 +3,9 @@
 (1 - gamma h J) k_1 = f(t, x),   (1 - gamma h J) k_2 = f(t + h, x + h k_1) - 2 k_1
 x_{k+1} = x_k + h (3 k_1 + k_2)/2,   gamma = 1 - 1/sqrt 2,   J = df/dx at (t, x)
 
-Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20 (1999), 1456: order 2 with any J, so a
-force's jump in slope costs nothing but damping. No iteration: two evaluations, one J by algorithmic
-differentiation and one factorisation, of n x n since q' = v:
+Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20 (1999), 1456: order 2 with any J, so that
+kinks of a force do not reduce the order. There is no iteration: two evaluations of f, one J by
+algorithmic differentiation and one factorisation, of n x n since q' = v:
 
 (1 - gamma h J_vv - (gamma h)^2 J_vq) k_v = r_v + gamma h J_vq r_q,   k_q = r_q + gamma h k_v
 """
@@ -37,7 +37,7 @@ class LinearlyImplicit(Integrator):
         h: ca.SX,
         positions: Sequence[int],
     ) -> ca.SX:
-        """Raises ValueError where an entry of x that is no position has no position of its own."""
+        """x(t + h). Raises ValueError unless x has as many velocities as positions."""
         import casadi as ca  # here, as a scene is checked against the registry without equations
 
         q = list(positions)
@@ -57,7 +57,7 @@ class LinearlyImplicit(Integrator):
         J_q, J_v = slopes(x, u, p, t)
         g = GAMMA * h
         A = ca.SX.eye(len(v)) - g * J_v - g**2 * J_q
-        # QR needs no pivot choice, hence no branch.
+        # QR needs no pivoting and hence no branch.
         factors = ca.qr(ca.densify(A))
 
         def solved(r: ca.SX) -> ca.SX:

@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta methods, each a Butcher tableau.
+"""Explicit Runge-Kutta methods, each given by its Butcher tableau.
 
 k_i = f(t + c_i h, x + h sum_j a_ij k_j),   x_{k+1} = x_k + h sum_i b_i k_i
 """
@@ -15,17 +15,18 @@ if TYPE_CHECKING:
     import casadi as ca
 
 ROUNDING = 1e-13
-"""Of coefficients that are given as decimals, relative to the sum of their magnitudes."""
+"""Tolerance for coefficients given as decimals, relative to the sum of their magnitudes."""
 
 
 @dataclass(frozen=True)
 class Tableau:
-    """a (strictly lower rows), b, c of an explicit method, and its order.
+    """Coefficients a (rows of the strictly lower triangle), b and c of an explicit method, and its
+    order.
 
-    Raises ValueError where a row of a does not sum to its c, or where the method does not
-    integrate powers of t up to its order: sum_i b_i c_i^(k-1) = 1/k for k = 1..order, of which
-    the first says that b sums to 1. (Hairer, Norsett, Wanner, Solving Ordinary Differential
-    Equations I, II.1 and II.2; the conditions on trees that branch are not checked.)
+    Raises ValueError if a row of a does not sum to its c, or if the method does not integrate
+    powers of t up to its order: sum_i b_i c_i^(k-1) = 1/k for k = 1..order, the first of which is
+    that b sums to 1. (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1 and
+    II.2; order conditions of branched trees are not checked.)
     """
 
     a: tuple[tuple[float, ...], ...]

@@ -1,8 +1,8 @@
-"""Which assembly of its loops a linkage is on.
+"""Determines on which assembly (branch) of its loops a linkage is.
 
-The loops give the rates of dependent coordinates from the others, W_d qd_d = -W_i qd_i. The
-branches meet where det W_d = 0, so its sign tells them apart. Dependent are, first, the
-coordinates that do not move the operational point: those that the hand cannot see fold.
+The loops determine the rates of dependent coordinates, W_d qd_d = -W_i qd_i. Branches meet where
+det W_d = 0, so its sign distinguishes them. Coordinates that do not move the operational point are
+made dependent first, since these are the ones that fold unnoticed.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from hapticlink.components.linkage.model import LinkageModel
 def dependent_coordinates(
     model: LinkageModel, start: np.ndarray, unseen_first: bool = True
 ) -> tuple[list[int], list[int]]:
-    """(rows of W, columns of W) of a regular block W_d at the start pose, by elimination.
+    """Rows and columns of W that form a regular block W_d at the start pose, by elimination.
 
-    start: flat parameters' defaults and pose as (q, p). Redundant rows are left out. Without
-    unseen_first the largest pivots alone choose, for a block far from singular.
+    start: the pose and the flat default parameters, (q, p). Redundant rows are left out. With
+    unseen_first, columns that do not move the operational point are taken first; otherwise the
+    largest pivots are, for a block far from singular.
     """
     n = model.q.numel()
     W = ca.Function("W", [model.q, model.p.vector], [model.W])
@@ -29,7 +30,7 @@ def dependent_coordinates(
     chosen: list[int] = []
     columns: list[int] = []
     while True:
-        # Unseen coordinates first; among equals the largest pivot.
+        # Coordinates that do not move the operational point first, then the largest pivot.
         pivots = [
             (unseen[j], abs(A[i, j]), i, j)
             for i in set(range(len(A))) - set(chosen)

@@ -1,7 +1,7 @@
 """Kinematics and Lagrangian terms of a planar linkage, by differentiation of the kinematics.
 
-Relative joint coordinates q of the tree; loops stay open in q and are closed by
-h(q) = 0 (2.13). The terms of (2.3), D qdd + C qd + g = J_h' F_h + W' lambda:
+q are relative joint coordinates of the tree; loops are closed by the constraints h(q) = 0 (2.13).
+The terms of (2.3), D qdd + C qd + g = J_h' F_h + W' lambda:
 
     D   = sum_i m_i J_i' J_i + I_i J_theta,i' J_theta,i       (2.7), (2.10)
     C qd = J' M Jdot qd of all bodies, stacked                (2.11) contracted with qd
@@ -45,11 +45,11 @@ def _rotation(angle: ca.SX) -> ca.SX:
 
 
 class LinkageModel:
-    """The terms of (2.3) at q, qd, each built when it is first asked for.
+    """The terms of (2.3) at q and qd, each built when it is first used.
 
-    q, qd: n x 1; p: the parameters by name. D n x n, W m x n (m two for each loop),
-    J_h 3 x n. tabled: (y, y') of the drives' tables at the instant t (s), NaN where the model is at
-    none. Raises ValueError for bodies that no joint connects to the ground.
+    q, qd: n x 1. p: the parameters by name. D is n x n, W is m x n (two rows per loop), J_h is
+    3 x n. tabled: (y, y') of the drives' tables at the instant t (s), by default NaN. Raises
+    ValueError for bodies that no chain of joints connects to the ground.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class LinkageModel:
 
     @cached_property
     def outward(self) -> list[Joint]:
-        """The joints in an order in which each stands on the ground or an earlier child."""
+        """The joints in an order in which the parent of each is the ground or an earlier child."""
         reached, order, waiting = {"ground"}, [], list(self.linkage.joint)
         while waiting:
             ready = [j for j in waiting if j.parent in reached]
@@ -92,7 +92,7 @@ class LinkageModel:
 
     @cached_property
     def leaf_to_root(self) -> list[int]:
-        """The coordinates, each after those of the joints that stand on it."""
+        """Indices of the coordinates, each after those of all joints farther out."""
         outward = [
             self.coordinate(j.name) + k for j in self.outward for k in range(COORDINATES[j.type])
         ]
@@ -115,8 +115,8 @@ class LinkageModel:
         return self.frames[joint.parent].point(self.p.get(f"{joint.name}.at_parent"))
 
     def twists(self, joint: Joint) -> tuple[ca.SX, list[ca.SX]]:
-        """The joint's point in the world (m), and (omega, v_x, v_y) there of a unit rate of each
-        of its coordinates."""
+        """The joint's point in the world (m), and the twist (omega, v_x, v_y) there for a unit rate
+        of each of its coordinates."""
         R, at = self.frames[joint.parent].rotation, self._pivot(joint)
         turn = ca.sparsify(ca.SX([1, 0, 0]))
 
@@ -151,7 +151,7 @@ class LinkageModel:
         )
 
     def rate(self, r: ca.SX) -> ca.SX:
-        """dr/dt along the motion, of an expression in q."""
+        """Time derivative (dr/dq) qd of an expression r in q."""
         return ca.jtimes(r, self.q, self.qd)
 
     @cached_property
@@ -164,7 +164,8 @@ class LinkageModel:
 
     @cached_property
     def _bodies(self) -> tuple[ca.SX, ca.SX]:
-        """(x, y, theta of every body's centre of mass; weights m, m, I), stacked, 3k x 1."""
+        """Poses (x, y, theta) of all bodies' centres of mass, and their weights (m, m, I), each
+        stacked to 3k x 1."""
         poses, weights = [], []
         for b in self.linkage.body:
             mass, inertia = self.p[f"{b.name}.mass"], self.p[f"{b.name}.inertia"]
@@ -191,7 +192,8 @@ class LinkageModel:
 
     @cached_property
     def h(self) -> ca.SX:
-        """Loop closures, two rows a loop: the gap from bodies[1]'s point to bodies[0]'s, m."""
+        """Loop closures (m), two rows per loop: the gap from the point of bodies[1] to that of
+        bodies[0]."""
         gaps = []
         for i, loop in enumerate(self.linkage.loop):
             name = loop_name(self.linkage, i)
@@ -213,7 +215,7 @@ class LinkageModel:
 
     @cached_property
     def closure_error(self) -> ca.SX:
-        """Largest gap over the loops, m."""
+        """Largest gap of all loops (m)."""
         gaps = [ca.norm_2(self.h[2 * i : 2 * i + 2]) for i in range(len(self.linkage.loop))]
         return ca.SX(0) if not gaps else gaps[0] if len(gaps) == 1 else ca.mmax(ca.vertcat(*gaps))
 
@@ -223,7 +225,7 @@ class LinkageModel:
         return self.pose(self.linkage.operational_point.body, "operational_point.at")
 
     def pose(self, body: str, at: str) -> ca.SX:
-        """(x, y, theta) of the point of a body that parameter `at` gives, or of its origin."""
+        """Pose (x, y, theta) of the point of a body given by parameter `at`, or of its origin."""
         frame = self.frames[body]
         return ca.vertcat(frame.point(self.p.get(at)), frame.angle)
 

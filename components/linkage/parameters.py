@@ -13,7 +13,7 @@ from hapticlink.components.specs.quantities import Point
 def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
     """Masses and geometry as `fixed` FMI parameters: `link1.mass`, `elbow1.at_parent[1]`.
 
-    A point that the scene does not mention is structure: the frame's origin.
+    A point that the scene does not mention has no parameter: it is the frame's origin.
     """
 
     def fixed(name: str, unit: str, value: float | Point, text: str) -> Variable:
@@ -58,7 +58,7 @@ def coordinate_units(linkage: Linkage) -> tuple[str, ...]:
 
 
 def coordinates(linkage: Linkage, values: Mapping[str, float | tuple[float, ...]]) -> list[float]:
-    """Flat joint coordinates from values by joint name; what is missing is 0."""
+    """Flat joint coordinates from values by joint name; missing ones are 0."""
     flat: list[float] = []
     for j in linkage.joint:
         value = values.get(j.name, (0.0,) * COORDINATES[j.type])
@@ -67,9 +67,9 @@ def coordinates(linkage: Linkage, values: Mapping[str, float | tuple[float, ...]
 
 
 def mean_link_length(linkage: Linkage) -> float:
-    """Mean over the bodies of the largest distance between two of their joint points, m.
+    """Mean over the bodies of the largest distance between two of their joint points (m).
 
-    A linkage without any such distance takes its mean radius of gyration.
+    For a linkage without any such distance, the mean radius of gyration.
     """
     points: dict[str, list[Point]] = {b.name: [] for b in linkage.body}
     for j in linkage.joint:

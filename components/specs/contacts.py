@@ -1,4 +1,4 @@
-"""What a scene can say of contacts, with every default. SI units."""
+"""[contacts]: obstacles and contact parameters, as a scene writes them, in SI units."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Disc:
     radius: Length
     """Its radius."""
     name: str | None = None
-    """Its name in messages and FMU parameters; disc1, disc2, ... where left out."""
+    """Its name in messages and FMU parameters; by default disc1, disc2, ..."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,17 +32,17 @@ class Polygon:
     """A fixed convex polygon."""
 
     corners: tuple[Point, ...]
-    """Its corners, three or more, in either sense."""
+    """Its corners, three or more, in either sense of rotation."""
     name: str | None = None
-    """Its name in messages and FMU parameters; polygon1, polygon2, ... where left out."""
+    """Its name in messages and FMU parameters; by default polygon1, polygon2, ..."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Contacts:
-    """What the links can touch, and how hard it is."""
+    """Obstacles that the links can touch, and the parameters of the contact force."""
 
     enclosure: tuple[Point, ...] | None = None
-    """Corners of a rigid convex polygon with the linkage inside."""
+    """Corners of a convex polygon around the linkage."""
     disc: tuple[Disc, ...] = ()
     """Fixed discs."""
     polygon: tuple[Polygon, ...] = ()
@@ -52,12 +52,12 @@ class Contacts:
     damping: LinearDamping = 300.0
     """b_contact of section B.6."""
     detection: Literal["graphics", "haptics"] = "graphics"
-    """graphics: the virtual environment finds the contact geometry, held between frames (the
-    report's local model); haptics: the mechanism does, at every evaluation."""
+    """graphics: the virtual environment detects contacts, and their geometry is held between frames
+    (the report's local model); haptics: the mechanism detects them at every evaluation."""
     margin: Annotated[float, Quantity("m", ge=0)] = 0.01
     """Gap up to which the virtual environment reports a contact."""
     broad_phase: bool = True
-    """Leaves out the pairs of a body and an obstacle that it can never reach."""
+    """Whether to leave out pairs of a body and an obstacle that can never touch."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,10 @@ class Pair:
 
 
 def pairs(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
-    """Every body with a shape against every obstacle.
+    """Every pair of a body with a shape and an obstacle.
 
-    A capsule touches the enclosure with either end at up to two walls (a corner); a disc once; a
-    polygon with either end and along its side.
+    A capsule has these places: at the enclosure, either end at up to two walls (a corner); at a
+    disc, one; at a polygon, either end and one along its side.
     """
     found = []
     for body in linkage.body:

@@ -10,15 +10,15 @@ from hapticlink.components.specs.quantities import Damping, Quantity, Stiffness
 
 @dataclass(frozen=True, kw_only=True)
 class Topology:
-    """Topology (joint-constraint) controller: it pulls along the constrained directions alone."""
+    """Topology (joint-constraint) controller: a stiffness along the constrained directions."""
 
     stiffness: Annotated[float, Quantity("N/(m.kg)", ge=0)] = 200.0
     """k_j, per kilogram of the device's inertia along the constrained directions."""
     damping: Annotated[float, Quantity("N.s/(m.kg)", ge=0)] = 50.0
-    """b_j, per kilogram of the same."""
+    """b_j, per kilogram of the same inertia."""
     form: Literal["constrained", "plain"] = "constrained"
-    """plain: M_d P_c (k_j e + b_j edot), for comparison only; it leaks onto free motion and depends
-    on the length scale."""
+    """constrained: F_T of [theory](theory.md); plain: M_d P_c (k_j e + b_j edot), for comparison
+    only, as it does work on free motion and depends on the length scale."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,14 +34,14 @@ class Teleoperation:
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
-    """The controller of the device. A part that is false or left out has no term, no input and no
+    """The controller of the device. A part that is false or left out adds no term, no input and no
     parameter."""
 
     impedance: bool = True
-    """The impedance law: the device moves as the mechanism would."""
+    """Impedance control: the device moves as the mechanism would move."""
     bias: Literal["none", "full"] = "none"
-    """full: adds M_d a_bias, what velocities, gravity, springs and drives of the mechanism make of
-    the operational acceleration; none: leaves it out (the report)."""
+    """full: adds M_d a_bias, the compensation of the mechanism's Coriolis and centrifugal terms,
+    gravity, springs and drives; none: leaves it out (the report)."""
     damping: Damping | None = None
     """B_d, the desired damping of (4.1)."""
     stiffness: Stiffness | None = None
@@ -49,6 +49,6 @@ class Controller:
     teleoperation: Teleoperation | Literal[False] = field(default_factory=Teleoperation)
     """Position channels between the operational point and the handle."""
     topology: Topology | bool = True
-    """Topology controller; true takes its defaults."""
+    """Topology controller; true for its defaults."""
     contact: bool = False
-    """Feels the contacts: F_env enters the impedance law. Needs [contacts]."""
+    """Whether contacts are felt: F_env enters the impedance law. Needs [contacts]."""

@@ -21,7 +21,7 @@ class Observer:
     """Nicosia observer of the handle's velocity and of the hand's wrench (section 4.2.1)."""
 
     rule: Literal["forward", "backward", "trapezoidal"] = "backward"
-    """The rule of section 1.3.1 that discretises it."""
+    """Discretisation rule of section 1.3.1."""
     omega_n: Annotated[float, Quantity("rad/s", gt=0)] = 50.0
     """Bandwidth."""
     k_D: Annotated[float, Quantity("1/s", gt=0)] = 100.0
@@ -30,7 +30,7 @@ class Observer:
 
 @dataclass(frozen=True, kw_only=True)
 class Device:
-    """Twin pantograph. The report gives no dimensions: every number here is assumed, but for the
+    """Twin pantograph. The report gives no dimensions: every number here is assumed, except for the
     0.09 degrees of an encoder count.
 
     Two five-bars in parallel planes, A and B, hold the ends of a crank at p -+ (crank/2)
@@ -71,18 +71,18 @@ class Device:
     handle_inertia: Annotated[float, Quantity("kg.m2", gt=0)] = 8e-5
     """Inertia of handle and crank."""
     torque_limit: Annotated[float, Quantity("N.m", gt=0)] = 0.5
-    """Largest torque of a motor; where one would exceed it, all four are scaled alike."""
+    """Largest torque of a motor; if one would exceed it, all four are scaled by one factor."""
     encoder_resolution: Annotated[float, Quantity("rad", gt=0)] = 0.0015707963267948966
     """Angle of one encoder count (0.09 degrees)."""
     reach_limit: Annotated[float, Quantity("1", gt=0.5, lt=1)] = 0.95
-    """Share of an arm's full reach at which the stops begin."""
+    """Fraction of an arm's full reach at which the stops begin."""
     stop_stiffness: LinearStiffness = 5000.0
     """Stiffness of the stops."""
     stop_damping: LinearDamping = 20.0
     """Damping of the stops."""
     substeps: Annotated[int, Quantity("1", ge=1, le=100)] = 1
-    """Integration steps within a communication step; the FMU's equations grow with them."""
+    """Integration steps per communication step; the size of the FMU's equations grows with them."""
     sensing: Literal["ideal", "encoders"] = "ideal"
-    """Not to be written here: the scene's own `sensing` sets it."""
+    """Set by the scene's own `sensing`; not to be written here."""
     observer: Observer = field(default_factory=Observer)
-    """The observer, with sensing = "encoders"."""
+    """The observer, used with sensing = "encoders"."""

@@ -46,12 +46,12 @@ class ProfileHand:
 
 @dataclass(frozen=True, kw_only=True)
 class ArmHand:
-    """An arm behind a grip: a mass held to a target path, and to the handle by the grip."""
+    """An arm behind a grip: a mass with springs and dampers to a target path and to the handle."""
 
     type: Literal["arm"] = "arm"
     """An arm behind a grip."""
     mass: Inertia = (1.0, 1.0, 0.002)
-    """M_a, the arm's mass and moment of inertia."""
+    """M_a, mass and moment of inertia of the arm."""
     stiffness: Stiffness = (300.0, 300.0, 1.0)
     """K_a, arm to target."""
     damping: Damping = (10.0, 10.0, 0.02)
@@ -73,7 +73,7 @@ class SpringHand:
     stiffness: Stiffness
     """Stiffness, handle to target."""
     damping: Damping | None = None
-    """Damping, handle to target; none where left out."""
+    """Damping, handle to target; by default none."""
     target: Path = ((0.0, 0.0, 0.0, 0.0),)
     """Rows of time and pose, sorted by time; linear between rows, the ends held."""
 

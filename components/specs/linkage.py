@@ -1,8 +1,8 @@
-"""What can be said of a linkage and of how it is simulated, with every default, once.
+"""[linkage], [mechanism], [directions] and the graphics copy, as a scene writes them.
 
-Plain frozen records: a scene file's tables are read straight into them. Structure is what a scene
-mentions: a field left at None has no term in the equations; one given, even as 0, is a parameter of
-the FMU. SI units throughout.
+Frozen records into which a scene file's tables are read. What a scene mentions is structure: a
+field that is None adds no term to the equations; one with a value, even 0, is a parameter of the
+FMU. SI units throughout.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ class Body:
     """A rigid body. With a radius it can touch obstacles: as a capsule, or as a disc."""
 
     name: str
-    """By which joints, loops and points speak of it; none is "ground"."""
+    """Its name in joints, loops and points; not "ground"."""
     mass: Mass
-    """Mass; 0 only for a body in a loop whose motion other masses determine."""
+    """Mass; may be 0 for a body in a loop that cannot move without other masses."""
     inertia: MomentOfInertia
     """Moment of inertia about the centre of mass."""
     center: Point | None = None
-    """Centre of mass in the body's frame; its origin where left out."""
+    """Centre of mass in the body's frame; by default its origin."""
     radius: Length | None = None
-    """Radius of the body's shape. Without one it touches nothing."""
+    """Radius of the body's shape; without one it touches nothing."""
     capsule: tuple[Point, ...] = ((0.0, 0.0),)
     """Ends of the axis of the body's shape, in its frame; one point for a disc."""
 
@@ -98,18 +98,18 @@ class Spring:
     """A spring and damper between two points of bodies."""
 
     bodies: tuple[str, str]
-    """The two bodies; "ground" is one."""
+    """The two bodies; may be "ground"."""
     at: tuple[Point, Point]
     """The two points, each in the frame of its body."""
     stiffness: LinearStiffness | None = None
-    """Stiffness; no spring where left out."""
+    """Stiffness; by default there is no spring."""
     damping: LinearDamping | None = None
-    """Damping; no damper where left out."""
+    """Damping; by default there is no damper."""
     length: Annotated[float, Quantity("m", ge=0)] | None = None
-    """Free length. Where left out it is 0, and the damping acts across the line through the points
-    too, not along it alone."""
+    """Free length; with one the damping acts along the line through the points only. By default 0,
+    and the damping acts in all directions."""
     name: str | None = None
-    """Prefix of its FMU parameters; spring1, spring2, ... where left out."""
+    """Prefix of its FMU parameters; by default spring1, spring2, ..."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +121,7 @@ class Joint:
     """
 
     name: str
-    """By which start values speak of it."""
+    """Its name in start values."""
     type: Literal["revolute", "prismatic", "free"] = "revolute"
     """revolute: one angle; prismatic: one displacement along `axis`; free: x, y and theta of the
     child in the parent's frame."""
@@ -130,15 +130,15 @@ class Joint:
     child: str
     """The body that the joint carries."""
     at_parent: Point | None = None
-    """Where the joint is in the parent's frame; its origin where left out."""
+    """Position of the joint in the parent's frame; by default its origin."""
     at_child: Point | None = None
-    """Where the joint is in the child's frame; its origin where left out."""
+    """Position of the joint in the child's frame; by default its origin."""
     axis: Angle | None = None
     """Direction of a prismatic joint in the parent's frame, from its x axis; required there."""
     stiffness: JointStiffness | None = None
     """Stiffness of a spring about `rest`."""
     rest: Coordinate | None = None
-    """Coordinate at which the spring is at rest; 0 where left out."""
+    """Coordinate at which the spring is at rest; by default 0."""
     damping: JointDamping | None = None
     """Viscous damping."""
     friction: Annotated[float, Quantity("N.m or N", ge=0)] | None = None
@@ -151,14 +151,14 @@ class Joint:
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """A cut revolute joint, which closes a loop: two points of two bodies that stay together."""
+    """A cut revolute joint, which closes a loop: two points of two bodies that coincide."""
 
     bodies: tuple[str, str]
-    """The two bodies; "ground" is one."""
+    """The two bodies; may be "ground"."""
     at: tuple[Point, Point]
     """The two points, each in the frame of its body."""
     name: str | None = None
-    """Prefix of its FMU parameters; loop1, loop2, ... where left out."""
+    """Prefix of its FMU parameters; by default loop1, loop2, ..."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,9 +166,9 @@ class OperationalPoint:
     """The point that the hand holds."""
 
     body: str
-    """The body that it is a point of."""
+    """The body that it belongs to."""
     at: Point | None = None
-    """Where it is in the body's frame; its origin where left out."""
+    """Its position in the body's frame; by default its origin."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +176,7 @@ class FurtherPoint(OperationalPoint):
     """Another operational point, for a hand of its own."""
 
     name: str
-    """By which [hands] and the FMU's ports speak of it."""
+    """Its name in [hands] and in the FMU's ports."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,39 +186,39 @@ class Linkage:
     body: tuple[Body, ...]
     """The bodies."""
     joint: tuple[Joint, ...]
-    """The joints of the tree: every body is the child of one."""
+    """The joints of the tree: every body is the child of exactly one."""
     operational_point: OperationalPoint
     """The point that the hand holds."""
     point: tuple[FurtherPoint, ...] = ()
-    """Further operational points, for more hands than one."""
+    """Further operational points, for further hands."""
     loop: tuple[Loop, ...] = ()
     """Cut joints that close loops."""
     spring: tuple[Spring, ...] = ()
     """Springs and dampers between points of bodies."""
     force: tuple[Any, ...] = ()
-    """Forces of your own: each `type` is a name that a plugin has registered, which says the other
+    """Forces of your own: `type` is a name that a plugin has registered, which defines the other
     keys ([extending](extending.md#a-force))."""
     gravity: tuple[Acceleration, Acceleration] | None = None
     """Gravity on every body."""
     start: Mapping[str, Coordinate | Pose] = field(default_factory=dict)
-    """Joint coordinates at t = 0 by the joint's name, 0 where left out; three for a free joint.
-    Assembly moves them onto the loop closures."""
+    """Joint coordinates at t = 0 by the joint's name, by default 0; three for a free joint.
+    Assembly changes them so that the loops close."""
     start_velocity: Mapping[str, Velocity | Twist] = field(default_factory=dict)
-    """Joint velocities at t = 0 by the joint's name; three for a free joint. They are kept; those
-    left out are the least that the loops allow."""
+    """Joint velocities at t = 0 by the joint's name; three for a free joint. Given ones are kept;
+    the others are the smallest that are consistent with the loops."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Directions:
-    """How constrained directions are told from free ones, by the eigenvalues of S Lambda^-1 S with
+    """Detection of constrained directions by the eigenvalues of S Lambda^-1 S with
     S = diag(1, 1, length_scale)."""
 
     length_scale: Length | None = None
-    """Makes rotations comparable with translations; the mean link length where left out."""
+    """L, makes rotations comparable with translations; by default the mean link length."""
     rank_tolerance: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.1
-    """A direction is constrained where its share of the largest eigenvalue falls below this."""
+    """A direction is constrained if its eigenvalue is below this fraction of the largest one."""
     hysteresis: Annotated[float, Quantity("1", ge=1)] = 1.5
-    """A direction stays constrained until its share exceeds this times `rank_tolerance`."""
+    """A direction stays constrained until that fraction exceeds this times `rank_tolerance`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -228,20 +228,20 @@ class Mechanism:
     integrator: Annotated[str, METHODS.names()] = "rk4"
     """Integration method."""
     formulation: Literal["multipliers", "partitioning", "embedding"] = "multipliers"
-    """How loops enter (section B.2): by multipliers with a stabilization, or by independent
-    coordinates alone, which need none."""
+    """Formulation of loops (section B.2): Lagrange multipliers with a stabilization, or independent
+    coordinates, which need none."""
     stabilization: Literal["none", "baumgarte", "projection"] = "projection"
-    """What keeps the loops closed."""
+    """Stabilisation of the loop closures."""
     directions: bool = False
-    """Puts out Lambda_inv, P_c and n_constraints at the mechanism's own rate."""
+    """Adds the outputs Lambda_inv, P_c and n_constraints at the mechanism's own rate."""
     diagnostics: bool = False
-    """Puts out rank and condition of the closures."""
+    """Adds outputs for rank and condition of the closures."""
     alpha: Annotated[float, Quantity("1/s", ge=0)] | None = None
-    """Baumgarte's frequency of (3.3); where left out, what suits the integrator."""
+    """Baumgarte's frequency of (3.3); the default depends on the integrator."""
     beta: Annotated[float, Quantity("1", ge=0)] | None = None
-    """Baumgarte's damping ratio of (3.3); where left out, what suits the integrator."""
+    """Baumgarte's damping ratio of (3.3); the default depends on the integrator."""
     substeps: Substeps = 1
-    """Integration steps within a communication step."""
+    """Integration steps per communication step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,9 +249,9 @@ class GraphicsCopy:
     """The graphics-rate copy, and how it follows the mechanism (section B.6)."""
 
     sync: Literal["exact", "operational", "joint"] = "exact"
-    """exact: the copy takes the mechanism's coordinates, moved onto the closures; operational: a PD
-    controller pulls it at the operational pose (the report), and it may fold to the other assembly
-    of links; joint: it is pulled at every joint coordinate."""
+    """exact: the copy takes the mechanism's coordinates, projected onto the closures; operational:
+    a PD controller pulls it at the operational point (the report), and it may fold to the other
+    assembly; joint: it is pulled at every joint coordinate."""
     stiffness: Stiffness = (1000.0, 1000.0, 10000.0)
     """K_g, on the operational pose."""
     damping: Damping = (100.0, 100.0, 10000.0)
@@ -261,4 +261,4 @@ class GraphicsCopy:
     joint_damping: Annotated[float, Quantity("1/s", ge=0)] = 200.0
     """Joint acceleration for an error of the joint velocity, with sync = "joint"."""
     substeps: Substeps = 20
-    """Integration steps within a frame, of the pulls."""
+    """Integration steps per frame, where the copy is pulled."""

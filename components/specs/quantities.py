@@ -1,8 +1,8 @@
-"""What the numbers of a scene are: units and ranges, declared with the keys that hold them.
+"""Units and ranges of the numbers in a scene, declared with the keys of its records.
 
-A number of a record is of one of the kinds below, or has a `Quantity` of its own; the docstring
-under a field is the key's meaning. What reads scenes refuses the values out of range; the reference
-page and the JSON schema of scenes are made from the same declarations.
+A number of a record has one of the types below or a `Quantity` of its own; the docstring under a
+field is the meaning of its key. Values out of range are refused when a scene is read; the reference
+page and the JSON schema of scenes are generated from the same declarations.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _BOUNDS: dict[str, tuple[str, Callable[[Any, Any], bool], Any]] = {
 
 @dataclass(frozen=True)
 class Quantity(GroupedMetadata):
-    """A finite number in `unit` ("1" has none), within the bounds that are given."""
+    """A finite number in `unit` ("1" for none), within the bounds that are given."""
 
     unit: str
     _: KW_ONLY
@@ -36,13 +36,13 @@ class Quantity(GroupedMetadata):
 
     @property
     def bounds(self) -> dict[str, float]:
-        """The bounds that are given, by "gt", "ge", "lt", "le"."""
+        """The given bounds by their names, "gt", "ge", "lt" and "le"."""
         given = {name: getattr(self, name) for name in _BOUNDS}
         return {name: bound for name, bound in given.items() if bound is not None}
 
     @property
     def range(self) -> str:
-        """`> 0 and <= 1000`; `finite` where there is no bound."""
+        """The bounds as text, `> 0 and <= 1000`; `finite` without bounds."""
         said = [f"{_BOUNDS[name][0]} {bound}" for name, bound in self.bounds.items()]
         return " and ".join(said) or "finite"
 
@@ -50,7 +50,7 @@ class Quantity(GroupedMetadata):
         return all(_BOUNDS[name][1](number, bound) for name, bound in self.bounds.items())
 
     def __iter__(self) -> Iterator[Any]:
-        """The bounds as what pydantic reads."""
+        """The bounds as annotations for pydantic."""
         for name, bound in self.bounds.items():
             yield _BOUNDS[name][2](bound)
 

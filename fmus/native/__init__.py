@@ -1,4 +1,4 @@
-"""Native FMUs: a component as generated C behind one FMI wrapper, in a binary of its own."""
+"""Native FMUs: a component as generated C, compiled with an FMI wrapper."""
 
 from hapticlink.fmus.native.compiler import PLATFORMS, compile_library, host_platform
 

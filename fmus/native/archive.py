@@ -1,4 +1,4 @@
-"""What a native FMU holds, as bytes by name."""
+"""The files of a native FMU, as bytes by name."""
 
 from __future__ import annotations
 
@@ -32,10 +32,11 @@ def entries(
     step_size: float,
     platforms: Sequence[str],
 ) -> dict[str, bytes]:
-    """Every file of the FMU, with a binary for each of `platforms`, compiled in `folder`.
+    """All files of the FMU, with a binary for each of `platforms`, compiled in `folder`.
 
-    The GUID is a hash of what the binaries are made of, so a platform's binary does not depend on
-    which others are there. Raises FmuError where the component gives no FMU.
+    The GUID is a hash of the binaries' sources, so that a platform's binary does not depend on the
+    other platforms. Raises FmuError if no FMU can be built from the component, CompilerError if the
+    source does not compile.
     """
     check_functions(component)
 

@@ -1,6 +1,6 @@
-"""C to a shared library, for this machine or another, by the compiler in the package `ziglang`.
+"""Compiles C to a shared library, for this machine or another one, with the package `ziglang`.
 
-The same source, platform and version of ziglang give the same bytes, wherever it runs.
+The same source, platform and version of ziglang give the same bytes on every machine.
 """
 
 from __future__ import annotations
@@ -21,32 +21,33 @@ from hapticlink.fmus.errors import CompilerError, FmuError
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
 TARGETS = {
-    # Old enough for the systems in use; newer ones run it too.
+    # A version old enough for the systems in use.
     "linux64": ("aarch64-linux-gnu.2.17" if _ARM_LINUX else "x86_64-linux-gnu.2.17",),
     "win64": ("x86_64-windows-gnu",),
     "darwin64": ("x86_64-macos.11.0", "aarch64-macos.11.0"),
 }
-"""What each platform of FMI 2.0 (section 2.3) is compiled for. linux64 is x86-64, on an ARM machine
-with Linux ARM, where importers look in the same folder; darwin64 holds both."""
+"""The compiler's targets for each platform of FMI 2.0 (section 2.3). linux64 is x86-64, or ARM64 on
+an ARM machine with Linux, where importers use the same folder; darwin64 contains both."""
 PLATFORMS = tuple(TARGETS)
 SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
-# Contracted to a fused multiply-add, a product and a sum are rounded once where CasADi's virtual
-# machine rounds twice. The search for vectors takes a time that grows with the square of a
-# straight line's length; what it found did not run faster.
+# No contraction: a fused multiply-add rounds once where CasADi's virtual machine rounds twice. No
+# vectorisation: its time grows with the square of the length of straight-line code, and it did not
+# make the code faster.
 _ARITHMETIC = ("-ffp-contract=off", "-fno-slp-vectorize")
 FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", *_ARITHMETIC, "-g0", "-s", "-fvisibility=hidden")
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
 def host_platform() -> str:
-    """The platform of FMI 2.0 that this process can load. Raises FmuError where it is none."""
+    """The platform of FMI 2.0 that this process can load. Raises FmuError if native FMUs cannot be
+    built for it."""
     if fmpy.platform not in TARGETS:
         raise FmuError(f"native FMUs are made for {', '.join(TARGETS)}; this is {fmpy.platform}")
     return fmpy.platform
 
 
 def compiler_version() -> str:
-    """Of ziglang. Raises FmuError where it is not installed."""
+    """The version of ziglang. Raises FmuError if it is not installed."""
     try:
         return version("ziglang")
     except PackageNotFoundError:
@@ -64,10 +65,10 @@ def compile_library(
 ) -> Path:
     """Compile the C file `source` to the shared library `library` and return its path.
 
-    platform is one of PLATFORMS, this machine's by default. The FMI headers are on the include
-    path, and only what is declared FMI2_Export is exported; `options` are further arguments of
-    the compiler (-DNAME=VALUE, -fvisibility=default). Raises FmuError, CompilerError with the
-    compiler's words where the source does not compile.
+    platform: one of PLATFORMS, by default this machine's. The FMI headers are on the include path,
+    and only functions declared FMI2_Export are exported. options: further arguments of the compiler
+    (-DNAME=VALUE, -fvisibility=default). Raises FmuError for an unknown platform, CompilerError
+    with the compiler's output if the source does not compile.
     """
     compiler_version()
     source, library = Path(source).resolve(), Path(library).resolve()
@@ -85,9 +86,9 @@ def _compiled(source: Path, room: Path, target: str, options: Iterable[str]) -> 
     made.mkdir()
     flags = [*FLAGS, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags, *options]
-    # A Mach-O file holds the path that it was written to, so this is the same everywhere.
+    # A Mach-O file contains the path that it was written to, so this is the same everywhere.
     command += [f"-I{_HEADERS}", "-o", "library", str(source)]
-    # What zig makes of its C library stays in its own cache; what it makes of ours does not.
+    # zig keeps its own C library in its cache, but not our code.
     environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(room / "cache")}
     done = subprocess.run(
         command, cwd=made, env=environment, capture_output=True, text=True, check=False
@@ -102,8 +103,8 @@ _PAGE = 14  # log2 of the larger page size of the two
 
 
 def universal(slices: Iterable[bytes]) -> bytes:
-    """One Mach-O file of a library for several processors (<mach-o/fat.h>): a big-endian header
-    0xCAFEBABE, count, and (cputype, subtype, offset, size, alignment) of each slice."""
+    """A Mach-O file with a library for several processors (<mach-o/fat.h>): the big-endian header
+    0xCAFEBABE, the count, and (cputype, subtype, offset, size, alignment) of each slice."""
     slices = list(slices)
     head = struct.pack(">II", 0xCAFEBABE, len(slices))
     body, at = b"", 1 << _PAGE

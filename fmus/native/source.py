@@ -1,4 +1,4 @@
-"""The C text of a component: what `fmi2.c` includes as component.h, but for its GUID."""
+"""The C text of a component, which `fmi2.c` includes as component.h, without the GUID."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hapticlink.components.component import Component
 def component_header(component: Component) -> str:
     """Sizes, names, start values and functions; the same text for the same component.
 
-    The functions are `static`, so their names (initialize, step, output) meet no one else's.
+    The functions are `static`, so that their names (initialize, step, output) cause no conflict.
     """
     text = functions((component.initialize, component.step, component.output))
     settable = (*component.inputs, *component.parameters)
@@ -30,7 +30,7 @@ def component_header(component: Component) -> str:
         "N_X": sum(v.size for v in component.states),
         "SUBSTEPS": component.substeps,
         "SAMPLED": int(component.timing == "sampled"),
-        # Room that the functions need to call the look-ups of tables.
+        # Working memory that the functions need to call the look-ups of tables.
         **{f"N_{of.upper()}": _room(text, of) for of in ("arg", "res", "iw", "w")},
     }
     return "\n".join(
@@ -49,7 +49,7 @@ def component_header(component: Component) -> str:
 
 
 def _table(declared: str, entries: Iterable[str]) -> str:
-    """With a last 0, as a C table is never empty."""
+    """A C array with an additional 0 at its end, since a C array must not be empty."""
     return f"static const {declared}[] = {{{', '.join([*entries, '0'])}}};"
 
 
@@ -64,16 +64,16 @@ def _number(value: float) -> str:
 
 
 def _room(text: str, of: str) -> int:
-    """The most that a function of `text` asks for in its `_work`."""
+    """The largest size that a function of `text` requests in its `_work`."""
     return max(int(n) for n in re.findall(rf"\*sz_{of} = (\d+);", text))
 
 
 def functions(made: Iterable[ca.Function]) -> str:
-    """Static C functions: each instruction of CasADi's virtual machine is a statement on local
-    variables.
+    """Static C functions in which each instruction of CasADi's virtual machine is a statement on
+    local variables.
 
-    CasADi asks at each read and write whether there is an argument or a result; `fmi2.c` gives them
-    all. With these branches the time to compile grows with the square of the length.
+    CasADi's tests for missing arguments and results are left out, since `fmi2.c` passes all of
+    them: with these branches the time to compile grows with the square of the length.
     """
     generator = ca.CodeGenerator("component")
     for function in made:

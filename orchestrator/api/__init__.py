@@ -1,4 +1,4 @@
-"""What `import hapticlink` offers, and the commands call."""
+"""The functions of `import hapticlink`, which the commands call as well."""
 
 from hapticlink.orchestrator.api.files import build as build
 from hapticlink.orchestrator.api.files import export as export

@@ -1,4 +1,4 @@
-"""Files made from a scene: its FMUs, and its SSP."""
+"""Files built from a scene: its FMUs, and its SSP."""
 
 from __future__ import annotations
 
@@ -28,13 +28,15 @@ def build(
     out: str | Path,
     all_platforms: bool = False,
 ) -> dict[str, Path]:
-    """Build the FMUs of a scene into the folder `out`: the file `<block>.fmu` of each block.
+    """Build the FMUs of a scene, changed by `options`, in the folder `out`: `<block>.fmu` for each
+    block. Returns the paths by block.
 
-    Each starts where the scene does: a parameter that a connection of the scene sets once (the
-    device's `x_start`) has the value that it carries as its start.
+    The FMUs start as in the scene: the start value of a parameter that a connection of the scene
+    sets once (the device's `x_start`) is the value that it gets there.
 
-    `all_platforms` compiles native FMUs for Linux, Windows and macOS, not for this machine alone.
-    Raises InputFault where there is nothing to build, or `out` cannot be written to.
+    `all_platforms` compiles native FMUs for Linux, Windows and macOS instead of this machine only.
+    Raises InputFault if the scene is invalid, has nothing to build, or `out` cannot be written to;
+    Fault if the compiler fails.
     """
     read = open_scene.load(scene, options)
     if all_platforms and read.packaging != "native":
@@ -53,12 +55,13 @@ def build(
 
 
 def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path) -> Path:
-    """Write a scene as the SSP `out`: FMUs, connections and start values for other tools; rates and
-    holds, which the standard does not know, in an annotation. `run` reads it back.
+    """Write a scene, changed by `options`, as the SSP `out`, and return its path: FMUs, connections
+    and start values for other tools; rates and holds, which the standard does not have, in an
+    annotation. `run` can read the SSP.
 
-    Raises InputFault for a scene that cannot be run, or where `out` cannot be written.
+    Raises InputFault for a scene that cannot be run, or if `out` cannot be written.
     """
-    from hapticlink.orchestrator.ssp import write  # its XML parsers take a while to load
+    from hapticlink.orchestrator.ssp import write  # its XML parsers are slow to load
 
     read = open_scene.load(scene, options)
     with built(read, _starts(read)) as system:

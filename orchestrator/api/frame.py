@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 def frame(columns: Mapping[str, Any], index: str | None = None) -> pd.DataFrame:
-    """A frame of `columns`, the one of the name `index` as its index. Raises InputFault without
-    pandas."""
+    """A frame of `columns` whose index is the column `index`. Raises InputFault if pandas is not
+    installed."""
     try:
         import pandas as pd
     except ImportError:

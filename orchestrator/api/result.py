@@ -1,4 +1,4 @@
-"""A run's results as Python sees them."""
+"""The results of a run in Python."""
 
 from __future__ import annotations
 
@@ -20,18 +20,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Run(Results):
-    """The results of a run, good or not.
+    """The results of a run, whether it failed or not.
 
     `r["haptics"]` is the Table of a rate, `r["virtual_mechanism.x"]` a signal as a NumPy array:
     (k,) of a scalar, (k, n) of a vector, (k, n, m) of a matrix, in the units of its FMU. Rates
     differ, so that each signal has its own k times: `r.time("virtual_mechanism.x")`, in s.
 
-    `tables` are the Tables by rate, `run` is run.json (the scene, versions, holds, energies, ages
-    of samples, timings), `folder` where they stand, None for a run in memory.
+    `tables` are the Tables by rate, `run` is the content of run.json (the scene, versions, holds,
+    energies, ages of samples, timings), `folder` is the result folder, None for a run in memory.
     """
 
     def __getitem__(self, name: str) -> Any:
-        """The Table of a rate, or a signal of any. Raises KeyError with the names there are."""
+        """The Table of a rate, or a signal of any rate. Raises KeyError with a hint for an unknown
+        name."""
         return self.tables[name] if name in self.tables else self._table(name)[name]
 
     def __contains__(self, name: object) -> bool:
@@ -41,32 +42,33 @@ class Run(Results):
         return iter(self.tables)
 
     def time(self, name: str) -> Vector:
-        """The times (s) of a signal, or of a rate's rows. Raises KeyError."""
+        """The times (s) of a signal, or of a rate's rows. Raises KeyError for an unknown name."""
         table: Table = self.tables[name] if name in self.tables else self._table(name)
         return table["time"]
 
     def frame(self, rate: str) -> pd.DataFrame:
-        """The Table of a rate as a pandas frame over `time` (s), a column an entry of a vector.
-        Raises InputFault without pandas, KeyError."""
+        """The Table of a rate as a pandas frame with the index `time` (s), a column per scalar.
+        Raises InputFault if pandas is not installed, KeyError for an unknown rate."""
         if rate not in self.tables:
             raise KeyError(unknown("rate", rate, self.tables))
         return frame(self.tables[rate], "time")
 
     @property
     def fault(self) -> str | None:
-        """What ended the run in bad order, an FMU's fault or a crash; None where it ended in good
-        order, by `stop_when` or the edge of the device's workspace too."""
+        """The message of the fault that ended the run, such as an FMU's error or a crash; None if
+        it ended regularly, also by `stop_when` or at the limit of the device's workspace."""
         found = self.run.get("fault")
         return found["message"] if found else None
 
     def tracking(self) -> Tracking:
-        """Tracking error, `(time, distance, angle)`: |x_S - x_D| (mm) and |theta_S - theta_D| (rad)
-        between operational point and handle, at times (s). Raises KeyError without either."""
+        """Tracking error `(time, distance, angle)`: |x_S - x_D| (mm) and |theta_S - theta_D| (rad)
+        between operational point and handle at times (s). Raises KeyError if the scene does not
+        have both."""
         return pose_error(self)
 
     def figures(self) -> dict[str, Figure]:
-        """Matplotlib figures by name, of what the scene has: `trajectories`, `distance`, `contact`,
-        `constraints`, `energies`."""
+        """Matplotlib figures by name, as far as the scene has the signals: `trajectories`,
+        `distance`, `contact`, `constraints`, `energies`."""
         return figures.figures(self)
 
     def _table(self, name: str) -> Table:

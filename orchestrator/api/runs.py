@@ -1,4 +1,4 @@
-"""Running a scene, and reading a run back."""
+"""Runs a scene, and reads results back."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST = 2**30
 
 
 class RunInterrupted(Interrupted):
-    """Ctrl-C ended a run; `run` holds its results up to then."""
+    """A run was interrupted by Ctrl-C; `run` are its results up to then."""
 
     def __init__(self, run: Run) -> None:
         super().__init__(run.run["end"]["time"])
@@ -37,14 +37,14 @@ def run(
 ) -> Run:
     """Run a scene, changed by `options` (see `scene`).
 
-    The results are in memory, or in the folder `out` too: a CSV a rate, run.json, plan.txt and
-    figures, in place of those of an earlier run there, from this one's first row on. `progress` is
-    told the simulated time (s) now and then.
+    The results are returned, and with `out` also written to that folder: a CSV per rate, run.json,
+    plan.txt and figures. They replace those of an earlier run there from the first row on.
+    `progress` is called with the simulated time (s) from time to time.
 
-    Raises InputFault before anything runs. A fault of the run itself is no exception: look at
-    `fault` of what is returned, whose results go as far as the run did. Ctrl-C raises
-    RunInterrupted, with the results so far as its `run`. Tables of more than 1 GiB in `out` are not
-    read back: `load` does.
+    Raises InputFault for invalid input, before anything runs. A fault during the run raises no
+    exception: it is the `fault` of the returned Run, which has the results up to then. Ctrl-C
+    raises RunInterrupted, with the results so far as its `run`. Tables of more than 1 GiB in `out`
+    are not read back; use `load` for them.
     """
     with interrupt.held():
         if out is None:
@@ -87,6 +87,6 @@ def _in_folder(
 
 
 def load(folder: str | Path) -> Run:
-    """Read the folder of a run. Raises InputFault where it holds none."""
+    """Read the results of a run from its folder. Raises InputFault if it contains no run."""
     found = tables.load(folder)
     return Run(found.folder, found.run, found.tables)

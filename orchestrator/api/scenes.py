@@ -1,4 +1,4 @@
-"""Scenes before they run: which there are, what one says, what would run when."""
+"""Scenes before they run: lists, reads and explains them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hapticlink.orchestrator.system.built import built
 
 
 def shipped() -> dict[str, str]:
-    """The names of the scenes that come with hapticlink, each with its title."""
+    """The names of the scenes that are shipped with hapticlink, each with its title."""
     return {name: open_scene.load(name).title for name in find.shipped()}
 
 
@@ -23,10 +23,10 @@ def scene(scene: str | Path | Scene, options: Options = ()) -> Scene:
 
     `options` change it, as a mapping of dotted keys to values,
     `{"graphics.rate": 10, "holds.virtual_environment.P_c": "lead"}`, or as on the command line,
-    `["graphics.rate=10"]`. Values are numbers, truth values, text, lists, NumPy arrays and tables
-    (mappings), which take the place of what the scene says. Every function that takes a scene takes
-    such options, and a Scene in place of a name: it remembers its file, so that options act and
-    faults name their lines.
+    `["graphics.rate=10"]`. Values are numbers, booleans, text, lists, NumPy arrays and tables
+    (mappings), which replace those of the scene. Every function that takes a scene takes such
+    options, and accepts a Scene in place of a name. A Scene keeps its origin, so that options can
+    be applied again and faults name lines of the file.
 
     Raises SceneFault with all findings at once, InputFault for an option that cannot be applied.
     """
@@ -34,9 +34,8 @@ def scene(scene: str | Path | Scene, options: Options = ()) -> Scene:
 
 
 def explain(scene: str | Path | Scene, options: Options = ()) -> list[str]:
-    """What a run would do, as lines of text: which FMU steps when, and from which samples.
-
-    Raises InputFault for a scene that cannot be run.
+    """The plan of a run as lines of text: which FMU steps when, and from which samples its inputs
+    are computed. Raises InputFault for a scene that cannot be run.
     """
     with built(open_scene.load(scene, options)) as system:
         return list(explained.explain(Plan(system), explained.PRINTED))

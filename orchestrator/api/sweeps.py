@@ -1,4 +1,4 @@
-"""Running many variants of a scene."""
+"""Runs many variants of a scene."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Sweep:
-    """The table of a sweep: `s["tracking_max_mm"]` is a column as a NumPy array, one entry a run.
+    """The table of a sweep: `s["tracking_max_mm"]` is a column as a NumPy array, one entry per run.
 
-    `rows` are the runs, `keys` what was varied, `folder` is where `files` stand, None in memory.
+    `rows` are the runs, `keys` the varied keys, `folder` contains `files`, None in memory.
     """
 
     rows: list[dict[str, Any]]
@@ -41,17 +41,17 @@ class Sweep:
 
     @property
     def columns(self) -> list[str]:
-        """The names of the columns, those that were varied first."""
+        """The names of the columns, varied keys first."""
         return table.columns(self.rows)
 
     @property
     def failed(self) -> list[dict[str, Any]]:
-        """The rows of runs that failed: `end` and `message` say how."""
+        """The rows of failed runs, with the reason in `end` and `message`."""
         return [r for r in self.rows if r["end"] in row.FAILED]
 
     def __getitem__(self, column: str) -> NDArray[Any]:
-        """Numbers, NaN where a run has none; text where one of them is no number. Raises KeyError
-        with the names that there are."""
+        """A column as numbers, NaN where a run has none, or as text if an entry is no number.
+        Raises KeyError with a hint for an unknown name."""
         if column not in self.columns:
             raise KeyError(unknown("column", column, self.columns))
         cells = [str(r.get(column, "")) for r in self.rows]
@@ -59,12 +59,13 @@ class Sweep:
         return np.array(numbers if any(cells) and None not in numbers else cells)
 
     def frame(self) -> pd.DataFrame:
-        """The table as a pandas frame. Raises InputFault without pandas."""
+        """The table as a pandas frame. Raises InputFault if pandas is not installed."""
         return frame({name: self[name] for name in self.columns})
 
     def figure(self, metric: str | None = None) -> Figure | None:
-        """A Matplotlib figure of a column (`metric`, default the largest tracking error) against
-        what was varied; None where there is no number to draw. Raises InputFault."""
+        """A Matplotlib figure of a column (`metric`, by default the largest tracking error) against
+        the varied keys; None if there is no number to draw. Raises InputFault for a metric that is
+        no column of numbers."""
         return figure.draw(self.rows, self.keys, metric)
 
     def __repr__(self) -> str:
@@ -84,20 +85,21 @@ def sweep(
     metric: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Sweep:
-    """Run many variants of a scene in parallel, in processes of their own.
+    """Run many variants of a scene in parallel, in a pool of processes.
 
     `vary` gives each key its values, `{"graphics.rate": range(10, 61, 10), "hold": ["zoh", "foh"]}`
     or, as on the command line, `["graphics.rate=10..60..10", "hold=zoh,foh"]`; every combination is
-    run. In its place, `runs` lists them: the options of each, or a file. `options` (see `scene`)
-    hold for all.
+    run. Alternatively `runs` lists the options of each run, or is a file with them. `options` (see
+    `scene`) apply to all runs.
 
-    The table is in memory, or in the folder `out` too: table.csv, sweep.png (of the column
-    `metric`) and a file a row, so that an interrupted sweep goes on when it is called again.
-    `jobs` run at a time, by default one a processor; `scheduler` is the address of a Dask scheduler
-    to run on. `progress` is told how many runs of how many are done.
+    The table is returned, and with `out` also written to that folder: table.csv, sweep.png (of the
+    column `metric`) and a file per row, so that an interrupted sweep can be continued by the same
+    call. `jobs` is the number of runs at a time, by default one per processor; `scheduler` is the
+    address of a Dask scheduler to run on. `progress` is called with the numbers of finished and of
+    all runs.
 
-    A run that fails is a row of the table. Raises InputFault for bad input and where every run is
-    refused, Fault where the sweep is interrupted.
+    A run that fails is a row of the table. Raises InputFault for invalid input and if every run is
+    refused, Fault if the sweep is interrupted.
     """
     if jobs is not None and jobs < 1:
         raise InputFault(f"--jobs {jobs}: give 1 or more")
@@ -117,7 +119,7 @@ def sweep(
             try:
                 return Sweep(into(room), keys, None)
             except Unfinished as left:
-                advice = "with a folder `out` they are kept, and the same call does the rest"
+                advice = "with a folder `out` they are kept, and the same call continues"
                 raise Fault(f"interrupted: {left.done} of {left.of} runs; {advice}") from None
     folder = folders.ensure(out)
     found = Sweep(into(folder), keys, folder, ("table.csv",))

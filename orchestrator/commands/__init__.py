@@ -1,4 +1,4 @@
-"""`hapticlink`: one command a file. Each imports what it needs when it is called."""
+"""The command line `hapticlink`, one command a file, imported when it is called."""
 
 from __future__ import annotations
 
@@ -26,16 +26,17 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
         "run": "Run a scene: results, run.json and figures.",
         "build": "Build the FMUs of a scene.",
         "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
-        "info": "Tell what a scene consists of, or which scenes there are.",
-        "schema": "Print what a scene may say, for editors or as a page.",
+        "info": "Describe a scene, or list the shipped scenes.",
+        "schema": "Print the keys of a scene, as a JSON schema or as a page.",
         "sweep": "Run many variants of a scene in parallel: one table and figure.",
         "study": "Study which hold suits which rate: tables, figures and a page.",
         "bench": "Measure run time against error, beside other codes.",
-        "reproduce": "Make the report's figures and a page of what was found.",
+        "reproduce": "Reproduce the report's figures, with a page of the findings.",
     },
 )
-"""The help of a command whose function is in the file of its name, imported when it is called; or
-a function, whose arguments and docstring are the command's. It returns the exit status."""
+"""For each command, the help of a function in the file of that name, which is imported when it is
+called; or a function itself. Its arguments and docstring define the command, and it returns the
+exit status."""
 
 Plugin = Annotated[
     list[str] | None,
@@ -51,13 +52,13 @@ Tokens = Annotated[str, Parameter(show=False, allow_leading_hyphen=True)]
 
 @app.meta.default
 def _command(*tokens: Tokens, plugin: Plugin = None) -> int | None:
-    """`plugin` has been loaded before the tokens are read."""
+    """Runs a command; `_commands` has loaded the plugins before."""
     return app(tokens, result_action="return_value", exit_on_error=False)
 
 
 def _commands(arguments: Sequence[str]) -> None:
-    """Load the plugins that the arguments name, then list all commands; those of installed plugins
-    where a command is called that is not known else."""
+    """Loads the plugins named in the arguments and registers all commands; installed plugins are
+    loaded if the command is not known otherwise."""
     named, words, rest = [], [], iter(arguments)
     for each in rest:
         if each == "--plugin":
@@ -73,7 +74,8 @@ def _commands(arguments: Sequence[str]) -> None:
         if name in app:
             continue
         if isinstance(command, str):
-            # The list needs a line without an import; a command's own help is its docstring.
+            # The list of commands uses this line, without an import; a command's own help is its
+            # docstring.
             line = None if words[:1] == [name] else command
             app.command(f"{__name__}.{name}:{name}", name=name, help=line)
         else:
@@ -105,7 +107,7 @@ def _status(arguments: Sequence[str] | None) -> int:
     except Fault as fault:
         say(f"hapticlink: {fault}", file=sys.stderr)
         return fault.exit_status
-    except BrokenPipeError:  # whoever reads has enough, as `| head`
+    except BrokenPipeError:  # the reader has closed the pipe, such as `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a full disk, a folder that may not be written

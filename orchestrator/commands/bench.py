@@ -27,18 +27,18 @@ def bench(
     out: Out = None,
     quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
 ) -> int:
-    """Run time against error of the mechanism, with the multibody codes that are installed; its
-    error over many rates where it runs through singular poses; what the local model costs.
+    """Benchmark the mechanism: run time against error, with the multibody codes that are installed;
+    errors over many rates on motions through singular poses; cost and error of the local model.
 
-    Writes a page with tables and figures to OUT (default results/<what>). Interrupted, it goes on
-    where it stopped.
+    Writes a page with tables and figures to OUT (default results/<what>). An interrupted benchmark
+    is continued by the same command.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     root = checkout()
     sys.path.insert(0, str(root))
-    # By name: the package's own checks never see what is not in it.
+    # Imported by name, as the benchmarks are not part of the package.
     module, _, name = BENCHES[what].partition(":")
     make = getattr(importlib.import_module(module), name)
     folder = out or root / "results" / what
@@ -57,7 +57,7 @@ def bench(
 
 
 def checkout() -> Path:
-    """The project's folder. Raises InputFault where only the package is installed."""
+    """The project's folder. Raises InputFault if only the package is installed."""
     import hapticlink.components
 
     root = Path(next(iter(hapticlink.components.__path__))).resolve().parent

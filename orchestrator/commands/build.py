@@ -18,7 +18,7 @@ AllPlatforms = Annotated[
 def build(
     scene: Scene, /, *, out: Out = None, set: Set = None, all_platforms: AllPlatforms = False
 ) -> int:
-    """Build the FMUs of a scene into OUT (default fmus/<scene>), one file a block."""
+    """Build the FMUs of a scene in OUT (default fmus/<scene>), one file per block."""
     from hapticlink.orchestrator import api
 
     folder = out or default_folder("fmus", scene)

@@ -45,8 +45,8 @@ def info(
     draw: Draw = False,
     out: Out = None,
 ) -> int:
-    """Tell what a scene consists of: rates, FMUs, connections, holds; where the device's workspace
-    lies, and whether the scene starts in it; what it needs and leaves out, and what that saves.
+    """Describe a scene: rates, FMUs, connections and holds; the device's workspace, and whether the
+    scene starts in it; the parts of the equations that it needs and leaves out, with their cost.
     Without SCENE, list the shipped scenes.
     """
     from hapticlink.orchestrator import api
@@ -144,8 +144,8 @@ _PER_TICK = ("operations", "signals")
 
 
 def at_start(system: System) -> dict[str, float]:
-    """Outputs of the mechanism alone, as its FMU assembles it in initialisation; none without
-    one."""
+    """Start values of the mechanism's outputs, as its FMU assembles it in initialisation mode; {}
+    without a mechanism."""
     fmu = system.fmu.get(MECHANISM)
     if fmu is None:
         return {}
@@ -158,5 +158,5 @@ def at_start(system: System) -> dict[str, float]:
 
 
 def coordinates(values: dict[str, float]) -> list[float]:
-    """q[1], q[2], ... of named values."""
+    """The joint coordinates q[1], q[2], ... among named values."""
     return [float(value) for name, value in values.items() if name.startswith("q[")]

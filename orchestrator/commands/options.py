@@ -51,6 +51,6 @@ def _swap(given: str) -> str:
 
 
 def default_folder(root: str, scene: str) -> Path:
-    """`runs/<scene>` for a name or a path."""
+    """The default output folder, `<root>/<scene>`, for a scene's name or path."""
     known = scene.endswith((".toml", ".ssp"))
     return Path(root) / (Path(scene).stem if known else Path(scene).name)

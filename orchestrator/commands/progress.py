@@ -1,4 +1,4 @@
-"""A progress bar on stderr, only where somebody sees it."""
+"""A progress bar on stderr, if that is a terminal."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from hapticlink.orchestrator.base.say import printable
 
 @contextmanager
 def counted(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Gives a function that is told how many runs of how many are done."""
+    """Gives a function to be called with the numbers of finished and of all runs."""
     with _bar(title) as show:
         yield lambda done, of: show(done, of, f"{done} of {of} runs") if show else None
 
 
 @contextmanager
 def progress(title: str, duration: float) -> Iterator[Callable[[float], None] | None]:
-    """Gives a function that is told the simulated time (s), None where stderr is no terminal."""
+    """Gives a function to be called with the simulated time (s); None if stderr is no terminal."""
     with _bar(title) as show:
         yield (
             (lambda time: show(time, duration, f"{time:.2f} of {duration:g} s")) if show else None

@@ -9,7 +9,7 @@ from hapticlink.orchestrator.commands.options import Out
 
 
 def reproduce(*, out: Out = None) -> int:
-    """Make the report's figures from runs of the FMUs, and a page of what was found, in OUT
+    """Reproduce the report's figures from runs of the FMUs, with a page of the findings, in OUT
     (default results/report)."""
     from hapticlink.orchestrator.report import reproduce as make
 

@@ -13,7 +13,7 @@ from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, defa
 from hapticlink.orchestrator.commands.progress import progress
 
 Explain = Annotated[
-    bool, Parameter(negative="", help="Print what runs when, from which samples; run nothing.")
+    bool, Parameter(negative="", help="Print what would run when, from which samples; do not run.")
 ]
 
 
@@ -26,7 +26,7 @@ def run(
     swap: Swap = None,
     explain: Explain = False,
 ) -> int:
-    """Run a scene: results as CSV, run.json, plan.txt and figures in OUT (default runs/<scene>)."""
+    """Run a scene; write CSV files, run.json, plan.txt, figures to OUT (default runs/<scene>)."""
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.results import summary
 
@@ -53,5 +53,5 @@ def run(
     if made.folder:
         say(f"  {folder}/: {', '.join([*tables, *others])}")
     else:
-        say(f"  {folder}/ is as it was: the run has no row")
+        say(f"  {folder}/ is unchanged: the run has no row")
     return Fault.exit_status if made.fault else 0

@@ -12,8 +12,8 @@ Markdown = Annotated[
 
 
 def schema(*, markdown: Markdown = False) -> int:
-    """Print what a scene may say, every key with unit, range and meaning: a JSON schema (draft
-    2020-12), by which editors complete and check scenes.
+    """Print every key of a scene with unit, range and meaning, as a JSON schema (draft 2020-12)
+    with which editors complete and check scenes.
 
     `hapticlink schema > scene.schema.json`, and `#:schema scene.schema.json` as the first line of a
     scene.

@@ -10,9 +10,9 @@ from hapticlink.orchestrator.commands.sweep import Jobs
 
 
 def study(*, out: Out = None, jobs: Jobs = None) -> int:
-    """Study rates, holds and coupling: tables, figures and a page in OUT (default
-    results/mismatch). Its runs are kept in sweeps/mismatch, so that it goes on after an
-    interruption."""
+    """Study rates, holds and coupling; write tables, figures and a page to OUT (default
+    results/mismatch). Runs are kept in sweeps/mismatch, so that an interrupted study can be
+    continued."""
     from hapticlink.orchestrator.commands.progress import counted
     from hapticlink.orchestrator.study import cases
     from hapticlink.orchestrator.study import study as make

@@ -18,22 +18,22 @@ Vary = Annotated[
         name="--vary",
         consume_multiple=False,
         negative="",
-        help="key=values, repeatable: every combination is run. Values stand between commas; "
-        "a..b is every whole number from a to b, a..b..step goes in steps, a..b:n spreads n "
-        "points evenly. E.g. --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh",
+        help="key=values, repeatable: every combination is run. Values are separated by commas; "
+        "a..b is every whole number from a to b, a..b..step has that step, a..b:n has n evenly "
+        "spaced points. E.g. --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh",
     ),
 ]
 Runs = Annotated[
     Path | None,
     Parameter(
-        help="In place of --vary, a list of runs: a CSV with a column a key, or a TOML of [[run]]."
+        help="Instead of --vary, a list of runs: a CSV with a column per key, or a TOML of [[run]]."
     ),
 ]
-Jobs = Annotated[int | None, Parameter(help="Runs at a time; default one a processor.")]
+Jobs = Annotated[int | None, Parameter(help="Runs at a time; default one per processor.")]
 Scheduler = Annotated[
     str | None, Parameter(help="Address of a Dask scheduler to run on, e.g. tcp://10.0.0.5:8786.")
 ]
-Metric = Annotated[str | None, Parameter(help="The figure's column of table.csv.")]
+Metric = Annotated[str | None, Parameter(help="The column of table.csv that the figure shows.")]
 
 
 def sweep(
@@ -51,9 +51,9 @@ def sweep(
     """Run many variants of a scene in parallel; write table.csv and sweep.png to OUT (default
     sweeps/<scene>).
 
-    A run that fails is a row of the table; where every run is refused the exit status is 2, where
-    every run fails 1. A sweep that is interrupted goes on where it was when
-    it is called again; runs made before are not made twice.
+    A run that fails is a row of the table. The exit status is 2 if every run is refused, 1 if every
+    run fails. An interrupted sweep is continued by the same command; finished runs are not
+    repeated.
     """
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.base.faults import InputFault

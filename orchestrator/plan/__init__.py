@@ -1,1 +1,1 @@
-"""Which operation comes when: the plan of a run, as data."""
+"""The plan of a run as data: which operation is executed at which event."""

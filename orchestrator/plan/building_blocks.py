@@ -36,7 +36,7 @@ def without_steps(event: Event, clocks: Container[str] | None = None) -> Event:
 
 
 def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:
-    """The plants that start a step; no step is started that would pass the end of the run."""
+    """The plants that start a step; steps that would pass the end of the run are not started."""
     started = {f.clock for f in event.firings if not f.final}
     return [u for u in continuous if u.clock in started]
 
@@ -88,7 +88,7 @@ def dticks(event: Event, fmu: Fmu) -> int:
 
 
 def step(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
-    """Step an FMU whose inputs are set; a plant renews its inputs before each substep."""
+    """Step an FMU whose inputs are set; inputs of a plant are updated before each substep."""
     parts = 1 if fmu.sampled else system.substeps.get(fmu.name, 1)
     for part in range(parts):
         if part:

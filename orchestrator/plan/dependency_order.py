@@ -13,21 +13,21 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 @dataclass(frozen=True)
 class AlgebraicLoop:
-    """FMUs that feed each other, in the order in which they step, and one cycle among them."""
+    """FMUs that depend on each other, in the order in which they step, and one cycle of them."""
 
     fmus: tuple[str, ...]
     ring: str
 
 
 def groups(system: System, units: Iterable[Fmu]) -> list[list[Fmu]]:
-    """`units`, each group after those that feed it; a group of more than one is a loop."""
+    """`units` in groups, each after those that feed it; a group of several FMUs is a loop."""
     names = {u.name for u in units}
     feeds = {u.name: [c.source for c in system.into(u.name) if c.source in names] for u in units}
     return [[system.fmu[n] for n in group] for group in components(feeds)]
 
 
 def direct(system: System, units: Iterable[Fmu]) -> dict[str, set[str]]:
-    """By unit: those of `units` that an output of it which is read depends on directly
+    """For each unit, those of `units` on which its used outputs depend by direct feed-through
     (ModelStructure, FMI 2.0.5 section 2.2.8)."""
     names = {u.name for u in units}
     return {
@@ -42,7 +42,7 @@ def direct(system: System, units: Iterable[Fmu]) -> dict[str, set[str]]:
 
 
 def _read(system: System, unit: Fmu) -> Iterator[Scalar]:
-    """The outputs that a connection carries, or whose samples its hold takes as derivatives."""
+    """The used outputs: those of connections, and those that holds read as derivatives."""
     for c in system.out_of(unit.name):
         yield from c.outputs
         slope = derivative(c, system.fmu)
@@ -59,7 +59,7 @@ def plants(system: System, units: Iterable[Fmu]) -> Iterator[list[Fmu]]:
 
 
 def loops(system: System, ordered: Iterable[Iterable[Fmu]]) -> Iterator[AlgebraicLoop]:
-    """Within each group of FMUs that a scheme puts in an order."""
+    """The loops within each group of FMUs that a scheme puts in an order."""
     for units in ordered:
         for group in plants(system, units):
             names = tuple(u.name for u in group)

@@ -1,4 +1,4 @@
-"""`--explain`: a plan as text. What runs when, and which sample each input is made from."""
+"""`--explain`: a plan as text, what runs when and from which sample each input is computed."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.system.system import System
 
 LEGEND = """\
-Time is counted in ticks. What is done at an instant is a block; instants of one kind share one:
+Time is counted in ticks. The operations of an event form a block; events of one kind share it:
   get        read an FMU's outputs              set      write an FMU's inputs
   push       give a hold the newest sample      step     an FMU's doStep, over `dticks` ticks
   evaluate   ask a hold for its value           record   write a row of a rate's table
-`ahead n`: for a time n ticks after the instant. More: docs/holds.md, docs/coupling.md.
+`ahead n`: for a time n ticks after the event. More: docs/holds.md, docs/coupling.md.
 """
 PRINTED = 600
-"""Events of a table that somebody reads off a screen."""
+"""Number of events in a table that is printed."""
 
 
 def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
-    """Clocks, the block of each kind of event, then a table of the whole run, or of as much of it
-    as tells the rest (`comes_round`); of the first `rows` events where it is to be cut."""
+    """Lines with the clocks, the block of each kind of event, and a table of the events until their
+    pattern repeats (`comes_round`), at most of the first `rows` events."""
     system, timeline = plan.system, plan.system.timeline
     base = timeline.base
     yield LEGEND

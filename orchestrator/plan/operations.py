@@ -1,4 +1,4 @@
-"""The operations of a plan. Each names what it works on; `run` binds it to buffers and calls."""
+"""The operations of a plan, as data; `run` binds them to buffers and calls."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class Firing(NamedTuple):
-    """A clock starts a step of `dticks`; a `final` one would end after the end of the run."""
+    """A clock starts a step of `dticks`; a `final` step would end after the end of the run."""
 
     clock: str
     dticks: int
@@ -17,14 +17,14 @@ class Firing(NamedTuple):
 
 
 class Event(NamedTuple):
-    """The kind of an instant: at `first` nothing has been stepped yet."""
+    """The kind of an event: which clocks fire, and whether it is the `first` one, at t = 0."""
 
     first: bool
     firings: tuple[Firing, ...]
 
 
 class Part(NamedTuple):
-    """A step of the plants of a clock by themselves, or the reading at its end."""
+    """A step of the plants of one clock alone, for step control, or reading at its end."""
 
     clock: str
     dticks: int
@@ -33,7 +33,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class Get:
-    """Read all outputs of an FMU; they are stamped `ahead` of the event's tick."""
+    """Read all outputs of an FMU; their stamp is `ahead` of the event's tick."""
 
     fmu: str
     ahead: int = 0
@@ -41,7 +41,7 @@ class Get:
 
 @dataclass(frozen=True)
 class Push:
-    """Give a hold the newest sample of its source, stamped `ahead` of this tick."""
+    """Push the newest sample of its source into a hold; its stamp is `ahead` of this tick."""
 
     connection: str
     ahead: int = 0
@@ -52,7 +52,7 @@ class Evaluate:
     """Evaluate a hold from the samples known at this tick for the instant `ahead` of it: the middle
     of the step for a plant, 0 for a sampled block.
 
-    A plant that takes inputs that vary gets the value at the beginning of its step of `width`, and
+    A plant that can interpolate inputs gets the value at the beginning of its step of `width`, and
     its derivatives up to `order`."""
 
     connection: str
@@ -63,8 +63,8 @@ class Evaluate:
 
 @dataclass(frozen=True)
 class Set:
-    """Write all connected inputs of an FMU; `now` with the sources' newest outputs, no holds;
-    with the `derivatives` that were evaluated."""
+    """Set all connected inputs of an FMU to their held values, with `derivatives` also their
+    derivatives; with `now`, to the sources' newest outputs without holds."""
 
     fmu: str
     now: bool = False
@@ -83,19 +83,19 @@ class Step:
 
 @dataclass(frozen=True)
 class Record:
-    """Write a row of a clock's results: the outputs of all its FMUs."""
+    """Write a row of a clock's table: the outputs of all its FMUs."""
 
     clock: str
 
 
 @dataclass(frozen=True)
 class StopWhen:
-    """End the run in good order if the system's condition holds."""
+    """End the run, without a fault, if the system's stop condition holds."""
 
 
 @dataclass(frozen=True)
 class Blend:
-    """Evaluate a weighted sum of a hold's values: each (weight, `ahead` of this tick)."""
+    """Evaluate a weighted sum of a hold's values, given by pairs (weight, `ahead` of this tick)."""
 
     connection: str
     points: tuple[tuple[float, Fraction], ...]
@@ -103,14 +103,14 @@ class Blend:
 
 @dataclass(frozen=True)
 class Save:
-    """Keep the state of an FMU (fmi2GetFMUstate)."""
+    """Save the state of an FMU (fmi2GetFMUstate)."""
 
     fmu: str
 
 
 @dataclass(frozen=True)
 class Rollback:
-    """Take an FMU back to the state that was saved (fmi2SetFMUstate)."""
+    """Restore the saved state of an FMU (fmi2SetFMUstate)."""
 
     fmu: str
 
@@ -133,7 +133,7 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Advance:
-    """Take the plants of a clock over `dticks` in steps that the step control chooses."""
+    """Advance the plants of a clock over `dticks` in steps of controlled size."""
 
     clock: str
     dticks: int
@@ -156,7 +156,7 @@ Operation = (
 
 
 def flat(block: Iterable[Operation]) -> Iterator[Operation]:
-    """The operations of a block, a repetition carried out once."""
+    """The operations of a block, those of a Repeat listed once."""
     for operation in block:
         if isinstance(operation, Repeat):
             yield from (*operation.guess, *flat(operation.body))

@@ -2,7 +2,7 @@
 
 An event is an instant at which clocks fire. Events of one kind run the same block of
 operations, so a plan is a finite set of blocks and an iterator of (tick, event). A scheme
-orders a block; `run` carries it out; `sample_ages` reads causality off it.
+orders a block; `run` executes it; `sample_ages` derives causality from it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class Moment(NamedTuple):
 
 @dataclass
 class Plan:
-    """The blocks of a system's events, made when an event of a new kind comes."""
+    """The blocks of a system's events, created at the first event of each kind. Iteration gives
+    the events with their ticks."""
 
     system: System
     _blocks: dict[Event | Part, Block] = field(default_factory=dict)
@@ -49,17 +50,18 @@ class Plan:
         return scheme(self.system, kind)
 
     def check(self) -> None:
-        """Raises InputFault where the blocks cannot be made: at the first event all clocks fire, so
-        what their FMUs do to each other is found there."""
+        """Raises InputFault if the scheme cannot order the FMUs. The first event suffices, since
+        all clocks fire there."""
         tuple(self.unrolled(next(iter(self)).event))
 
     def loops(self) -> tuple[AlgebraicLoop, ...]:
-        """Among FMUs that the scheme puts in an order, and the order taken."""
+        """The algebraic loops among FMUs that the scheme puts in an order, in that order."""
         ordered = SCHEMES[self.system.coupling].ordered(self.system)
         return tuple(dependency_order.loops(self.system, ordered))
 
     def unrolled(self, event: Event) -> Iterator[Operation]:
-        """The operations of `event`: a repetition carried out once, step control in one step."""
+        """The operations of `event`, with one iteration of each Repeat and one step of each
+        Advance."""
         for operation in flat(self.block(event)):
             if isinstance(operation, Advance):
                 yield from flat(self.block(Part(operation.clock, operation.dticks)))
@@ -71,14 +73,15 @@ class Plan:
 
 
 def moments(timeline: Timeline) -> Iterator[Moment]:
-    """All events from 0 to the end, in time; clocks that fire together share one."""
+    """All events from 0 to the end in order; clocks that fire at the same tick share one."""
     merged = heapq.merge(*(_firings(i, c, timeline.end) for i, c in enumerate(timeline.clocks)))
     for tick, firing in groupby(merged, key=lambda entry: entry[0]):
         yield Moment(tick, Event(tick == 0, tuple(entry[2] for entry in firing)))
 
 
 def _firings(order: int, clock: Clock, end: int) -> Iterator[tuple[int, int, Firing]]:
-    """A step that would end after the end of the run is `final`: it only completes the row."""
+    """The firings of a clock; a step that would end after the end of the run is `final`: it is not
+    taken, but its row is written."""
     for start, after in pairwise(clock.starts):
         if start > end:
             return

@@ -1,4 +1,4 @@
-"""Schemes that take steps back need FMUs whose state can be restored."""
+"""Schemes that repeat steps need FMUs that support rollback."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from hapticlink.orchestrator.system.system import System
 
 
 def require(system: System, names: Iterable[str], what: str) -> None:
-    """Raises InputFault naming the FMUs that cannot roll back."""
+    """Raises InputFault with the FMUs of `names` that cannot save and restore their state; `what`
+    needs it."""
     unable = [n for n in names if not restores_state(system.fmu[n].description)]
     if unable:
         flags = {STATE[system.fmu[n].description.fmi] for n in unable}

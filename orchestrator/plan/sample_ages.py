@@ -62,7 +62,7 @@ class Ages:
         found[3] += 1
 
     def delays(self) -> dict[str, Delay]:
-        """By connection."""
+        """The delay of each connection by name."""
         seconds = self._seconds
         return {
             name: Delay(seconds(least), seconds(most), seconds(total) / number)
@@ -71,11 +71,11 @@ class Ages:
 
 
 MOST = 100_000
-"""Events that are gone through before a run, where it does not come round."""
+"""Number of events that are processed before a run if their pattern does not repeat."""
 
 
 def delays(plan: Plan) -> dict[str, Delay]:
-    """By connection, without a run."""
+    """The delay of each connection by name, without a run."""
     ages = Ages(plan)
     for tick, event in islice(plan, MOST):
         if not ages.event(tick, event):
@@ -84,8 +84,8 @@ def delays(plan: Plan) -> dict[str, Delay]:
 
 
 def comes_round(system: System) -> int:
-    """The last tick of the first hyperperiod in which all phases have begun and constant latencies
-    are over; the end of a run in which nothing comes round."""
+    """The last tick of the first hyperperiod that begins after all phases and constant latencies;
+    the end of the run if the pattern of events does not repeat."""
     timeline = system.timeline
     clocks, late = timeline.clocks, [c.latency for c in system.connections if c.latency]
     drawn = any(way.loss or way.max not in (None, way.min) for way in late)

@@ -1,4 +1,4 @@
-"""Which sample each input was made from: stamps carried through a plan, without running an FMU."""
+"""Traces stamps through a plan without running FMUs: the sample that each input depends on."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hapticlink.orchestrator.system.latency import Link
 
 
 class Use(NamedTuple):
-    """At `tick` the target of `connection` was given a value made from samples up to `stamp`."""
+    """At `tick` the target of `connection` got a value computed from samples up to `stamp`."""
 
     tick: int
     connection: str
@@ -27,12 +27,12 @@ class Use(NamedTuple):
 
 
 Take = Callable[[int, str, int], object]
-"""What is told each Use."""
+"""A function that is called for each Use."""
 
 
 class Stamps:
-    """The stamps of all samples while a plan is gone through; `take` is told of each that is used.
-    Events of one kind do the same, so what they do is bound once."""
+    """The stamps of all samples as events of a plan are processed; `take` is called for each use.
+    The operations of each kind of event are bound once."""
 
     def __init__(self, plan: Plan, take: Take) -> None:
         system = plan.system
@@ -48,7 +48,7 @@ class Stamps:
         self._bound: dict[Event, list[Callable[[int], None]]] = {}
 
     def event(self, tick: int, event: Event) -> None:
-        """Go through an event; they come in time."""
+        """Process an event, in the order of time."""
         if (bound := self._bound.get(event)) is None:
             operations = self._plan.unrolled(event)
             bound = [each for op in operations if (each := self._bind(op))]

@@ -1,4 +1,4 @@
-"""Operations of a plan bound to the calls that carry them out."""
+"""Binds the operations of a plan to the calls that execute them."""
 
 from __future__ import annotations
 
@@ -32,11 +32,12 @@ from hapticlink.orchestrator.system import held_polynomials
 
 
 class Stop(Exception):
-    """The stop condition holds."""
+    """Raised when the scene's stop condition holds."""
 
 
 class Binder:
-    """One way to bind each operation. `calls` gives the bound operations of a part of a plan."""
+    """Binds operations to the objects of a simulation; `calls` returns the bound operations of a
+    part of the plan, for step control."""
 
     def __init__(self, simulation: Simulation, calls: Callable[[Part], Sequence[Call]]) -> None:
         self._simulation, self._calls = simulation, calls
@@ -47,9 +48,12 @@ class Binder:
     def bind_all(
         self, operations: Iterable[Operation], bind: Callable[[Operation], Call] | None = None
     ) -> list[Call]:
+        """The calls of a block, each operation bound by `bind`; steps of isolated FMUs run
+        concurrently."""
         return parallel_steps.bound(operations, bind or self.bind, self._isolated)
 
     def bind(self, operation: Operation) -> Call:
+        """The call that executes an operation; its argument is the tick."""
         simulation = self._simulation
         match operation:
             case Get(fmu, ahead):
@@ -163,12 +167,12 @@ class Binder:
         return blend
 
     def _repeat(self, operation: Repeat) -> FixedPoint:
-        """The loop of a Repeat; events share it, and what its solver has learned."""
+        """The fixed-point iteration of a Repeat, shared by all events, with its solver's state."""
         simulation = self._simulation
         if operation in self.loops:
             return self.loops[operation]
 
-        def bind(op: Operation) -> Call:  # finite or not: an iteration comes back from infinity
+        def bind(op: Operation) -> Call:  # accepts non-finite outputs, which iterations can have
             if isinstance(op, Get):
                 return simulation.meters.read(op.fmu, op.ahead, simulation.instances[op.fmu].read)
             return self.bind(op)

@@ -1,5 +1,5 @@
-"""A watchdog process for runs that load foreign FMUs into their own process: where such an FMU
-crashes the run, it records the end in run.json and removes the temporary folders."""
+"""A watchdog process for runs that load foreign FMUs into their own process: if such an FMU crashes
+the run, it records that in run.json and removes the temporary folders."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def beside(folder: Path) -> Iterator[None]:
     """Context in which a crash of this process is recorded in `folder`/run.json, and in which
     Python code that ends the process (os._exit) does not end it with 0, which is a good end."""
     command = [sys.executable, "-P", "-m", __name__, str(folder.resolve()), str(os.getpid())]
-    # A session of its own: Ctrl-C is for the run. Its input ends when this process does.
+    # In a session of its own, so that it gets no Ctrl-C. Its stdin ends when this process ends.
     with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
         interrupt.add(process.kill)
         leave = os._exit
@@ -34,7 +34,7 @@ def beside(folder: Path) -> Iterator[None]:
 
 
 def finish(folder: Path, process: int) -> None:
-    """Complete run.json and remove the temporary folders for the dead run in `process`."""
+    """Completes run.json and removes the temporary folders of the run that died in `process`."""
     from hapticlink.orchestrator.results.files import write_json
     from hapticlink.orchestrator.results.tables import load
 
@@ -42,10 +42,10 @@ def finish(folder: Path, process: int) -> None:
     for unfinished in folder.glob(f".*.{process}"):
         unfinished.unlink()
     remedy = (
-        "an FMU may have crashed it: with isolate = true it has a process of its own, and the run "
-        "tells which"
+        "an FMU may have crashed it: with isolate = true each FMU has a process of its own, and "
+        "the run names the one that crashes"
     )
-    if _process(folder) != process:  # the folder has no row of that run
+    if _process(folder) != process:  # that run has written no row
         print(f"hapticlink: the process ended before its first row; {remedy}", file=sys.stderr)
         return
     results = load(folder)
@@ -61,7 +61,7 @@ def finish(folder: Path, process: int) -> None:
 
 
 def _process(folder: Path) -> int | None:
-    """That of the run which goes on in `folder`, by its run.json."""
+    """The process of the run in progress in `folder`, from its run.json; None without one."""
     try:
         end = json.loads((folder / "run.json").read_text(encoding="utf-8"))["end"]
         process: int | None = end.get("process")
@@ -71,11 +71,11 @@ def _process(folder: Path) -> int | None:
 
 
 def main() -> None:
-    """Wait for the end of the run, which kills this process where it ends in good order."""
+    """Waits for the end of the run's process; a run that ends regularly kills this one first."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     sys.stdin.buffer.read()
-    with suppress(OSError):  # a full disk, a folder that is gone
+    with suppress(OSError):  # a full disk, or a folder that was removed
         finish(Path(sys.argv[1]), int(sys.argv[2]))
 
 

@@ -1,4 +1,4 @@
-"""A plan carried out: operations bound to calls once, then one loop over events."""
+"""Executes a plan: binds operations to calls once, then loops over the events."""
 
 from __future__ import annotations
 
@@ -38,10 +38,14 @@ Progress = Callable[[float], None]
 
 @dataclass
 class Outcome:
-    """How a run ended: `fault` is None for a good end, end_time the last recorded row's time, asked
-    which FMU asked for the end; published: it has rows, in place of those of an earlier run. Times
-    in s, counts by FMU and call. isolated says why an FMU ran in a process of its own, held
-    how often an output was held for not being finite, smaller_steps how many were retried."""
+    """How a run ended.
+
+    end_time: time of the last row (s). fault: None for a regular end. asked: the FMU that requested
+    the end, and how. published: whether the folder has rows of this run. wall_time, step_time: s,
+    the latter by FMU. calls: counts by FMU and call. isolated: why an FMU ran in a process of its
+    own. held: how often outputs of an FMU were held since they were not finite. smaller_steps:
+    number of steps repeated with smaller ones.
+    """
 
     end_time: float = 0.0
     reason: str = "duration"
@@ -62,16 +66,16 @@ class Outcome:
 
 
 def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Outcome:
-    """Run to the end or to the first fault; what was recorded until then is in `results`.
+    """Execute the plan to its end or to the first fault; rows up to then are in `results`.
 
-    progress is told the simulated time (s) now and then.
+    progress is called with the simulated time (s) from time to time.
     """
     outcome = Outcome()
     simulation: Simulation | None = None
     ages, counting = Ages(plan), True
     begin = perf_counter()
     try:
-        # Values that are not finite are found by 0 x NaN, without numpy's own warning.
+        # Non-finite values are detected by 0 x NaN, for which numpy would warn.
         with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
             interrupt.check()
             simulation = Simulation(plan.system, results, stack)
@@ -120,7 +124,7 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
 
 
 def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
-    """Why a run that came to its end has left physics on the way."""
+    """The fault of a run that reached its end but has diverged; None if it has not."""
     condition = simulation.system.ends_when
     left = condition and (condition.fmu, condition.variable) == WORKSPACE
     if outcome.reason == "stop_when" and left and (why := unstable(outcome.energies)):
@@ -136,7 +140,8 @@ def _reason(fault: Fault) -> str:
 
 
 class _Bound:
-    """The calls of each event, bound when it first comes, and how often it came."""
+    """The calls of each kind of event, bound at its first occurrence, and its number of
+    occurrences."""
 
     def __init__(self, plan: Plan, simulation: Simulation) -> None:
         self._plan, self._simulation = plan, simulation
@@ -151,7 +156,7 @@ class _Bound:
         return found
 
     def counts(self) -> dict[str, dict[str, int]]:
-        """FMI calls of the loop, by FMU and kind; those of blocks that a fault cut are in it."""
+        """Number of FMI calls by FMU and kind; blocks interrupted by a fault count in full."""
         totals: dict[str, Counter[str]] = {name: Counter() for name in self._simulation.instances}
         ran: list[tuple[Operation, int]] = []
         for event, times in self._events.items():

@@ -1,4 +1,4 @@
-"""Fixed-point iteration of an algebraic loop: the operation Repeat carried out."""
+"""Fixed-point iteration of an algebraic loop: executes the operation Repeat."""
 
 from __future__ import annotations
 
@@ -55,10 +55,11 @@ class Unconverged(Fault):
 
 
 class FixedPoint:
-    """One Repeat, its operations bound.
+    """The bound operations of one Repeat.
 
     guess: push trial outputs into the holds. body: one co-simulation step. again: restore FMU
-    states. held: the operations of the body that evaluate holds.
+    states. held: the operations of the body that evaluate holds. Raises Unconverged unless the
+    scene accepts unconverged steps.
     """
 
     def __init__(

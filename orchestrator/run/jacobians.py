@@ -3,8 +3,8 @@
 fmi2GetDirectionalDerivative gives dy = (dh/du) du of what the FMU computes in its mode, y = h(u)
 (FMI 2.0.5 section 2.1.9, FMI 3.0 section 2.2.11): in initialisation the outputs by inputs of the
 instant; in step mode h is the step, f_doStep of the table in section 4.1.2, so it is the outputs
-at its end by inputs that were held over it. Not every FMU reads the standard so, and none is
-taken at its word: `solvers.Newton` falls back to differences.
+at its end by inputs that were held over it. Not every FMU interprets the standard in this way, so
+`solvers.Newton` falls back to finite differences where such a Jacobian does not help.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from hapticlink.orchestrator.system.system import Connection, System
 @dataclass(frozen=True)
 class Through:
     """Partial derivatives of one FMU: of the outputs at `rows` of the signal vector with respect to
-    the inputs whose sources stand at `columns`."""
+    the inputs whose sources are at `columns`."""
 
     instance: Instance
     outputs: tuple[Scalar, ...]
@@ -34,7 +34,8 @@ class Through:
     columns: tuple[int, ...]
 
     def of(self, tangent: Matrix) -> Matrix | None:
-        """(rows, n): what `tangent`, (signals, n), becomes; None where the FMU does not tell."""
+        """The derivatives (rows, n) of the outputs for derivatives `tangent` (signals, n) of all
+        signals; None if the FMU does not give them."""
         found = self.instance.jacobian(self.outputs, self.inputs)
         if found is None:
             return None

@@ -1,4 +1,4 @@
-"""From a connection to the hold that stands on it, with what it knows of its place."""
+"""Creates the hold of each connection, with its context."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from hapticlink.orchestrator.system.system import Connection, System
 
 
 def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], list[EnergyTank]]:
-    """By connection; and the accounts of springs, each shared by those that set it."""
+    """The hold of each connection by name, and the energy tanks, each shared by the holds of one
+    spring-damper."""
     shared: dict[SetSpring, EnergyTank] = {}
     holds = {c.name: make_hold(c, system, signals, shared) for c in system.connections if c.hold}
     return holds, [*shared.values()]
@@ -33,7 +34,8 @@ def make_hold(
     signals: SignalVector,
     shared: dict[SetSpring, EnergyTank],
 ) -> Hold:
-    """The hold of `connection`, its kind kept and behind its latency."""
+    """The hold of `connection`, wrapped for its kind, its latency and its derivative samples;
+    `shared` are the energy tanks so far."""
     assert connection.hold is not None
     kind, size = HOLDS[connection.hold], len(connection.inputs)
     context = _context(connection, system, signals, shared)
@@ -49,12 +51,12 @@ def make_hold(
         hold = Late(hold, Link(connection.latency, system.timeline.base))
     if kind.needs == "derivative" and (slope := derivative(connection, system.fmu)):
         slopes = [signals.scalar(connection.source, s.name) for s in slope]
-        hold = _Beside(hold, _reader(signals, slopes))
+        hold = _WithDerivative(hold, _reader(signals, slopes))
     return hold
 
 
-class _Beside(Hold):
-    """Sends the derivative along with each sample, so that both are late together."""
+class _WithDerivative(Hold):
+    """Appends the source's derivative to each sample, so that both have the same latency."""
 
     def __init__(self, hold: Hold, derivative: Callable[[], Vector]) -> None:
         self._hold, self._derivative = hold, derivative
@@ -73,11 +75,12 @@ def _context(
     signals: SignalVector,
     shared: dict[SetSpring, EnergyTank],
 ) -> HoldContext:
-    """The displacement and the spring only where the hold keeps account of energy."""
+    """The context of a hold; displacement, velocity and tank only if the hold needs them."""
     size, moved, moving, tank = len(connection.inputs), None, None, None
     found = bond(connection, system, signals)
     if HOLDS[connection.hold or ""].needs == "power" and found:
-        # The hold's own samples are not converted yet: what converts them scales their motion.
+        # Samples are converted to the target's units behind the hold, so that the displacement is
+        # scaled instead.
         entries, work, places = list(found.entries), np.zeros(size), np.zeros(size, np.intp)
         work[entries], places[entries] = found.work, found.moved
         moved = reader(signals, places.tolist(), work)

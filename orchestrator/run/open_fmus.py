@@ -1,4 +1,4 @@
-"""How the FMUs of a system are opened: by FMI version, and here or each in its own process."""
+"""Creates the instances of FMUs, by FMI version, in this process or isolated in their own."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hapticlink.orchestrator.system.system import Fmu
 
 
 def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
-    """Why each FMU that runs in a process of its own does, by name."""
+    """The FMUs that run in a process of their own, by name, with the reason."""
     fmus = tuple(fmus)
     return {u.name: "asked for" for u in fmus if u.isolate} | clashes(fmus)
 
 
 def instance(fmu: Fmu, outputs: Vector, policy: Faults, alone: bool) -> Instance:
     """The instance of `fmu`, not loaded yet, that fills `outputs`."""
-    made = Isolated if alone else IN_PROCESS[fmu.description.fmi]
-    return made(fmu.name, fmu.description, outputs, fmu.starts, policy)
+    kind = Isolated if alone else IN_PROCESS[fmu.description.fmi]
+    return kind(fmu.name, fmu.description, outputs, fmu.starts, policy)

@@ -1,7 +1,8 @@
 """Module names of Python FMUs that clash.
 
-Python FMUs of one process share an interpreter: of two modules with one name, the first imported
-serves both FMUs, silently. An FMU that would get another's module runs in a process of its own.
+Python FMUs of one process share an interpreter: of two modules with the same name, both FMUs would
+silently use the one imported first. An FMU that would get another's module is isolated in a process
+of its own.
 
 pythonfmu and pythonfmu3 put an FMU's resources/ on sys.path; what can be imported from there
 are its top-level modules and packages. Two are the same where their files have equal CRC-32s.
@@ -20,15 +21,15 @@ from hapticlink.orchestrator.fmi.archive import opened
 from hapticlink.orchestrator.system.system import Fmu
 
 Modules = dict[str, dict[str, int]]
-"""By top-level name: CRC-32 by path in resources/."""
+"""For each top-level module name, the CRC-32 of its files by their path in resources/."""
 
 _loaded: Modules = {}
-"""What FMUs of this process have brought; it stays imported when they are gone."""
+"""Modules of all FMUs that this process has loaded; they stay imported when FMUs are freed."""
 
 
 def bundled(path: Path) -> Modules:
-    """The modules in the resources/ of a Python FMU; {} for any other, and for one that cannot be
-    read, which loading it will tell."""
+    """The modules in the resources/ of a Python FMU; {} for other FMUs, and for a file that cannot
+    be read, which is reported when it is loaded."""
     try:
         with opened(path, "FMU") as archive:
             crcs = {e.filename: e.CRC for e in archive.infolist()}
@@ -43,8 +44,8 @@ def bundled(path: Path) -> Modules:
 
 
 def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
-    """Why FMUs that are not isolated have to be: by name, with the module. The rest count as
-    loaded from now on."""
+    """The FMUs that have to be isolated although the scene does not say so, by name, with the
+    reason. The modules of the others are recorded as loaded."""
     found = {}
     for fmu in fmus:
         if fmu.isolate:
@@ -60,7 +61,7 @@ def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
 
 
 def _is_mine(name: str, files: dict[str, int]) -> bool:
-    """Whether `import name` gives an FMU the module that it brings."""
+    """Whether `import name` would give an FMU its own module."""
     known = _loaded.get(name)
     if known is None:
         module = sys.modules.get(name)

@@ -53,11 +53,12 @@ class SignalVector:
         return self._of_hold[connection]
 
     def derivatives(self, connection: str) -> slice:
-        """What is held, derived: all entries once, then all twice, ...; empty where it stands."""
+        """Derivatives of a held value: the first of all entries, then the second of all, ...; empty
+        if it is constant within a step."""
         return self._of_derivatives.get(connection, slice(0, 0))
 
     def mean(self, connection: Connection) -> list[int]:
-        """The places of what the target takes in the mean of its step."""
+        """Indices of the mean over the target's step, or of the value itself if it is constant."""
         span = self.derivatives(connection.name)
         if span.stop:
             return list(range(span.stop, span.stop + len(connection.inputs)))
@@ -67,28 +68,29 @@ class SignalVector:
         return self._of_scalar[fmu, variable]
 
     def port(self, unit: Fmu, name: str) -> list[int]:
-        """The places of an output vector."""
+        """Indices of an output vector."""
         return [self.scalar(unit.name, s.name) for s in unit.description.port(name, "output")]
 
     def view(self, places: Sequence[int]) -> Vector | None:
-        """The values at `places` as a view, None where they do not stand side by side."""
+        """The values at the indices `places` as a view; None if these are not consecutive."""
         if list(places) != list(range(places[0], places[-1] + 1)):
             return None
         return self.values[places[0] : places[-1] + 1]
 
     def sources(self, connection: Connection) -> list[int]:
-        """The places of a connection's source."""
+        """Indices of a connection's source outputs."""
         return [self.scalar(connection.source, s.name) for s in connection.outputs]
 
     def places(self, connection: Connection) -> list[int]:
-        """The places that its target reads: the source's, or the held value's."""
+        """Indices of the values that a connection's target reads: the held ones, or the source's
+        outputs."""
         if connection.hold:
             held = self.hold(connection.name)
             return list(range(held.start, held.stop))
         return self.sources(connection)
 
     def columns(self, clock: str) -> list[str]:
-        """`fmu.variable` of every output of a clock, in order."""
+        """The names `fmu.variable` of all outputs of a clock, in order."""
         span = self.clock(clock)
         inside = (k for k, i in self._of_scalar.items() if span.start <= i < span.stop)
         return [f"{fmu}.{variable}" for fmu, variable in inside]

@@ -22,10 +22,10 @@ Call = Callable[[int], object]
 
 
 class Simulation:
-    """What `stack` closes again; rows go to `results`.
+    """The objects of a run, which `stack` closes; rows are written to `results`.
 
-    setters, varying_setters and now_setters fill the inputs of an FMU from the signals: as its
-    connections hold them, with derivatives beside, and as their sources stand now.
+    setters, varying_setters and now_setters set the inputs of an FMU from the signals: with held
+    values, with held values and their derivatives, and with the newest outputs of the sources.
     """
 
     def __init__(self, system: System, results: RunFolder, stack: ExitStack) -> None:
@@ -54,8 +54,8 @@ class Simulation:
             made.dismiss()
 
     def start(self) -> None:
-        """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and open
-        the files of the rows."""
+        """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and
+        create the recorders."""
         initialize(self.system, self.instances, self.signals)
         values = self.signals.values
         for c in self.system.connections:
@@ -86,8 +86,8 @@ class Simulation:
     def _derived(
         self, incoming: Iterable[Connection]
     ) -> tuple[list[Scalar], list[int], list[int]] | None:
-        """(inputs, orders, places on the signals) of what varies within the steps of an FMU, values
-        first."""
+        """Inputs, orders and signal indices of the derivatives that an FMU gets with its inputs;
+        None if there are none."""
         rows = []
         for c in incoming:
             span = self.signals.derivatives(c.name)

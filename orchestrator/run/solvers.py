@@ -1,6 +1,6 @@
-"""Fixed points of a map, r(w) = g(w) - w = 0, from values of g alone.
+"""Solvers for fixed points of a map, r(w) = g(w) - w = 0, from evaluations of g.
 
-Each solver keeps what it has learned (relaxation, Jacobian) for the next call.
+Each solver keeps its relaxation factor or Jacobian for the next call.
 """
 
 from __future__ import annotations

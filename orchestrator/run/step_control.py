@@ -1,4 +1,4 @@
-"""Step-size control during a run: the operation Advance carried out."""
+"""Step-size control during a run: executes the operation Advance."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.system.system import System
 
 SLOT = 1
-"""Of the saved states; slot 0 is the iteration's."""
+"""Slot of the saved FMU states; slot 0 is used by fixed-point iteration."""
 
 
 class Advancer:
-    """The steps of one clock. `calls` gives the bound operations of a step."""
+    """Advances the plants of one clock in steps of controlled size. `calls` returns the bound
+    operations of a step."""
 
     def __init__(
         self,
@@ -44,7 +45,7 @@ class Advancer:
         self._most = max(min(most, longest), self._least)
         self._size = float(self._least)
         self._before, self.steps = 0.0, Steps()
-        self._growth = 2.0  # of a step; less for a while where an FMU has failed
+        self._growth = 2.0  # largest growth of a step; smaller for a while after an FMU has failed
         plants = [u.name for u in system.fmus if u.clock == clock and not u.sampled]
         self._instances = [simulation.instances[n] for n in plants]
         compared = _compared(system, signals, plants)
@@ -71,14 +72,14 @@ class Advancer:
             at += take(tick + at, self._fitting(dticks - at))
 
     def _fitting(self, left: int) -> int:
-        """A step that divides what is left evenly, or nearly so."""
+        """The size of the next step, so that the `left` ticks are divided about evenly."""
         self._size = size = min(max(self._size, self._least), self._most)
         parts = -int(-left // size)
         return left if parts == 1 else min(max(rounded(left / parts), self._least), left)
 
     def _aim(self, size: float, growth: float) -> None:
-        """The next step, at most `growth` times what was aimed at; a step that was cut short to
-        land on a tick does not count as aim."""
+        """Sets the target size of the next steps, at most `growth` times the previous target; steps
+        that were shortened to end at a tick do not change it."""
         self._size = min(max(size, 0.2 * self._size), growth * self._size)
 
     def _step(self, tick: int, dticks: int) -> None:
@@ -92,7 +93,7 @@ class Advancer:
     # --- doubling -------------------------------------------------------------------------
 
     def _double(self, tick: int, size: int) -> int:
-        """Ticks that were taken: `size`, or 0 where the step was taken back."""
+        """Ticks that the time advanced: `size`, or 0 if the step was rolled back."""
         if size < 2:
             self._step(tick, size)
             self._read(tick + size)
@@ -119,7 +120,7 @@ class Advancer:
         return size
 
     def _both(self, tick: int, size: int, saved: Any) -> float:
-        """The error of a step, in units of the tolerance; its two halves stand."""
+        """The error of a step relative to the tolerance; the result of its two halves is kept."""
         self._step(tick, size)
         self._read(tick + size)
         whole = self._values[self._outputs]
@@ -163,7 +164,7 @@ class Advancer:
             error = max(error, abs(float(residual)))
         assert self._settings.energy is not None
         error /= self._settings.tolerance * self._settings.energy
-        # Slowly: a residual energy passes through 0 twice in a period, where it says nothing.
+        # Slow growth, since a residual energy passes through 0 twice in a period.
         self._aim(size * proportional_integral(error, self._before, self._order + 1), 1.2)
         self._before = error
         self.steps.count(self._seconds(size), error > 1.0 and size <= self._least)
@@ -173,8 +174,8 @@ class Advancer:
 def _compared(
     system: System, signals: SignalVector, plants: Sequence[str]
 ) -> list[tuple[int, float]]:
-    """(place, nominal) of the outputs whose error counts: those that do not depend directly on an
-    input, which at the end of a step is still that of the step before; all where there are no
+    """Index and nominal of the outputs whose error is estimated: those without direct feed-through,
+    since at the end of a step inputs are still those of the step; all outputs if there are no
     others."""
     every = [
         ((signals.scalar(n, s.name), s.nominal), system.fmu[n].description.follows(s))
@@ -186,9 +187,9 @@ def _compared(
 
 @dataclass
 class Steps:
-    """What step control did on a rate: steps taken, taken back for their error, given up because
-    an FMU failed in them, taken at `min` though the error was too large, the shortest and longest
-    (s). A step of doubling is its two halves."""
+    """Statistics of step control on a clock: steps taken, rejected for their error, failed in an
+    FMU, and forced (accepted at `min` although the error was too large); the shortest and longest
+    step (s). A step of doubling consists of its two halves."""
 
     taken: int = 0
     rejected: int = 0
@@ -205,20 +206,22 @@ class Steps:
 
 
 def integral(error: float, order: int) -> float:
-    """The factor from the step taken to the next, where the error, in units of the tolerance, was
-    `error` and grows with the step to the power `order`."""
+    """The ratio of the next step size to the last one (integral controller), where `error` relative
+    to the tolerance grows with the step size to the power `order`."""
     return 0.9 * error ** (-1 / order) if error else inf
 
 
 def proportional_integral(error: float, before: float, order: int) -> float:
-    """The same with the error of the step before (Gustafsson 1991: .3 and .4)."""
+    """The same by a PI controller, which also uses the error `before` of the previous step
+    (Gustafsson 1991, exponents 0.3 and 0.4)."""
     if not error or not before:
         return integral(error, order)
     return 0.9 * error ** (-0.3 / order) * (before / error) ** (0.4 / order)
 
 
 def rounded(ticks: float) -> int:
-    """Down to four significant bits, so that few sizes occur and each is bound once; at least 1."""
+    """Rounded down to four significant bits, at least 1, so that only few step sizes occur and each
+    is bound once."""
     whole = max(int(ticks), 1)
     shift = max(whole.bit_length() - 4, 0)
     return whole >> shift << shift

@@ -46,7 +46,7 @@ def at_weaker_gains(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
     made = figures.maps(
         folder,
         "direct_energy.png",
-        "Energy that holding the wrenches of hand and coupling generates in 3 s (red: generated)",
+        "Red cells: holding the wrenches of hand and coupling generates energy in 3 s",
         [(headings[b], in_mJ[b]) for b in in_mJ],
         "energy generated (mJ)",
         signed=True,

@@ -1,6 +1,6 @@
-"""A scheme orders the operations of an event. One scheme a file.
+"""Coupling schemes, one a file: they order the operations of an event.
 
-All keep to FMI 2.0.5 section 4.2.4: no get after a set without a doStep between.
+All conform to FMI 2.0.5 section 4.2.4: no get after a set without a doStep between.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ def _none(system: System) -> list[list[Fmu]]:
 
 @dataclass(frozen=True)
 class Scheme:
-    """block: the operations of an event, in order. ordered: the groups of FMUs that it puts in an
-    order by their dependencies, so that loops among them are told; none by default. Whether it
-    reads the future nobody has to say: that is read off its blocks (`sample_ages`)."""
+    """A coupling scheme. block: the operations of an event, in order. ordered: the groups of FMUs
+    that the scheme puts in an order by their dependencies, for the report of loops; none by
+    default. Whether a scheme is causal is derived from its blocks (`sample_ages`)."""
 
     block: Callable[[System, Event], tuple[Operation, ...]]
     ordered: Callable[[System], list[list[Fmu]]] = _none

@@ -1,10 +1,10 @@
 """Gauss-Seidel: sampled blocks run one after the other before the plants step.
 
-At t: read the plants whose steps end at t; each sampled block, in the order of its inputs,
-takes what is known at t and puts out y(t); then the plants start their steps with it. No
-connection is delayed. In a ring of sampled blocks an input that no output depends on directly
-(ModelStructure, FMI 2.0.5 section 2.2.8) makes no order: it takes its source's output of the
-period before. A ring of direct dependencies has no order at all.
+At t: read the plants whose steps end at t; each sampled block, after those that feed it, computes
+y(t) from its inputs at t; then the plants start their steps with these outputs. No connection adds
+a delay. In a loop of sampled blocks, an input without direct feed-through (ModelStructure,
+FMI 2.0.5 section 2.2.8) is ignored for the order: it gets its source's output of the previous
+period. A loop by direct feed-through alone is an error.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
-    """The operations of `event`. Raises InputFault naming a ring of sampled blocks."""
+    """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks."""
     sampled, continuous = building_blocks.firing(system, event)
     operations: list[Operation] = [*building_blocks.publish_ended(system, event, continuous)]
     for fmu in in_order(system, sampled):
@@ -36,7 +36,7 @@ def ordered(system: System) -> list[list[Fmu]]:
 
 
 def in_order(system: System, fmus: list[Fmu]) -> list[Fmu]:
-    """`fmus` so that each comes after those that feed it."""
+    """`fmus` in an order in which each comes after those that feed it."""
     ordered: list[Fmu] = []
     for group in dependency_order.groups(system, fmus):
         inside = dependency_order.direct(system, group)

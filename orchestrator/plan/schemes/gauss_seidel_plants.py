@@ -1,10 +1,10 @@
-"""Gauss-Seidel among the plants: each takes the end of the step of those before it.
+"""Gauss-Seidel among the plants: each uses the outputs at the end of the step of those before it.
 
 As Gauss-Seidel up to the plants. Then these step one after the other, each after those that feed
-it; a loop has no such order, and goes by direct dependencies, then by the order of the system.
-Each is read at once, and its outputs, stamped with the end of the step, are given to those that
-come after it. Their holds interpolate where they would extrapolate. It reads the future, so it
-claims no causality: for comparison with the literature on continuous coupling.
+it; within a loop they are ordered by direct feed-through, then as declared. Each is read at once,
+and its outputs, stamped with the end of the step, are pushed to those that come after it, whose
+holds then interpolate instead of extrapolating. The scheme is not causal; it is meant for
+comparison with the literature on continuous coupling.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
-    """The operations of `event`. Raises InputFault naming a ring of sampled blocks."""
+    """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks."""
     operations = [*gauss_seidel.block(system, building_blocks.without_steps(event))]
     starting = building_blocks.starting(event, building_blocks.firing(system, event)[1])
     for unit in (u for group in dependency_order.plants(system, starting) for u in group):

@@ -1,17 +1,16 @@
 """Iterated coupling: the step of an algebraic loop of plants is repeated to a fixed point.
 
-Sampled blocks come first, as in Gauss-Seidel. Then the plants of a rate, each after those that
-feed it. A loop of them steps together on a guess of its outputs at the end of the step, given to
-their holds, which so interpolate; it steps again on a better guess, from the saved states, until
-the guess is what comes out. A hold by a polynomial of degree k gives order k + 1, as Jacobi, with a
-smaller error and no limit of the step beyond that of the plants.
+Sampled blocks come first, as in Gauss-Seidel, then the plants of a rate, each after those that feed
+it. The plants of a loop step together, with a guess of their outputs at the end of the step pushed
+into their holds, which thus interpolate; the step is repeated from the saved states with improved
+guesses until guess and outputs agree. With holds by polynomials of degree k the order is k + 1, as
+for Jacobi, with a smaller error and no stability limit on the step size beyond that of the plants.
 
-A plant takes constant inputs over each substep. Two neighbours of width h get
+A plant holds its inputs constant over each substep. Two adjacent substeps get
 (f1 + f2)/2 -+ (2/sqrt 3)(f2 - f1)/2, with f1, f2 the input at the two Gauss points of the pair:
-its mean and its first moment are those of the input up to the cubic, so substeps cost an error of
+mean and first moment equal those of the input up to cubics, so that substeps cause an error of
 order 4 (the commutator-free rule of Blanes and Moan 2006, for constant stages). A plant that can
-interpolate its inputs gets the hold's derivatives and needs no substeps. The scheme reads the
-future, so it claims no causality.
+interpolate its inputs gets the hold's derivatives and needs no substeps. The scheme is not causal.
 """
 
 from __future__ import annotations
@@ -39,8 +38,8 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
-    """The operations of `event`. Raises InputFault naming a ring of sampled blocks, or the FMUs
-    of a loop that cannot roll back."""
+    """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks, and
+    for FMUs of a loop that do not support rollback."""
     operations = [*gauss_seidel.block(system, building_blocks.without_steps(event))]
     for group in groups(system, event):
         if len(group) > 1:
@@ -61,7 +60,7 @@ def ordered(system: System) -> list[list[Fmu]]:
 
 
 def groups(system: System, event: Event) -> list[list[Fmu]]:
-    """The plants that start a step, in order; those of a loop together."""
+    """The plants that start a step, in order; those of a loop are in one group."""
     starting = building_blocks.starting(event, building_blocks.firing(system, event)[1])
     clock = {u.name: u.clock for u in starting}
     feeds = {
@@ -77,7 +76,7 @@ def _repeat(system: System, event: Event, group: list[Fmu]) -> Iterator[Operatio
     loop = [c for n in names for c in system.into(n) if c.source in names]
     dticks = building_blocks.dticks(event, group[0])
     body = [op for fmu in group for op in _step(system, event, fmu, loop)]
-    # The board still holds the guess of the end, by which feed-through is read.
+    # The signal vector still contains the guess, which direct feed-through is evaluated with.
     body += [Set(n, now=True) for n in names if n in system.get_after_set]
     body += [Get(n, dticks) for n in names]
     yield from (Save(n) for n in names)
@@ -91,7 +90,7 @@ def _repeat(system: System, event: Event, group: list[Fmu]) -> Iterator[Operatio
 
 
 def _push_on(system: System, event: Event, group: list[Fmu]) -> Iterator[Operation]:
-    """The end of a group's step, for the plants of its rate that come after it."""
+    """Push a group's outputs at the end of the step to the plants of its rate after it."""
     names, clock = [u.name for u in group], group[0].clock
     plants = [u.name for u in system.fmus if u.clock == clock and not u.sampled]
     for c in (c for n in names for c in system.out_of(n) if c.hold):
@@ -100,7 +99,7 @@ def _push_on(system: System, event: Event, group: list[Fmu]) -> Iterator[Operati
 
 
 def _step(system: System, event: Event, fmu: Fmu, loop: list[Connection]) -> Iterator[Operation]:
-    """The step of a plant, each substep on the means and first moments of what `loop` gives."""
+    """The step of a plant; each substep uses mean and first moment of the inputs from `loop`."""
     parts, dticks = system.substeps.get(fmu.name, 1), building_blocks.dticks(event, fmu)
     inside = {c.name for c in loop}
     for part in range(parts):
@@ -114,9 +113,8 @@ def _step(system: System, event: Event, fmu: Fmu, loop: list[Connection]) -> Ite
 
 
 def substep(part: int, parts: int, dticks: int) -> tuple[tuple[float, Fraction], ...]:
-    """What a plant takes over a substep: (weight, ahead) of the input's values (module's text).
-
-    A last substep without a neighbour takes the mean by two Gauss points.
+    """The constant input of a substep as (weight, ahead) of the input's values, see the module's
+    text. A last substep without a partner uses the mean of two Gauss points.
     """
     width = Fraction(dticks, parts)
     pair = part - part % 2

@@ -1,8 +1,7 @@
-"""Jacobi, as FMI allows it: get all, set all, step all.
+"""Jacobi in conformity with FMI: get all, set all, step all.
 
-Everybody takes what was read before anybody is set, so what a sampled block puts out at t
-reaches the others one event later. Sampled outputs are read and recorded with their own
-stamp t.
+All FMUs use outputs that were read before any input is set, so that an output of a sampled block at
+t reaches the others one event later. Sampled outputs are read and recorded with their own stamp t.
 """
 
 from __future__ import annotations

@@ -26,9 +26,10 @@ Scheme = Callable[[System, Event], tuple[Operation, ...]]
 
 
 def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]:
-    """The operations of `event`; clocks whose plants are not connected keep their steps.
+    """The operations of `event`; clocks whose plants are not connected keep their step sizes.
 
-    Raises InputFault naming plants whose steps cannot be chosen, or where there is nothing to do.
+    Raises InputFault for plants whose step size cannot be varied, and if there are no connected
+    plants.
     """
     assert system.step_control is not None
     between = {u.clock: _between(system, u.clock) for u in system.fmus}
@@ -64,29 +65,30 @@ def _between(system: System, clock: str) -> list[Connection]:
 
 
 def _require_energy(system: System, between: list[Connection], kind: Part, scheme: Scheme) -> None:
-    """Raises InputFault where there is no energy to look at, or nothing to measure it against."""
+    """Raises InputFault for ecco if no connection between the plants carries power, if `energy` is
+    missing, or if the coupling scheme interpolates."""
     assert system.step_control is not None
     if not any(carries_power(c, system.power) for c in between):
         raise InputFault(
-            "[step_control] method = 'ecco' looks at the energy between plants, and no connection "
-            f"between plants of {kind.clock} carries power: name efforts and displacements in "
+            "[step_control] method = 'ecco' needs the energy between plants, and no connection "
+            f"between plants of {kind.clock} carries power: pair efforts and displacements in "
             "[[power]], or take method = 'doubling'"
         )
     if system.step_control.energy is None:
         raise InputFault(
-            "[step_control] method = 'ecco' measures against the energy that matters in the "
+            "[step_control] method = 'ecco' measures errors relative to a typical energy of the "
             "scene: give energy (J)"
         )
     if any(isinstance(op, Get) and op.ahead for op in flat(part(system, kind, scheme))):
         raise InputFault(
-            "[step_control] method = 'ecco' estimates what extrapolation errs, and coupling = "
+            "[step_control] method = 'ecco' estimates the error of extrapolation, and coupling = "
             f"{system.coupling!r} interpolates: take 'jacobi', 'gauss-seidel', or 'doubling'"
         )
 
 
 def part(system: System, kind: Part, scheme: Scheme) -> tuple[Operation, ...]:
-    """One step of the plants of a clock, alone, from outputs that have been read; or the reading
-    at its end, carried out at that tick."""
+    """The operations of one step of a clock's plants alone, from outputs that have been read, or
+    those of reading at its end, at that tick."""
     plants = tuple(u for u in system.fmus if u.clock == kind.clock and not u.sampled)
     alone = replace(system, fmus=plants, ends_when=None)
     event = Event(not kind.ended, (Firing(kind.clock, kind.dticks, kind.ended),))

@@ -214,7 +214,7 @@ def test_of_several_dyads_one_that_never_folds():
 
 @pytest.mark.parametrize(
     ("settings", "what"),
-    [({"stabilization": "baumgarte"}, "Baumgarte's terms"), ({"held": 1 / 30}, "local_model")],
+    [({"stabilization": "baumgarte"}, "Baumgarte terms"), ({"held": 1 / 30}, "local_model")],
 )
 def test_settings_without_use_are_refused(settings, what):
     frame = settings.pop("held", None)

@@ -245,7 +245,7 @@ def test_an_ssp_whose_structure_is_to_change(tmp_path: Path) -> None:
     assert status("export", "pendulum", "--out", tmp_path) == 0
     path = str(tmp_path / "pendulum.ssp")
     for key in ("controller.topology=false", "linkage.gravity=[0, 0]", "packaging=native"):
-        with pytest.raises(SceneFault, match="FMUs of an SSP are made: change its scene"):
+        with pytest.raises(SceneFault, match="FMUs of an SSP are built already: change its scene"):
             open_scene.load(path, [key])
     assert open_scene.load(path, ["haptics.rate=64", "duration=0.5"]).duration == 0.5
     assert names.is_fixed(("graphics", "sync"))
