@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 
 from hapticlink.components.registry import Registry
-from hapticlink.orchestrator.base import internal_error, interrupt, plugins, temporary_folders
+from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.base.say import say
 
@@ -114,6 +114,8 @@ def _status(arguments: Sequence[str] | None) -> int:
         say(f"hapticlink: {error}", file=sys.stderr)
         return 1
     except Exception as error:
+        from hapticlink.orchestrator.base import internal_error  # slow to load
+
         say(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)
         return 1
 

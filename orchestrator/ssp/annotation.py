@@ -58,5 +58,5 @@ def _problems(found: Any) -> Iterator[Problem]:
 def _table(value: Any, path: Path, known: Collection[str]) -> Iterator[Problem]:
     if not isinstance(value, dict):
         yield path, "should be a table"
-    elif wrong := next((key for key in value if key not in known), None):
-        yield (*path, wrong), f"does not belong here; {unknown('key', wrong, sorted(known))}"
+    elif wrong := [key for key in value if key not in known]:
+        yield (*path, wrong[0]), f"does not belong here; {unknown('key', wrong[0], sorted(known))}"

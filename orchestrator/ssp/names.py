@@ -17,7 +17,7 @@ NOT_IN_ANNOTATION = frozenset(
     (
         *("linkage", "contacts", "mechanism", "directions", "device", "controller", "hand"),
         *("sensing", "mechanism_at", "directions_from", "graphics", "fmu", "connection"),
-        "packaging",
+        *("packaging", "hands", "local_model"),
     )
 )
 """Keys of a scene that are contained in its FMUs and the structure; of graphics, the rate is in the
@@ -32,8 +32,7 @@ def is_fixed(names: tuple[str, ...]) -> bool:
     it."""
     if names[0] == "graphics":
         return len(names) > 1 and names[1] not in ("rate", "align", "phase")
-    built_in = NOT_IN_ANNOTATION - {"fmu", "connection"} | {"hands", "local_model"}
-    return names[0] in built_in
+    return names[0] in NOT_IN_ANNOTATION - {"fmu", "connection"}
 
 
 def type_of(fmi_type: str) -> str:

@@ -72,7 +72,12 @@ def listed(path: Path) -> list[Point]:
     """The runs of a file: a CSV with one column per key (an empty cell keeps the scene's value), or
     a TOML file of [[run]] tables. Raises InputFault if it cannot be read or has no run."""
     text = text_files.read(path, "a list of runs", LARGEST, "utf-8-sig")
-    points = list(_toml(path, text) if path.suffix == ".toml" else _csv(path, text))
+    try:
+        points = list(_toml(path, text) if path.suffix == ".toml" else _csv(path, text))
+    except csv.Error as error:
+        raise InputFault(f"--runs {path}: not CSV: {error}") from error
+    if len(points) > MOST:
+        raise InputFault(f"--runs {path}: {len(points)} runs; at most {MOST} are made")
     if not points:
         form = "[[run]] table" if path.suffix == ".toml" else "row under its header"
         raise InputFault(f"--runs {path}: no runs; give one {form} a run")

@@ -3,4 +3,9 @@
 python -m tests.attack.signals --cases 300
 python -m tests.attack.archives --cases 500
 python -m tests.attack.c_interface --cases 500000
+python -m tests.attack.scenes --cases 2700
+python -m tests.attack.options --cases 4000
+python -m tests.attack.ssps --cases 400
+
+Each writes a table to results/faults; Ctrl-C ends it with the cases that it has made.
 """

@@ -7,6 +7,7 @@ import csv
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,13 +31,14 @@ class Made:
 
 
 def counted(made: Iterable[Made]) -> dict[str, Counter[str]]:
-    """Outcomes by kind; what was wrong goes to stderr."""
+    """Outcomes by kind, up to Ctrl-C; what was wrong goes to stderr."""
     counts: dict[str, Counter[str]] = {}
-    for i, each in enumerate(made):
-        counts.setdefault(each.kind, Counter())[each.outcome] += 1
-        if each.wrong:
-            line = f"case {i}, {each.kind}: {each.case}: {each.outcome}: {each.wrong}"
-            print(line, file=sys.stderr, flush=True)
+    with suppress(KeyboardInterrupt):
+        for i, each in enumerate(made):
+            counts.setdefault(each.kind, Counter())[each.outcome] += 1
+            if each.wrong:
+                line = f"case {i}, {each.kind}: {each.case}: {each.outcome}: {each.wrong}"
+                print(line, file=sys.stderr, flush=True)
     return counts
 
 

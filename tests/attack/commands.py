@@ -99,6 +99,17 @@ class Place:
         if process == 0:
             os.chdir(self._here)
             _child(lambda: commands.main(arguments), told, self._temporary)
+        status = None
+        try:
+            status = self._ended(process, rows, earlier)
+        finally:
+            if status is None:
+                os.killpg(process, signal.SIGKILL)
+                os.waitpid(process, 0)
+        return status, told.read_text("utf-8", errors="replace")
+
+    def _ended(self, process: int, rows: Path, earlier: int | None) -> int | None:
+        """Its status, None where it takes longer than PATIENCE."""
         begin, began = time.monotonic(), None
         while not (found := os.waitpid(process, os.WNOHANG))[0]:
             now = time.monotonic()
@@ -108,11 +119,9 @@ class Place:
                 os.kill(process, signal.SIGINT)
                 began = math.inf
             if now > begin + PATIENCE:
-                os.killpg(process, signal.SIGKILL)
-                os.waitpid(process, 0)
-                return None, told.read_text("utf-8", errors="replace")
+                return None
             time.sleep(0.002)
-        return os.waitstatus_to_exitcode(found[1]), told.read_text("utf-8", errors="replace")
+        return os.waitstatus_to_exitcode(found[1])
 
 
 def _same(a: Path, b: Path) -> bool:

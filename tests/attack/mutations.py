@@ -57,13 +57,13 @@ def mutated(tree: Any, draw: random.Random) -> tuple[Any, str]:
         return tree, "nothing"
     path = draw.choice(paths)
     node, key, old = at(tree, path[:-1]), path[-1], at(tree, path)
-    how = draw.choice(("value", "value", "near", "near", "other", "drop", "twice", "key", "wrap"))
+    how = draw.choice((*["near"] * 5, "value", "value", "other", "drop", "twice", "key", "wrap"))
     if how == "value":
         kinds = (NUMBERS, TEXTS, TABLES)
         same = 0 if isinstance(old, int | float) else 1 if isinstance(old, str) else 2
         node[key] = draw.choice(draw.choice((*kinds, kinds[same], kinds[same])))
     elif how == "near":
-        node[key] = _near(old, draw)
+        node[key] = near(old, draw)
     elif how == "other":
         node[key] = copy.deepcopy(at(tree, draw.choice(paths)))
     elif how == "drop":
@@ -78,7 +78,7 @@ def mutated(tree: Any, draw: random.Random) -> tuple[Any, str]:
     return tree, f"{how} at {'.'.join(map(str, path))}"
 
 
-def _near(value: Any, draw: random.Random) -> Any:
+def near(value: Any, draw: random.Random) -> Any:
     """A value of the same kind that is not far."""
     if isinstance(value, bool):
         return not value

@@ -55,7 +55,7 @@ def _keys(draw: random.Random) -> tuple[str, Any]:
     tables = tomllib.loads(find.find(draw.choice(SMALL))[1])
     path = draw.choice([*mutations.places(tables)])
     names = [str(name) for name in path]
-    for _ in range(draw.choice((0, 0, 1, 2))):
+    for _ in range(draw.choice((0, 0, 0, 1, 2))):
         i = draw.randrange(len(names))
         how = draw.randrange(4)
         if how == 0:
@@ -72,9 +72,10 @@ def _keys(draw: random.Random) -> tuple[str, Any]:
 
 def _value(old: Any, draw: random.Random) -> str:
     pool = (*mutations.NUMBERS, *mutations.TEXTS, *mutations.TABLES)
-    value = draw.choice((old, draw.choice(pool), draw.choice(pool)))
+    near = mutations.near(old, draw)
+    value = draw.choice((old, near, near, near, draw.choice(pool), draw.choice(pool)))
     said = draw.choice((str(value), repr(value)))
-    return mutations.text(said, draw) if draw.random() < 0.4 else said
+    return mutations.text(said, draw) if draw.random() < 0.2 else said
 
 
 def _range(draw: random.Random) -> str:

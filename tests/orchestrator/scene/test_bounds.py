@@ -113,6 +113,26 @@ def test_grids_without_end() -> None:
         grid.grid([grid.parse("x=1..100000"), grid.parse("y=1..100000")])
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("runs.csv", "hold\n" + "x" * 200_000, "not CSV: field larger"),
+        ("runs.csv", "hold\n" + "zoh\n" * 100_001, "100001 runs; at most 100000"),
+        ("runs.toml", "[[run]]\nx = " + "[" * 40, "not TOML: more than 32"),
+    ],
+)
+def test_lists_of_runs_without_end(tmp_path: Path, name: str, text: str, message: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputFault, match=message):
+        grid.listed(tmp_path / name)
+
+
+def test_a_date_in_a_list_of_runs_is_told_of_by_its_run(tmp_path: Path) -> None:
+    (tmp_path / "runs.toml").write_text("[[run]]\nduration = 2020-01-01\n")
+    (point,) = grid.listed(tmp_path / "runs.toml")
+    assert "2020-01-01" in refused("four-bar", f"duration={point['duration']}")
+
+
 def test_findings_are_shown_to_the_twentieth() -> None:
     with pytest.raises(SceneFault) as fault:
         load.read(GOOD + "[holds]\n" + "".join(f"a{i}.b = 'zoo'\n" for i in range(70)))

@@ -50,6 +50,7 @@ def test_an_annotation_says_rates(tmp_path: Path) -> None:
         ({**RUN, "connection": [3]}, "connection"),
         ({"extends": "closed-loop"}, "extends: does not belong here"),
         ({"linkage": {}}, "linkage: does not belong here"),
+        ({"": {}}, "does not belong here"),
         ({**RUN, "title": "\ud800"}, "is no Unicode text"),
         ({**RUN, "holds": {"x": 10**30}}, "more than 64 bits"),
         ({**RUN, "holds": [1]}, "holds: "),
