@@ -75,7 +75,8 @@ def _in_folder(
         return Run(None, run, found.tables)
     if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
         try:
-            with (folder / "plan.txt").open("w", encoding="utf-8") as file:
+            (folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed
+            with (folder / "plan.txt").open("x", encoding="utf-8") as file:
                 for line in explain.explain(Plan(ended.system)):
                     interrupt.check()
                     file.write(f"{line}\n")

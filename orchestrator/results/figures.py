@@ -56,7 +56,9 @@ def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
     """Write each figure as a PNG; returns the file names. Raises Interrupted."""
     for name, figure in figures.items():
         interrupt.check()
-        figure.savefig(folder / f"{name}.png", dpi=150)
+        path = folder / f"{name}.png"
+        path.unlink(missing_ok=True)  # a link is replaced, not followed
+        figure.savefig(path, dpi=150)
     return [f"{name}.png" for name in figures]
 
 

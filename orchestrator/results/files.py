@@ -31,7 +31,8 @@ class Recorder:
         self.path, self._view, self._first = path, view, first
         self.last: float | None = None
         self._unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-        self._file = self._unfinished.open("wb", buffering=0)
+        self._unfinished.unlink(missing_ok=True)
+        self._file = self._unfinished.open("xb", buffering=0)  # never through a link
         try:
             self._write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
         except OSError:

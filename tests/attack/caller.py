@@ -119,7 +119,7 @@ class Caller:
         return found
 
     def _real(self) -> float:
-        return self.draw.choice(TIMES) if self._rarely() else self.draw.gauss(0.0, 2.0)
+        return self.draw.choice(TIMES) if self._rarely(0.1) else self.draw.gauss(0.0, 2.0)
 
     # --- calls ----------------------------------------------------------------------------
 
@@ -155,6 +155,8 @@ class Caller:
         c, self.time = self._instance(), 0.0
         if self._rarely(0.7):
             self.call("fmi2Reset", c)
+        if self._rarely(0.5):
+            self.set_real(c)
         if not self._rarely():
             stop = self._time(1.0)
             self.call("fmi2SetupExperiment", c, 0, c_double(0), self._time(0.0), 1, stop)
@@ -173,11 +175,11 @@ class Caller:
         arguments = self._array(c_uint, references), c_size_t(len(references)), values
         self.call("fmi2GetReal", self._instance(), *arguments)
 
-    def set_real(self) -> None:
+    def set_real(self, c: c_void_p | None = None) -> None:
         references = self._references()
         values = self._array(c_double, [self._real() for _ in references])
         arguments = self._array(c_uint, references), c_size_t(len(references)), values
-        self.call("fmi2SetReal", self._instance(), *arguments)
+        self.call("fmi2SetReal", c or self._instance(), *arguments)
 
     def other_type(self) -> None:
         kind, verb = self.draw.choice([*TYPES]), self.draw.choice(("Get", "Set"))
@@ -191,6 +193,8 @@ class Caller:
         value = self._or_null((c_double * 1)())
         self.call(f"fmi2Get{kind}Status", self._instance(), self.draw.randrange(-1, 6), value)
         self.call("fmi2CancelStep", self._instance())
+        categories = self._array(c_char_p, [b"logAll", b"none"])
+        self.call("fmi2SetDebugLogging", self._instance(), 1, c_size_t(2), categories)
 
     def derivatives(self) -> None:
         references = self._references()

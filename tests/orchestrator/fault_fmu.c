@@ -53,12 +53,13 @@ int fmi2DoStep(void *c, double t, double h, int discard) {
     m->y += 1;
     return mode == 7 ? 2 : mode == 8 ? 0 : mode;
 }
-/* As in pythonfmu's library: to be called once before the destructor. */
+#ifdef PYTHON /* as in pythonfmu's library: to be called once before the destructor */
 static int released;
 void finalizePythonInterpreter(void) { released++; }
 __attribute__((destructor)) static void unload(void) {
     say(released == 1 ? "unloaded after its interpreter" : "unloaded with its interpreter");
 }
+#endif
 int fmi2GetBooleanStatus(void *c, int kind, int *value) {
     *value = kind == 3 && ((Model *)c)->mode == 7;
     return 0;

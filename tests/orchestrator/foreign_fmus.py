@@ -103,9 +103,16 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def c_fmu(folder: Path, guid: str = "{faults}") -> Path:
-    """The FMU of fault_fmu.c."""
-    return _packed(folder, "fault_fmu.c", "faults", platform, DESCRIPTION.format(guid=guid))
+def c_fmu(folder: Path, guid: str = "{faults}", python: bool = False) -> Path:
+    """The FMU of fault_fmu.c; with `python`, one that holds an interpreter."""
+    description = DESCRIPTION.format(guid=guid)
+    if not python:
+        return _packed(folder, "fault_fmu.c", "faults", platform, description)
+    path = _packed(folder, "fault_fmu.c", "faults", platform, description, "-DPYTHON")
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("resources/slavemodule.txt", "faults")
+        archive.writestr("resources/faults.py", "")
+    return path
 
 
 STAIR = """<?xml version="1.0" encoding="UTF-8"?>
@@ -126,8 +133,10 @@ def stair_fmu(folder: Path, **flags: str) -> Path:
     return _packed(folder, "stair_fmu.c", "stair", platform, STAIR.format(flags=said))
 
 
-def _packed(folder: Path, source: str, name: str, where: str, description: str) -> Path:
-    library, path = compiled(source, folder, name), folder / f"{name}.fmu"
+def _packed(
+    folder: Path, source: str, name: str, where: str, description: str, *options: str
+) -> Path:
+    library, path = compiled(source, folder, name, *options), folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description)
         archive.write(library, f"binaries/{where}/{library.name}")

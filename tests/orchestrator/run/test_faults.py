@@ -245,7 +245,7 @@ COMMAND = [sys.executable, "-c", "from hapticlink.orchestrator.commands import m
 def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
     tmp_path: Path, isolate: str
 ) -> None:
-    c_fmu(tmp_path)
+    c_fmu(tmp_path, python=True)
     path = scene(tmp_path, ONE.format("faults.fmu") + isolate)
     log = tmp_path / "log"
     command = [*COMMAND, "run", str(path), "--out", str(tmp_path / "out")]
