@@ -12,7 +12,7 @@ from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import figures, folders, tables
+from hapticlink.orchestrator.results import figures, folders, summary, tables
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -50,7 +50,8 @@ def run(
         if out is None:
             with temporary_folders.room() as room:
                 found = simulate(scene, room, options, progress).results
-            made = Run(None, found.run, found.tables)
+            warned = {**found.run, "warnings": list(summary.lines(found))}
+            made = Run(None, warned, found.tables)
         else:
             made = _in_folder(scene, Path(out), options, progress)
         if interrupt.came() or made.run["end"]["reason"] == "interrupted":
@@ -70,9 +71,9 @@ def _in_folder(
         logging.getLogger(__name__).warning(said, folder, MOST)
         return Run(folder, ended.run, {})
     found = ended.results
-    run = found.run
     if not ended.outcome.published:
-        return Run(None, run, found.tables)
+        return Run(None, found.run, found.tables)
+    run = folders.add(folder, (), {"warnings": list(summary.lines(found))})
     if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
         try:
             (folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed

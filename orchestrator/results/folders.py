@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from hapticlink.orchestrator.base.faults import InputFault
@@ -29,9 +30,12 @@ def ensure(folder: Path | str) -> Path:
     raise InputFault(f"--out {folder}: {why}; name a folder that can be written to")
 
 
-def add(folder: Path, names: Iterable[str]) -> dict[str, Any]:
-    """Adds files of a run to the list in its run.json; returns the new content."""
+def add(
+    folder: Path, names: Iterable[str], more: Mapping[str, Any] = MappingProxyType({})
+) -> dict[str, Any]:
+    """Adds files of a run to the list in its run.json, and `more` keys; returns the new content."""
     run: dict[str, Any] = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     run["files"] = list(dict.fromkeys([*run["files"], *names]))
+    run |= more
     write_json(folder / "run.json", run)
     return run
