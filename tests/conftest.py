@@ -1,6 +1,7 @@
 """What holds for every test."""
 
 import os
+import signal
 
 from hypothesis import settings
 
@@ -11,3 +12,8 @@ settings.load_profile("repeatable")
 # Matrices here have at most some dozen rows: threads of BLAS would only wait for each other, in
 # this process and in those that tests start. Read when NumPy is imported, which comes after.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# A shell that starts pytest in the background has it ignore Ctrl-C, which processes of tests would
+# inherit.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
