@@ -1,1 +1,1 @@
-"""One FMU: its description, variables, calls and state. Knows no scene."""
+"""A single FMU: its description, variables, calls and state; independent of any scene."""

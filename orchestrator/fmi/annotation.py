@@ -33,7 +33,8 @@ TIMINGS = ("continuous", "sampled")
 
 @dataclass(frozen=True)
 class Annotation:
-    """kinds by output port, power by input port; timing is None where the FMU declares none."""
+    """What an FMU declares: kinds by output port, power by input port; timing None if
+    undeclared."""
 
     timing: Timing | None = None
     kinds: Mapping[str, Kind] = field(default_factory=dict)
@@ -42,7 +43,8 @@ class Annotation:
 
 
 def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> Annotation:
-    """Raises ValueError for what is malformed, or does not fit the variables and their units."""
+    """The annotation of an FMU, empty if it has none. Raises ValueError if it is malformed, or does
+    not fit the variables and their units."""
     block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
     if block is None:
         return Annotation()
@@ -66,7 +68,7 @@ def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) ->
 
 
 class _Ports:
-    """The ports of an FMU, and what each may be declared as."""
+    """The ports of an FMU, with checks of what is declared of each."""
 
     def __init__(self, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> None:
         self._scalars, self._units = tuple(scalars), units

@@ -1,5 +1,5 @@
-"""FMUs and SSPs are zip archives with XML from anywhere: opened only where nothing in them can
-write outside its folder or expand without end."""
+"""Opens FMUs and SSPs, which are untrusted zip archives with XML, only if no entry can be written
+outside its folder or expand without limit."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def opened(path: Path, kind: str) -> Iterator[zipfile.ZipFile]:
 
 
 def _outside(entry: zipfile.ZipInfo) -> str:
-    """Why an entry is refused, "" where it is not."""
+    """The reason to refuse an entry, "" if there is none."""
     name = entry.orig_filename
     if "\\" in name or ":" in name or "\0" in name:
         return "is not a path with forward slashes"
@@ -60,8 +60,8 @@ def _outside(entry: zipfile.ZipInfo) -> str:
 
 
 def _too_large(entries: list[zipfile.ZipInfo]) -> str:
-    """By how much an archive is, "" where it is not. What it says of its entries' sizes holds: more
-    than that is not read of one."""
+    """The reason to refuse an archive for its size, "" if there is none. The sizes that it declares
+    for its entries are reliable: never more is read of an entry."""
     if (size := sum(entry.file_size for entry in entries)) > MOST:
         return f"it has {size} bytes unpacked; at most {MOST}"
     if len(entries) > MOST_ENTRIES:
@@ -70,7 +70,7 @@ def _too_large(entries: list[zipfile.ZipInfo]) -> str:
 
 
 def require_whole(archive: zipfile.ZipFile) -> None:
-    """Raises InputFault where an entry is not what its CRC-32 was made from."""
+    """Raises InputFault if the content of an entry does not match its CRC-32."""
     damaged = archive.testzip()
     if damaged is not None:
         raise InputFault(f"{archive.filename}: damaged: entry {damaged!r} has another checksum")

@@ -1,5 +1,5 @@
-"""How large an output may become: a run that goes beyond has left physics, though its numbers are
-finite."""
+"""Bounds on the magnitude of outputs: a run that exceeds one has diverged, though its numbers are
+still finite."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ GROWTH = 1e12
 
 
 class Bounds:
-    """The bounds of `outputs`, which are read where they stand. Before `start` nothing is known of
-    them, but that they are finite."""
+    """The bounds of `outputs`, a view that is read at each check. Before `start` an output only has
+    to be finite."""
 
     def __init__(self, description: Description, outputs: NDArray[np.float64]) -> None:
         self._scalars, self._outputs = description.outputs, outputs
         self._inverse, self._shares = np.zeros(len(outputs)), np.zeros(len(outputs))
 
     def start(self) -> None:
-        """The outputs stand at their start. Whole numbers have the bounds of their types; a Real
-        without a unit is no physical quantity that is known, and may be of any size."""
+        """Sets the bounds from the start values. Integers have the bounds of their types; a Real
+        without a unit is no known physical quantity and has none."""
         nominal = np.array([s.nominal for s in self._scalars])
         bounds = GROWTH * np.maximum(np.abs(self._outputs), nominal)
         for i, scalar in enumerate(self._scalars):
@@ -34,13 +34,13 @@ class Bounds:
         self._inverse[:] = 1.0 / bounds
 
     def kept(self) -> bool:
-        """Whether all outputs are surely finite and within their bounds: one pass, as it is asked
-        at every read."""
+        """Whether all outputs are certainly finite and within their bounds: one pass over the
+        vector, since this is asked at every read."""
         np.multiply(self._outputs, self._inverse, out=self._shares)
         return bool(self._shares.dot(self._shares) <= 1.0)  # not where one is NaN or infinite
 
     def first_beyond(self) -> tuple[Scalar, float, float] | None:
-        """(output, value, bound) of the first that is beyond."""
+        """(output, value, bound) of the first output beyond its bound, None if there is none."""
         for scalar, value, inverse in zip(
             self._scalars, self._outputs.tolist(), self._inverse.tolist(), strict=True
         ):

@@ -1,4 +1,4 @@
-"""What an FMU says of itself in its capability flags, by FMI version."""
+"""The capability flags of an FMU, by FMI version."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What an FMU says of itself: ports (scalars grouped into vectors and matrices), what they mean,
-and timing."""
+"""The description of an FMU: its ports (scalars grouped into vectors and matrices), their meaning,
+and its timing."""
 
 from __future__ import annotations
 
@@ -65,13 +65,13 @@ class Description:
     """Whether the FMU itself says its timing."""
 
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
-        """The entries of vector `name` (or the scalar of that very name), in the order of their
-        indices: some tools write x[10] before x[2]."""
+        """The entries of the vector `name` (or the scalar of exactly that name), sorted by index:
+        some tools write x[10] before x[2]."""
         found = (s for s in self.scalars if name in (s.port, s.name) and s.causality in causalities)
         return tuple(sorted(found, key=lambda s: s.indices))
 
     def follows(self, output: Scalar, inputs: Iterable[Scalar] | None = None) -> bool:
-        """Whether an output depends directly on one of `inputs`; None are all."""
+        """Whether an output depends directly on one of `inputs`, by default on any input."""
         if inputs is None:
             inputs = (s for s in self.scalars if s.causality == "input")
         declared = self.dependencies.get(output.name, self.dependencies.get(output.port))
@@ -165,7 +165,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
 
 
 def _only_xml(text: bytes) -> BytesIO:
-    """FMPy reads an archive or a file's name; this is an archive with nothing but the text."""
+    """An archive with modelDescription.xml alone, since FMPy reads an archive or a file."""
     file = BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("modelDescription.xml", text)

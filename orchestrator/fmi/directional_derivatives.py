@@ -19,7 +19,7 @@ WARNING = 1
 def derivatives(
     slave: Any, description: Description, outputs: Sequence[Scalar], inputs: Sequence[Scalar]
 ) -> Matrix | None:
-    """(outputs, inputs), one call an input; None where a call fails.
+    """The Jacobian (outputs, inputs), by one call per input; None if a call fails.
 
     fmi2GetDirectionalDerivative, FMI 2.0.5 section 2.1.9; in FMI 3.0, section 2.2.11, arrays are
     derived whole, in the order of their entries.
@@ -51,7 +51,7 @@ def _key(scalar: Scalar) -> tuple[int, int]:
 
 
 def _whole(description: Description, scalars: Sequence[Scalar]) -> list[tuple[int, int]]:
-    """(reference, entry) of all entries of what `scalars` are of, variable by variable."""
+    """(reference, entry) of all entries of the variables that `scalars` belong to."""
     references = dict.fromkeys(s.reference for s in scalars)
     types = {s.type for s in scalars}
     every = dict.fromkeys(_key(s) for s in description.scalars if s.type in types)

@@ -1,9 +1,9 @@
-"""An FMU in this process, whose values stand in shared arrays: FMI 2.0 here, what FMI 3.0 calls
-otherwise in `in_process3`.
+"""An FMU loaded into this process, with its values in shared arrays: FMI 2.0 here, the differences
+of FMI 3.0 in `in_process3`.
 
-FMPy loads the library and instantiates; the calls of the loop go straight to the C functions,
-on pointers made once. Every status is checked, every output must be finite, and whatever the
-FMU logged goes into the error.
+FMPy loads the library and instantiates; during the run the C functions are called directly, with
+pointers that are created once. Every status is checked, every output must be finite, and the
+messages that the FMU logged are part of the error.
 """
 
 from __future__ import annotations
@@ -99,8 +99,8 @@ class InProcess(Instance):
         return advance
 
     def _end(self, end: float) -> None:
-        """The FMU asks to end the simulation at `end` (s). Raises AsksToEnd where its step would
-        have gone on."""
+        """The FMU requests the end of the simulation at `end` (s). Raises AsksToEnd if that lies
+        within its step."""
         time, size = self._stepping
         if end < time + (1 - SHARE) * size:
             what = f"asks to end the simulation at {end:.6g} s, within its step"
@@ -124,7 +124,7 @@ class InProcess(Instance):
     def _connected(
         self, scalars: Sequence[Scalar], places: Sequence[int], exact: Mapping[str, int]
     ) -> Callable[[Vector], None]:
-        """As `connect`; exact: whole numbers that are set in place of values."""
+        """As `connect`; exact: integers, by name, to be set instead of the values."""
         order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
         where = np.array([places[i] for i in order], dtype=np.intp)
         conversions = [scalars[i].conversion for i in order]
@@ -164,7 +164,7 @@ class InProcess(Instance):
     def _setting(
         self, scalars: Sequence[Scalar], exact: Mapping[str, int]
     ) -> tuple[Vector, list[tuple[Callable[[], int], str]]]:
-        """(values of `scalars`, the named calls that set them)."""
+        """An array of values of `scalars`, and the calls, with their names, that set them."""
         values = np.zeros(len(scalars))
         return values, [(t.call, t.name) for t in self._transfers("Set", scalars, values, exact)]
 
@@ -231,7 +231,7 @@ class InProcess(Instance):
         self.time = end
 
     def finish(self) -> None:
-        """A step is over when `step` returns."""
+        """Nothing to wait for: `step` returns after doStep."""
 
     def save(self, slot: int = 0) -> None:
         if slot not in self._saved:
@@ -258,13 +258,13 @@ class InProcess(Instance):
         return self._fault(what, self.time, passing, repeatable=status == DISCARD)
 
     def dismiss(self) -> None:
-        """Closing takes no time."""
+        """Nothing to do in advance: `close` is quick."""
 
     def _said(self) -> list[str]:
         return messages.newest(self._key)
 
     def close(self) -> FmuFault | None:
-        """After a fatal fault the FMU is not called again."""
+        """After fmi2Fatal the FMU is not called again."""
         slave, self._slave = self._slave, None
         fault = None
         try:

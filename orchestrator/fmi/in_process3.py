@@ -1,6 +1,6 @@
-"""What an instance of an FMI 3.0 co-simulation FMU does otherwise than one of FMI 2.0.
+"""The differences of an FMI 3.0 co-simulation FMU from one of FMI 2.0.
 
-Event mode, early return and intermediate updates are not asked for, so a step is whole and its
+Event mode, early return and intermediate update are not used, so a step is never cut short and its
 inputs are constant (FMI 3.0 section 4.2.1)."""
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 
 class InProcess3(InProcess):
-    """An FMI 3.0 FMU."""
+    """An FMU of FMI 3.0 whose library is loaded into this process."""
 
     def _instantiate(self) -> Any:
         slave = fmi3.FMU3Slave(
@@ -61,8 +61,8 @@ class InProcess3(InProcess):
     def _setting(
         self, scalars: Sequence[Scalar], exact: Mapping[str, int]
     ) -> tuple[Vector, list[tuple[Callable[[], int], str]]]:
-        """Arrays are set whole: entries that nobody sets keep their start values. Raises FmuFault
-        for an entry that has none, since its array was given another size."""
+        """Arrays are set as a whole: entries that are not connected keep their start values. Raises
+        FmuFault if such an entry has none, because its array was resized."""
         references = {s.reference for s in scalars}
         whole = [s for s in self.description.scalars if s.reference in references]
         whole.sort(key=lambda s: TYPES.index(s.type))

@@ -19,9 +19,9 @@ WARNING = 1
 
 
 class Varying:
-    """Rows (scalar, order, place on a board), those of order 0 first. Inputs and derivatives are of
-    the beginning of a step (FMI 2.0.5 section 4.2.1): where it is taken in parts, `renew` tells the
-    FMU what they have become.
+    """Inputs with their time derivatives: rows of (scalar, order, index in the signal vector), order
+    0 first. Values hold at the beginning of a step (FMI 2.0.5 section 4.2.1); if a step is taken in
+    parts, `renew` extrapolates them to the beginning of each part.
     """
 
     name = "fmi2SetRealInputDerivatives"
@@ -48,12 +48,12 @@ class Varying:
         )
 
     def set(self, board: Vector) -> int:
-        """Set the derivatives; the values are set with all other inputs."""
+        """Set the derivatives; the values are set together with all other inputs."""
         self._first[:] = self._now[:] = board[self._places] * self._factors + self._offsets
         return self._set_derivatives()
 
     def renew(self, elapsed: float) -> int:
-        """Set both as they are `elapsed` s after the beginning of the step."""
+        """Set values and derivatives for `elapsed` s after the beginning of the step."""
         for i, (reference, order) in enumerate(self._rows):
             self._now[i] = sum(
                 self._first[j] * elapsed ** (other - order) / factorial(other - order)

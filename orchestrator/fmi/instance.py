@@ -1,4 +1,5 @@
-"""An FMU of a run, as the run calls it: `in_process`, or in a process of its own, `isolated`."""
+"""The interface of a loaded FMU, implemented in this process (`in_process`) and in a process of its
+own (`isolated`)."""
 
 from __future__ import annotations
 
@@ -24,12 +25,12 @@ Vector = NDArray[np.float64]
 
 
 class Instance(ABC):
-    """A loaded FMU, from instantiation to removal; a context manager, which raises FmuFault where
-    the FMU fails in its last call and nothing else has failed.
+    """A loaded FMU, from instantiation to the removal of its folder. As a context manager it raises
+    FmuFault if the FMU fails while it is closed and nothing else has failed.
 
-    `outputs` is the view that `get` fills. `held` counts the outputs that a policy has held at
-    their last value. `ended`: the FMU has asked to end the simulation, so it is only read from then
-    on.
+    outputs: the view that `get` fills. held: number of outputs held at their last value by
+    `faults.nan`. ended: the FMU has requested the end of the simulation; it is only read after
+    that.
     """
 
     ended = False
@@ -73,19 +74,21 @@ class Instance(ABC):
 
     @abstractmethod
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
-        """A function that takes the values at `places` of a board and sets `scalars` to them."""
+        """A function that sets `scalars` to the values at the indices `places` of a signal
+        vector."""
 
     @abstractmethod
     def connect_derivatives(
         self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
     ) -> Callable[[Vector], None]:
-        """A function that sets what the scalars have at `places` of a board as their derivatives of
-        an order; of order 0, their values, stand first and serve a step that is retried."""
+        """A function that sets time derivatives of inputs, of the given orders, from the indices
+        `places` of a signal vector. Rows of order 0, the values, come first; retried steps need
+        them."""
 
     @abstractmethod
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
-        """(outputs, inputs): the directional derivatives of what the FMU has computed last; None
-        where it does not tell them."""
+        """The Jacobian (outputs, inputs) at the current state, by directional derivatives; None if
+        the FMU does not provide them."""
 
     @abstractmethod
     def enter_initialization(self, stop_time: float) -> None:
@@ -93,16 +96,16 @@ class Instance(ABC):
 
     @abstractmethod
     def exit_initialization(self) -> None:
-        """Leave initialisation mode: steps may follow."""
+        """Leave initialisation mode and enter step mode."""
 
     @abstractmethod
     def read(self) -> None:
-        """All outputs, finite or not."""
+        """Read all outputs without checking that they are finite."""
 
     @property
     @abstractmethod
     def smaller_steps(self) -> int:
-        """How many steps were discarded and taken again in smaller ones."""
+        """Number of steps that were discarded and repeated in smaller steps."""
 
     @abstractmethod
     def step(self, time: float, end: float, size: float) -> None:
@@ -110,34 +113,34 @@ class Instance(ABC):
 
     @abstractmethod
     def finish(self) -> None:
-        """Wait for the step, where it is not over yet."""
+        """Wait until the step has been taken."""
 
     @abstractmethod
     def save(self, slot: int = 0) -> None:
-        """Keep the state in a slot; a slot keeps one."""
+        """Save the FMU state in a slot, replacing the one in it."""
 
     @abstractmethod
     def rollback(self, slot: int = 0) -> None:
-        """Go back to the state in a slot, which keeps it."""
+        """Restore the FMU state of a slot."""
 
     @abstractmethod
     def dismiss(self) -> None:
-        """Begin to close, where that takes its time."""
+        """Start closing without waiting for it."""
 
     @abstractmethod
     def close(self) -> FmuFault | None:
-        """Terminate where FMI allows it, free, unload, remove the folder; in every state. The fault
-        of an FMU that fails in that."""
+        """Terminate if FMI allows it in the current state, free, unload, and remove the folder.
+        Returns the fault of an FMU that fails in this."""
 
     def _said(self) -> Sequence[str]:
-        """What the FMU logged last."""
+        """The last messages that the FMU logged."""
         return ()
 
     # --- outputs --------------------------------------------------------------------------
 
     def get(self) -> None:
-        """All outputs. Raises FmuFault naming the first that is not finite, unless the policy is
-        to keep its last value, and Diverged for the first that is beyond its bound."""
+        """Read all outputs. Raises FmuFault for the first that is not finite, unless `faults.nan`
+        holds its last value, and Diverged for the first beyond its bound."""
         self.read()
         if not self._bounds.kept():
             self._judge()
@@ -166,7 +169,7 @@ class Instance(ABC):
                 raise self._fault(what, self.time, passing=True, repeatable=True)
 
     def _start_loop(self) -> None:
-        """The outputs stand at their start."""
+        """Take the start values of the outputs as reference for their bounds."""
         self._bounds.start()
         if self.policy.nan == "hold":
             self._good = self.outputs.copy()

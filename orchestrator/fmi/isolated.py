@@ -1,8 +1,8 @@
-"""An instance whose FMU runs in a process of its own: when that dies or hangs, the run does not.
+"""An FMU in a process of its own, so that its crash or hang does not affect the run.
 
-The worker has an `Instance`; here each call is a message to it and its answer. Inputs go with the
-call that comes next and the outputs come back with a step, so that a step is one message; it is
-answered when somebody asks, so that several FMUs step at the same time (`rounds`).
+The worker process has an `Instance`; each call is a message to it and an answer. Inputs are sent
+with the next call and outputs come back with a step, so a step is one message. Its answer is
+awaited in `finish`, so that several FMUs step concurrently (`run.parallel_steps`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LOADING = 60.0
 
 
 class Isolated(Instance):
-    """An FMU in a worker process. `step` starts a step, `finish` waits for it."""
+    """An FMU in a worker process: `step` starts a doStep, `finish` waits for it."""
 
     _process: Process | None = None
     _fresh: bytes | FmuFault | None = None
@@ -58,7 +58,8 @@ class Isolated(Instance):
         self._pending = []
 
     def _answer(self) -> Any:
-        """The worker's answer. Raises its FmuFault, or one that says how it ended."""
+        """Wait for the worker's answer. Raises its FmuFault, or one that says how the process
+        ended."""
         assert self._process is not None
         try:
             kind, answer = self._process.answer()
@@ -73,7 +74,8 @@ class Isolated(Instance):
         return self._answer()
 
     def _drop(self) -> None:
-        """Wait for a step that nobody waits for, because another FMU's in its round has failed."""
+        """Wait for a step whose result is not needed, because another FMU has failed at the same
+        communication point."""
         try:
             self._answer()
         except FmuFault as fault:
@@ -95,7 +97,7 @@ class Isolated(Instance):
         return self._remote(self._ask("connect_derivatives", list(scalars), list(orders)), places)
 
     def _remote(self, key: int, places: Sequence[int]) -> Callable[[Vector], None]:
-        """What keeps the values at `places` for the setter `key` of the worker."""
+        """A function that queues the values at `places` for the setter `key` of the worker."""
         where = np.array(places, dtype=np.intp)
 
         def set_from(board: Vector) -> None:
@@ -148,7 +150,7 @@ class Isolated(Instance):
         self.time, self.ended = self._saved_time[slot], False
 
     def dismiss(self) -> None:
-        """`close` waits for the FMU, so that all of a run close together."""
+        """`close` waits for the worker; dismissing all first lets them close concurrently."""
         process = self._process
         if process is None or self._dismissed:
             return

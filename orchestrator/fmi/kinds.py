@@ -1,4 +1,4 @@
-"""Kinds of outputs (`components.ports.Kind`) against the entries that they are said of."""
+"""Checks that a declared kind (`components.ports.Kind`) fits the entries of an output."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _ANGLE = tuple(int(base == "rad") for base in BASES)
 
 
 def turn(unit: Unit | None) -> float | None:
-    """A whole turn in a unit whose only base unit is rad, 2 pi / factor; 2 pi where there is no
-    unit, None where it is no angle."""
+    """A full turn in a unit of angle, 2 pi / factor; 2 pi without a unit, None if the unit is not
+    one of angle."""
     if unit is None or (unit.base is None and unit.name == "rad"):
         return math.tau
     return math.tau / unit.factor if unit.base == _ANGLE else None
 
 
 def misfit(kind: str, units: Sequence[Unit | None]) -> str | None:
-    """Why entries in these units are not of a kind."""
+    """The reason why entries with these units cannot be of a kind, "" if they can."""
     n = len(units)
     if kind in MATRICES and math.isqrt(n) ** 2 != n:
         return f"has {n} entries, and a {kind} matrix is square"

@@ -1,4 +1,4 @@
-"""What FMUs log, the newest of it kept by the key of their instance."""
+"""The most recent log messages of each FMU, by the key of its instance."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _keys = count(1)
 
 
 def opened() -> int:
-    """The key of a new instance, whose messages are kept from now on."""
+    """A key for a new instance; its messages are kept from now on."""
     key = next(_keys)
     _messages[key] = deque(maxlen=KEPT)
     return key
 
 
 def keep(key: int, status: int, message: bytes) -> None:
-    """Keep what the FMU of instance `key` says; it is shown when a call fails."""
+    """Keep a message of instance `key`, to be shown if a call fails."""
     said = _messages.get(key)
     if said is not None and status > 0:
         said.append((message or b"")[: 4 * LONGEST].decode("utf-8", "replace").strip()[:LONGEST])
@@ -37,7 +37,7 @@ def closed(key: int) -> None:
 
 
 def callbacks(key: int) -> fmi2.fmi2CallbackFunctions:
-    """What an FMI 2.0 FMU calls."""
+    """The callback functions of an FMI 2.0 FMU."""
     made = fmi2.fmi2CallbackFunctions.from_buffer_copy(_CALLBACKS)
     made.componentEnvironment = key
     return made

@@ -1,4 +1,4 @@
-"""Libraries of Python FMUs let go of their interpreter before their own destructors run.
+"""Releases the interpreter of Python FMUs before the destructors of their libraries run.
 
 pythonfmu 0.7 and pythonfmu3 0.3 destroy the static that holds the interpreter and then, in the
 library's destructor, drop it once more: memory is corrupted as the process ends. Dropped while
@@ -16,8 +16,8 @@ _kept: dict[int, ctypes.CDLL] = {}
 
 
 def release_at_exit(loaded: ctypes.CDLL) -> None:
-    """Have a library that FMPy has loaded let go at the end of this process, once; nothing to do
-    for one that holds no interpreter."""
+    """Release the interpreter of a library that FMPy has loaded when this process ends, once;
+    libraries without an interpreter are left alone."""
     if os.name != "posix" or not hasattr(loaded, "finalizePythonInterpreter"):
         return
     library = ctypes.CDLL(loaded._name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY)

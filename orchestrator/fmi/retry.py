@@ -18,7 +18,7 @@ _NEEDED = {
 
 
 class Saved:
-    """A place for one state of an FMU. save and restore give the status of the call."""
+    """Storage for one FMU state. save and restore return the status of the call."""
 
     def __init__(self, slave: Any, fmi: str) -> None:
         state = "state" if fmi == "2" else "State"
@@ -38,8 +38,8 @@ class Saved:
 
 
 class Retry:
-    """Steps with the state before each saved. `smaller` counts the steps taken in halves; `renew`
-    sets inputs that vary as they are so long (s) after the beginning of the step."""
+    """Takes steps with the state before each saved. smaller: number of steps taken in halves.
+    renew: sets varying inputs for a time (s) after the beginning of the step."""
 
     def __init__(self, slave: Any, fmi: str, advance: Callable[[float, float], int]) -> None:
         self._advance, self.smaller, self._begin = advance, 0, 0.0
@@ -52,7 +52,7 @@ class Retry:
 
     @staticmethod
     def why_not(description: Description) -> str:
-        """Why steps of an FMU cannot be taken again in smaller ones, "" where they can."""
+        """The reason why an FMU cannot repeat a step in smaller ones, "" if it can."""
         if description.timing == "sampled":
             return "not retried: a sampled block takes whole periods only"
         missing = [n for n in _NEEDED[description.fmi] if n not in description.flags]

@@ -1,6 +1,6 @@
-"""An FMU that asks to end the simulation: FMI 2.0 by a step that it discards (fmi2Terminated,
-FMI 2.0.5 section 4.2.3), FMI 3.0 by a step that it takes (terminateSimulation, FMI 3.0 section
-4.2.1)."""
+"""An FMU that requests the end of the simulation: in FMI 2.0 by a step that it discards
+(fmi2Terminated, FMI 2.0.5 section 4.2.3), FMI 3.0 by a step that it takes (terminateSimulation, FMI
+3.0 section 4.2.1)."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ SHARE = 1e-6
 
 
 def ended_in_discard(slave: Any) -> Callable[[float], float | None]:
-    """What tells, after the discard of a step from a time (s), the time at which an FMU of FMI 2.0
-    ended; None where it wants to go on. pythonfmu 0.7 and pythonfmu3 0.3 say fmi2Terminated of
-    every discard, so their FMUs are not asked."""
+    """A function that returns, after a step from a time (s) was discarded, the time at which the
+    FMU ended, None if it has not. pythonfmu 0.7 and pythonfmu3 0.3 say fmi2Terminated of every
+    discard, so their FMUs are not asked."""
     if (Path(slave.unzipDirectory) / "resources" / "slavemodule.txt").exists():
         return lambda begin: None
     component = ctypes.c_void_p(slave.component)

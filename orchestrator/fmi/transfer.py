@@ -1,4 +1,4 @@
-"""Values between a vector and an FMU, one C call for each FMI type."""
+"""Copies values between a vector and an FMU, with one C call per FMI type."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class Unfit(Exception):
 class Transfer:
     """The scalars of one FMI type within a vector, and the C call that moves them.
 
-    Entries of an FMI 3.0 array move together, so they stand side by side and none is left out.
-    exact: by name, whole numbers to set in place of values that are doubles.
+    Entries of an FMI 3.0 array are transferred together, so they have to be adjacent and complete.
+    exact: integers, by name, to set instead of the values, which are doubles.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Transfer:
         self.call: Callable[[], int] = self._transfer if direct else through
 
     def _get(self) -> int:
-        """Raises Unfit for a whole number that is no double."""
+        """Raises Unfit for an integer that is not exactly representable as a double."""
         status = self._transfer()
         self._values[:] = self._buffer
         if self._wide:
@@ -101,7 +101,7 @@ class Transfer:
         return self._transfer()
 
     def _rounded(self) -> Vector:
-        """The nearest whole numbers. Raises Unfit."""
+        """The nearest integers. Raises Unfit for values beyond the range of the type."""
         rounded, limits = np.rint(self._values), self._limits
         # max + 1 is a power of two, so it is exact where max is not.
         fits = (rounded >= limits.min) & (rounded < float(limits.max + 1))
@@ -120,6 +120,6 @@ def transfers(
     values: Vector,
     exact: Mapping[str, int] = MappingProxyType({}),
 ) -> list[Transfer]:
-    """One for each type present; `scalars` are sorted by type."""
+    """One transfer per FMI type; `scalars` are sorted by type."""
     present = [t for t in TYPES if any(s.type == t for s in scalars)]
     return [Transfer(slave, fmi, verb, scalars, t, values, exact) for t in present]

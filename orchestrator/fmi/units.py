@@ -1,4 +1,4 @@
-"""Units of a connection: the same, convertible, or a mistake.
+"""Conversion between the units of the two ends of a connection.
 
 FMI 2.0.5 section 2.2.2 and FMI 3.0 section 2.4.3: a unit is factor x (product of powers of
 kg, m, s, A, K, mol, cd, rad) + offset, so y_base = factor y + offset and a signal goes from unit
@@ -31,7 +31,7 @@ class Linear:
     offset: float = 0.0
 
     def after(self, first: Linear) -> Linear:
-        """This one of what `first` gives."""
+        """The composition: this after `first`."""
         return Linear(self.factor * first.factor, self.factor * first.offset + self.offset)
 
 
@@ -39,10 +39,8 @@ SAME = Linear()
 
 
 def conversion(source: Unit | None, target: Unit | None, relative: bool = False) -> Linear:
-    """From `source` to `target`; SAME where one of the two has no unit.
-
-    Raises ValueError, saying why, where there is none.
-    """
+    """The conversion from `source` to `target`; SAME if one of the two has no unit. Raises
+    ValueError with the reason if they are not convertible."""
     if source is None or target is None:
         return SAME
     if source.base is None or target.base is None:

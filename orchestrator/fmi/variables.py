@@ -1,4 +1,4 @@
-"""The numbers of an FMU: variables of FMI 2.0, entries of the arrays of FMI 3.0."""
+"""The scalars of an FMU: variables of FMI 2.0, entries of arrays of FMI 3.0."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _ENTRY = re.compile(r"\[[\d, ]+\]$")
 class Scalar:
     """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array.
 
-    `conversion` is what a connection does to a value on its way in, `nominal` a size that counts,
-    1 where the FMU gives none (FMI 2.0.5 section 2.2.7), `bound` the size beyond which a block of
-    this project has left what it models.
+    conversion: applied to values of a connection to it. nominal: nominal value (FMI 2.0.5 section
+    2.2.7), 1 by default. bound: magnitude beyond which a block of this project is outside of its
+    model.
     """
 
     name: str
@@ -63,7 +63,8 @@ class Scalar:
 
     @property
     def settable(self) -> bool:
-        """Whether it may be set until initialisation ends, or be connected to."""
+        """Whether it may be set before the end of initialisation, or be the target of a
+        connection."""
         return self.causality in ("input", "parameter") and self.variability != "constant"
 
     @property
@@ -73,14 +74,14 @@ class Scalar:
 
     @property
     def startable(self) -> bool:
-        """Whether it takes a start value: states do too, where the FMU says how they start
+        """Whether it takes a start value: also a state for which the FMU declares `initial`
         (FMI 2.0.5 section 2.2.7, FMI 3.0 section 2.4.7)."""
         started = self.initial in ("exact", "approx") and self.variability != "constant"
         return self.settable or self.structural or started
 
 
 def differences(tree: ElementTree.Element) -> set[str | None]:
-    """Names of the variables that are differences; FMPy 0.3.32 overlooks the attribute."""
+    """Names of the variables with relativeQuantity, which FMPy 0.3.32 does not read."""
     return {
         variable.get("name")
         for variable in tree.iterfind("./ModelVariables/*")
@@ -91,9 +92,9 @@ def differences(tree: ElementTree.Element) -> set[str | None]:
 def numbers(
     variable: Any, fmi: str, relative: bool, bounded: bool = False, resized: bool = False
 ) -> Iterator[Scalar]:
-    """The numbers of a variable; entries of an FMI 3.0 array row by row, named from 1. bounded: its
-    `max` is one that a run must keep to. resized: structural parameters are not those that its
-    start values are for, which then are NaN where their number is another."""
+    """The scalars of a variable; entries of an FMI 3.0 array row by row, with indices from 1.
+    bounded: the run has to end if its `max` is exceeded. resized: structural parameters have been
+    changed; start values are NaN if their number does not match the new size."""
     kind = _CALLED.get((fmi, variable.type), variable.type)
     if kind not in TYPES:
         return
@@ -124,8 +125,8 @@ def numbers(
 
 
 def derivatives(model: Any) -> dict[str, str]:
-    """By name, that of the derivative with respect to time: as the attribute says, or der(y), which
-    means the derivative of y where names are structured (FMI 2.0.5 sections 2.2.7 and 2.2.9)."""
+    """By name of an output, the name of its time derivative: by the attribute `derivative`, or
+    der(y) if variable names are structured (FMI 2.0.5 sections 2.2.7 and 2.2.9)."""
     structured = model.variableNamingConvention == "structured"
     found: dict[str, str] = {}
     for variable in model.modelVariables:

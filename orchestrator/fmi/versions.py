@@ -1,4 +1,4 @@
-"""What opens an FMU in this process, by its FMI version."""
+"""The class of an FMU in this process, by FMI version."""
 
 from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.fmi.in_process3 import InProcess3

@@ -1,5 +1,5 @@
 """The process of an isolated FMU: answers the messages of `isolated.Isolated` until it is told to
-close or its caller is gone."""
+close or the calling process has ended."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ class Worker:
         return self.instance.outputs.tobytes()
 
     def step(self, time: float, end: float, size: float) -> Any:
-        """(outputs, or why they cannot be read, whether it has asked to end, time in steps, steps
-        taken in smaller ones)."""
+        """Returns (outputs, or the fault in reading them; whether the FMU has requested the end;
+        time spent in doStep (s); number of steps repeated in smaller ones)."""
         outputs, fault = b"", None
         instance = self.instance
         instance.step(time, end, size)
@@ -96,7 +96,7 @@ def _told(fault: FmuFault) -> tuple[Any, ...]:
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
-    """Answer until `close`, or until there is nobody left to ask."""
+    """Answer requests until `close`, or until the stream ends."""
     worker = Worker()
     call = ""
     while call != "close":
@@ -116,7 +116,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
 
 
 def main() -> None:
-    """Messages come and go by the first two streams; what the FMU prints goes to the third."""
+    """Messages use standard input and output; what the FMU prints goes to standard error."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)  # the caller ends the run, and then this process
     if sys.platform == "linux":

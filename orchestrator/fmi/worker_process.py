@@ -1,6 +1,7 @@
-"""A worker process and the call that it is at: sent, then waited for.
+"""A worker process with at most one pending call.
 
-A watchdog kills a process that is late; the waiting read then ends like any other death.
+A watchdog kills a process that exceeds its time; the pending read then ends as if the process had
+died by itself.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _APART: Any = (
 
 
 class Died(Exception):
-    """The process ended without an answer; says how."""
+    """The process ended without an answer; the message says how."""
 
 
 class Process:
@@ -61,7 +62,7 @@ class Process:
                 return
 
     def _kill(self) -> None:
-        """The process and those that its FMU has started, its group."""
+        """Kill the process group: the process and those that its FMU has started."""
         if sys.platform == "win32":
             self._popen.kill()
         else:
@@ -69,7 +70,7 @@ class Process:
                 os.killpg(self._popen.pid, signal.SIGKILL)
 
     def send(self, message: Any, allowed: float) -> None:
-        """Raises Died. The answer may take `allowed` seconds from now."""
+        """Send a call, whose answer may take `allowed` s. Raises Died."""
         self._allowed, self._sent, self.busy = allowed, monotonic(), True
         try:
             pickle.dump(message, self._requests)
@@ -78,7 +79,7 @@ class Process:
             raise self._died() from None
 
     def answer(self, allowed: float | None = None) -> Any:
-        """Raises Died. `allowed`: seconds from now instead."""
+        """Wait for the answer, if given for another `allowed` s. Raises Died."""
         now = monotonic()
         if allowed is not None:
             self._allowed, self._sent = allowed, now
@@ -103,8 +104,8 @@ class Process:
         return Died(f"ended with exit status {code}")
 
     def end(self) -> int:
-        """The exit status of a process that has nothing more to do; killed where it lingers, and
-        so is what it leaves behind."""
+        """Wait for the process to end, kill it and its group if it does not, and return its exit
+        status."""
         self._ended.set()
         for stream in (self._requests, self._answers):
             with suppress(OSError):  # bytes that a dead process has not taken
