@@ -92,7 +92,7 @@ def near(name: str, known: Iterable[str]) -> str:
     known = list(known)
     found = difflib.get_close_matches(name[:MOST], known[:MOST], 1)
     more = f" and {len(known) - MOST} more" if len(known) > MOST else ""
-    there = ", ".join(known[:MOST]) or "none"
+    there = ", ".join(each[:MOST] for each in known[:MOST]) or "none"
     return f"did you mean {found[0]!r}?" if found else f"there are {there}{more}"
 
 

@@ -12,9 +12,9 @@ SHOWN, COUNTED = 20, 1000
 """Findings of a scene that are shown, and that are looked for."""
 
 
-def shortened(text: str) -> str:
+def shortened(text: str, most: int = 100) -> str:
     """What somebody wrote, as much of it as makes it known again."""
-    return text if len(text) <= 100 else f"{text[:97]}..."
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 class Fault(Exception):
@@ -50,7 +50,8 @@ class Finding:
         line = f"line {self.line}" if self.line else ""
         place = ", ".join(part for part in (self.file, line) if part)
         place = shortened(self.option) if self.option else place
-        return ": ".join(part for part in (place, shortened(self.key), self.message) if part)
+        message = shortened(self.message, 1000)
+        return ": ".join(part for part in (place, shortened(self.key), message) if part)
 
 
 class SceneFault(InputFault):
