@@ -19,9 +19,9 @@ WARNING = 1
 
 
 class Varying:
-    """Inputs with their time derivatives: rows of (scalar, order, index in the signal vector), order
-    0 first. Values hold at the beginning of a step (FMI 2.0.5 section 4.2.1); if a step is taken in
-    parts, `renew` extrapolates them to the beginning of each part.
+    """Inputs with their time derivatives: rows of (scalar, order, index in the signal vector),
+    order 0 first. Values hold at the beginning of a step (FMI 2.0.5 section 4.2.1); if a step is
+    taken in parts, `renew` extrapolates them to the beginning of each part.
     """
 
     name = "fmi2SetRealInputDerivatives"
