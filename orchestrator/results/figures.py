@@ -34,8 +34,9 @@ def figures(results: Results) -> dict[str, Figure]:
     drawn: dict[str, Figure] = {}
     if not last_time(results):
         return drawn
-    if coordinates := table_of(results, COORDINATES):
-        drawn["mechanism"] = _mechanism(results, coordinates)
+    linkage = _part(results, "linkage", Linkage)  # an SSP has the block, but not its description
+    if linkage and (coordinates := table_of(results, COORDINATES)):
+        drawn["mechanism"] = _mechanism(results, linkage, coordinates)
     if table_of(results, MECHANISM):
         drawn["trajectories"] = _trajectories(results)
         if table_of(results, DEVICE):
@@ -67,8 +68,7 @@ def _part(results: Results, name: str, kind: Any) -> Any:
     return TypeAdapter(kind | None).validate_python(results.run["scene"][name])
 
 
-def _mechanism(results: Results, table: Table) -> Figure:
-    linkage: Linkage = _part(results, "linkage", Linkage)
+def _mechanism(results: Results, linkage: Linkage, table: Table) -> Figure:
     q = table[COORDINATES]
     title = f"{results.run['scene']['title']} at the start and at {short(last_time(results))} s"
     figure, axes = titled(results, title, "x (mm)", "y (mm)")

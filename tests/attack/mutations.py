@@ -83,7 +83,7 @@ def near(value: Any, draw: random.Random) -> Any:
     if isinstance(value, bool):
         return not value
     if isinstance(value, int | float):
-        factor = draw.choice((-1, 0.5, 2, 10, 1e-3, 1e3, 1e-6, 1e6, 1e-12, 1e12))
+        factor = draw.choice((-1, 0.5, 0.9, 1.1, 2, 10, 1e-3, 1e3, 1e-6, 1e6, 1e-12, 1e12))
         return draw.choice((value * factor, value + 1, round(value) if abs(value) < 1e9 else 0))
     if isinstance(value, str):
         return text(value, draw)

@@ -73,13 +73,14 @@ def _keys(draw: random.Random) -> tuple[str, Any]:
 def _value(old: Any, draw: random.Random) -> str:
     pool = (*mutations.NUMBERS, *mutations.TEXTS, *mutations.TABLES)
     near = mutations.near(old, draw)
-    value = draw.choice((old, near, near, near, draw.choice(pool), draw.choice(pool)))
+    value = draw.choice((old, near, near, near, draw.choice(pool)))
     said = draw.choice((str(value), repr(value)))
     return mutations.text(said, draw) if draw.random() < 0.2 else said
 
 
-def _range(draw: random.Random) -> str:
-    a, b, c = (draw.choice(NUMBERS) for _ in range(3))
+def _range(old: Any, draw: random.Random) -> str:
+    about = (str(mutations.near(old, draw)) for _ in range(3))
+    a, b, c = about if draw.random() < 0.5 else (draw.choice(NUMBERS) for _ in range(3))
     return draw.choice((f"{a}..{b}", f"{a}..{b}..{c}", f"{a}..{b}:{c}", f"{a},{b},{c}", a))
 
 
@@ -91,11 +92,12 @@ def arguments(kind: str, out: Path, draw: random.Random) -> list[str]:
         found = ["run", scene, *short]
         for _ in range(draw.choice((1, 1, 2))):
             key, old = _keys(draw)
-            found += ["--set", draw.choice((f"{key}={_value(old, draw)}", key))]
+            given = f"{key}={_value(old, draw)}"
+            found += ["--set", given if draw.random() < 0.8 else key]
         return found
     if kind == "vary":
         key, old = _keys(draw)
-        values = draw.choice((_range(draw), _value(old, draw)))
+        values = draw.choice((_range(old, draw), _value(old, draw)))
         values = mutations.text(values, draw) if draw.random() < 0.3 else values
         return ["sweep", scene, *short, "--jobs", "1", "--vary", f"{key}={values}"]
     found = [draw.choice(("run", "info", "export", "build", "sweep", "schema")), scene, *short]

@@ -128,7 +128,7 @@ def test_a_recorded_trace_is_a_list_of_frames_beside_its_scene(tmp_path: Path) -
     ("text", "why"),
     [
         ("time\n0.1\nsoon", "line 3: 'soon' is no time"),
-        ("0.2\n0.1", "line 2: 0.1 s does not come after 0.2 s"),
+        ("0.2\n0.1", "line 2: 0.1 s is not after 0.2 s"),
         ("0.1", "1 time stamps"),
     ],
 )

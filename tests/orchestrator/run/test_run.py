@@ -144,9 +144,19 @@ def test_an_fmu_that_cannot_be_loaded_is_named_and_leaves_nothing(
     assert left_behind() == before
 
 
-def test_a_full_disk_is_a_fault(slave: Slave, tmp_path: Path) -> None:
-    plan, before = alone(slave("Full"), steps=600), left_behind()
-    (tmp_path / f".haptics.csv.{os.getpid()}").symlink_to("/dev/full")  # until the first row
+def test_a_full_disk_is_a_fault(
+    slave: Slave, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the second row on: the published table is a link to a device that is always full."""
+    plan, before, replace = alone(slave("Full"), steps=600), left_behind(), os.replace
+
+    def full(source: Path, target: Path) -> None:
+        replace(source, target)
+        if target.name == "haptics.csv":
+            target.unlink()
+            target.symlink_to("/dev/full")
+
+    monkeypatch.setattr(os, "replace", full)
     outcome = run(plan, RunFolder(tmp_path))
     assert "No space left on device" in str(outcome.fault)
     assert left_behind() == before
