@@ -150,6 +150,7 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
         },
         "iterations": outcome.iterations and asdict(outcome.iterations),
         "unstable": unstable(outcome.energies),
+        "step_errors": {name: asdict(errors) for name, errors in outcome.step_errors.items()},
         "controlled_steps": {clock: asdict(steps) for clock, steps in outcome.steps.items()},
     } | energies(system, outcome.energies)
 

@@ -68,6 +68,8 @@ def lines(results: Results) -> Iterator[str]:
         yield f"{fmu}: {count} steps were discarded and repeated with smaller ones"
     if (found := run["iterations"]) and found["unconverged"]:
         yield f"{found['unconverged']} of {found['steps']} iterated steps did not converge"
+    for fmu, errors in run.get("step_errors", {}).items():
+        yield from long_steps(fmu, errors)
     for clock, steps in run["controlled_steps"].items():
         if steps["forced"]:
             few = f"{steps['forced']} of {steps['taken']} steps were accepted at the smallest size"
@@ -83,6 +85,23 @@ def lines(results: Results) -> Iterator[str]:
         misfits = [f"{name} ({why['reason']})" for name, why in group]
         more = f" and {len(misfits) - 1} more" if len(misfits) > 1 else ""
         yield f"hold {hold} does not fit {misfits[0]}{more}: zoh there"
+
+
+LARGEST, MEDIAN = 0.1, 1e-3
+"""Bounds of a step's relative error (`step_check`): for a single one, which may be an impact, and
+for the median."""
+
+
+def long_steps(fmu: str, errors: Mapping[str, Any]) -> Iterator[str]:
+    """A line if the steps of an FMU were too long for its equations."""
+    if errors["largest"] <= LARGEST and errors["median"] <= MEDIAN:
+        return
+    yield (
+        f"warning: steps of {fmu} are too long: with half of them {errors['output']} changes by up "
+        f"to {100 * errors['largest']:.2g} % of its largest value (in the median "
+        f"{100 * errors['median']:.2g} %, most at {errors['time']:.4g} s): take more "
+        "mechanism.substeps or a higher rate"
+    )
 
 
 def replaced(found: Mapping[str, Any]) -> Iterator[str]:

@@ -93,7 +93,7 @@ class Binder:
     def _step(self, fmu: str, dticks: int, part: int, parts: int) -> Call:
         simulation = self._simulation
         step, seconds = simulation.instances[fmu].step, simulation.seconds
-        size = seconds(dticks)
+        size, check = seconds(dticks), simulation.step_checks.get(fmu)
         # A sampled output is stamped at the start of its step.
         valid = 0 if simulation.system.fmu[fmu].sampled else dticks
         if parts > 1:
@@ -105,6 +105,13 @@ class Binder:
                 step(float(start * base), float((start + dticks) * base), size)
 
             return substep
+        if check:
+
+            def checked(tick: int) -> None:
+                time, end = seconds(tick), seconds(tick + dticks)
+                check.around(lambda: step(time, end, size), time, end)
+
+            return checked
         return lambda tick: step(seconds(tick), seconds(tick + valid), size)
 
     def _push(self, connection: str, ahead: int) -> Call:

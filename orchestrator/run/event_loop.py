@@ -30,6 +30,7 @@ from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.fixed_point import Iterations, total
 from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.run.step_check import StepErrors
 from hapticlink.orchestrator.run.step_control import Steps
 from hapticlink.orchestrator.system.haptic_loop import WORKSPACE
 
@@ -63,6 +64,7 @@ class Outcome:
     links: dict[str, dict[str, int]] = field(default_factory=dict)
     iterations: Iterations | None = None
     steps: dict[str, Steps] = field(default_factory=dict)
+    step_errors: dict[str, StepErrors] = field(default_factory=dict)
 
 
 def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Outcome:
@@ -116,6 +118,8 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
             outcome.calls = bound.counts()
             outcome.steps = bound.steps()
             outcome.iterations = bound.iterations()
+            found = {n: check.errors() for n, check in simulation.step_checks.items()}
+            outcome.step_errors = {n: errors for n, errors in found.items() if errors}
             if outcome.fault is None and (why := _judged(outcome, simulation)):
                 outcome.reason, outcome.fault = "diverged", why
     if progress:

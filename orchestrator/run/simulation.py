@@ -16,6 +16,7 @@ from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.open_fmus import instance, isolated
 from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.step_check import StepCheck
 from hapticlink.orchestrator.system.system import Connection, System
 
 Call = Callable[[int], object]
@@ -41,6 +42,11 @@ class Simulation:
             made = instance(fmu, view, system.faults, fmu.name in self.isolated)
             self.instances[fmu.name] = stack.enter_context(made)
         stack.callback(self._dismiss)
+        self.step_checks = {
+            fmu.name: StepCheck(self.instances[fmu.name])
+            for fmu in system.fmus
+            if fmu.name not in self.isolated and StepCheck.possible(fmu.description)
+        }
         self.holds, self.springs = make_holds(system, self.signals)
         self.meters = Meters(system, self.signals)
         self.balance = Balance(system, self.signals)

@@ -1,0 +1,142 @@
+"""Estimates the integration error of plants during a run, by step doubling on a few of their steps.
+
+e_k = |v(t_k + h) - v_2(t_k + h)| / max_k |v|
+
+v are the outputs that are first derivatives of others, v_2 the same after two steps of h/2 from
+the same FMU state with the same inputs (Hairer, Norsett, Wanner, Solving Ordinary Differential
+Equations I (1993), section II.4, without the factor 1/(1 - 2^-p): a step may be too long for its
+order p to show). e_k of about 1 is a step beyond the stability of its method, as with a stiff drive
+at a light body; an impact gives a single e_k that halves with h.
+
+The state is restored before the step that counts, so that results do not depend on the check. Only
+FMUs with a hapticlink annotation are checked: others may keep what they do not restore.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.fmi import capabilities
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.instance import Instance, Vector
+
+EVERY = 67
+"""One step in so many is checked: two half steps, a saved state and two reads cost below 5 %. A
+prime, so that checks fall on all phases between two rates."""
+FIRST = 13
+SLOT = 2
+"""Slot of the saved FMU state, beside those of iteration and step control."""
+AT_REST = 1e-6
+"""Rate (1/s), relative to the magnitude of the output itself, below which it is at rest."""
+
+Call = Callable[[int], object]
+
+
+@dataclass(frozen=True)
+class StepErrors:
+    """Of the steps of an FMU, `size` (s) the longest checked: median and largest e_k, and the
+    output and time (s) of the largest."""
+
+    checked: int
+    median: float
+    largest: float
+    output: str
+    time: float
+    size: float
+
+
+class StepCheck:
+    """Checks one in EVERY steps of an FMU for which `possible` is true."""
+
+    def __init__(self, instance: Instance) -> None:
+        self._instance = instance
+        names = [s.name for s in instance.description.outputs]
+        pairs = _first_derivatives(instance.description)
+        self._bases = np.array([names.index(base) for base, _ in pairs], dtype=np.intp)
+        self._rates = np.array([names.index(rate) for _, rate in pairs], dtype=np.intp)
+        ports = [_port(rate) for _, rate in pairs]
+        self._ports = sorted(set(ports))
+        self._port = np.array([self._ports.index(p) for p in ports], dtype=np.intp)
+        self._scales = np.zeros(len(self._ports))
+        self._steps = 0
+        self._errors: list[Vector] = []
+        self._times: list[float] = []
+        self._size = 0.0
+
+    @staticmethod
+    def possible(description: Description) -> bool:
+        """Whether an FMU is a plant of this project whose state can be restored."""
+        return (
+            description.declares_timing
+            and description.timing == "continuous"
+            and capabilities.restores_state(description)
+            and capabilities.varies_step(description)
+            and bool(_first_derivatives(description))
+        )
+
+    def around(self, step: Callable[[], object], time: float, end: float) -> None:
+        """Call `step`, which takes the FMU from `time` to `end` (s), and check it if it is due."""
+        self._steps += 1
+        if self._steps % EVERY != FIRST:
+            step()
+            return
+        instance, outputs = self._instance, self._instance.outputs
+        before = outputs.copy()
+        instance.save(SLOT)
+        halves = self._halves(time, end)
+        instance.rollback(SLOT)
+        step()
+        instance.read()
+        if halves is not None:
+            self._compare(outputs, halves, time, end)
+        outputs[:] = before
+
+    def _halves(self, time: float, end: float) -> Vector | None:
+        """The outputs at `end` after two steps; None where one of these fails."""
+        instance, half = self._instance, (end - time) / 2
+        try:
+            instance.step(time, time + half, half)
+            instance.step(time + half, end, half)
+            instance.read()
+        except FmuFault:
+            return None
+        return instance.outputs.copy()
+
+    def _compare(self, whole: Vector, halves: Vector, time: float, end: float) -> None:
+        rates, found = whole[self._rates], np.zeros(len(self._ports))
+        size = np.maximum(np.abs(rates), AT_REST * np.abs(whole[self._bases]))
+        np.maximum.at(self._scales, self._port, size)
+        np.maximum.at(found, self._port, np.abs(rates - halves[self._rates]))
+        if np.all(np.isfinite(found)):
+            self._errors.append(found)
+            self._times.append(time)
+            self._size = max(self._size, end - time)
+
+    def errors(self) -> StepErrors | None:
+        """What was found; None before the first check."""
+        if not self._errors:
+            return None
+        share = np.array(self._errors) / np.where(self._scales > 0, self._scales, 1.0)
+        k, port = np.unravel_index(int(share.argmax()), share.shape)
+        return StepErrors(
+            checked=len(share),
+            median=float(np.median(share.max(axis=1))),
+            largest=float(share[k, port]),
+            output=self._ports[port],
+            time=self._times[k],
+            size=self._size,
+        )
+
+
+def _first_derivatives(description: Description) -> list[tuple[str, str]]:
+    """Outputs with their derivatives, the first in time: derivatives of these are no states."""
+    rates = set(description.derivatives.values())
+    return [(y, dy) for y, dy in description.derivatives.items() if y not in rates]
+
+
+def _port(name: str) -> str:
+    return name.partition("[")[0]
