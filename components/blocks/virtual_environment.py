@@ -86,7 +86,7 @@ def virtual_environment(
         found = constrained_directions(block, space, q0, q1)
         initial["n_constrained"], step["n_constrained"] = found.first, found.after
         output |= found.output
-    if linkage.loop:
+    if linkage.closed:
         output |= _branch(block, model)
     if contacts:
         output["contacts"] = contact_forces.detected(model, contacts)
@@ -121,7 +121,7 @@ def _outputs(linkage: Linkage, units: tuple[str, ...]) -> list[Variable]:
 
 
 def _branch_outputs(linkage: Linkage) -> list[Variable]:
-    if not linkage.loop:
+    if not linkage.closed:
         return []
     return [
         Variable("branch_ok", description="1 on the mechanism's branch, 0 folded"),

@@ -106,7 +106,7 @@ def virtual_mechanism(
         "a_bias": space.a_bias,
         "energy": energy,
     }
-    if linkage.loop:
+    if linkage.closed:
         output |= {"lambda": multipliers, "closure_error": model.closure_error}
         output |= closure_diagnostics.values(space.solver) if mechanism.diagnostics else {}
     output |= further_points.values(space, directions is not None)
@@ -174,7 +174,7 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
     outputs += further_points.outputs(linkage, directions is not None)
     if parts.frame_s:
         inputs += local_model.ports(linkage)
-    if linkage.loop and parts.mechanism.diagnostics:
+    if linkage.closed and parts.mechanism.diagnostics:
         outputs += closure_diagnostics.outputs()
     memory = states(linkage)
     if contacts or directions:
@@ -211,10 +211,10 @@ def _step(
         efforts = ca.substitute(efforts, model.tabled, time_tables.within(tables, over, t))
         u, given = ca.vertcat(u, over), ca.vertcat(u, time_tables.over(tables, t, block.h))
     closing = -space.terms.w
-    if model.linkage.loop and mechanism.stabilization == "baumgarte":
+    if model.linkage.closed and mechanism.stabilization == "baumgarte":
         alpha, beta = block.p["alpha"], block.p["beta"]
         closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
-    if model.linkage.loop and mechanism.formulation == "embedding":
+    if model.linkage.closed and mechanism.formulation == "embedding":
         pushing = ca.Function("efforts", [x, u, p, t], [efforts], {"cse": True})
         embedded = Embedding(
             model, block.p, independent_coordinates.start_pose(model, block.p), pushing
@@ -223,7 +223,7 @@ def _step(
     extrapolates = integrators.METHODS[mechanism.integrator].extrapolates
     qdd = space.solver.follow(efforts, closing, refined=extrapolates)
     ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
-    if model.linkage.loop and mechanism.formulation == "partitioning":
+    if model.linkage.closed and mechanism.formulation == "partitioning":
         parted = Partitioning(
             model, block.p, independent_coordinates.start_pose(model, block.p), ode
         )

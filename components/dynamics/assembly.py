@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from hapticlink.components.component import Component
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, UnitInertia
+from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import COORDINATES, coordinates, loop_name
+from hapticlink.components.linkage.parameters import COORDINATES, coordinates
 from hapticlink.components.specs.linkage import Linkage
 
 STEPS = 12
@@ -38,12 +39,12 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     """Expressions of q and qd with h = 0 and W qd = 0: q by least-norm steps from the model's own,
     qd with the rates of `start_velocity`, or the nearest ones if these are not consistent."""
     q, qd = model.q, model.qd
-    if not model.linkage.loop:
+    if not model.linkage.closed:
         return q, qd
-    n = q.numel()
+    n, count = q.numel(), rows(model.linkage)
     symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
     at = LinkageModel(model.linkage, model.p, *symbols)
-    least = ClosedLoopSolver(UnitInertia(n), at.W, MU)
+    least = ClosedLoopSolver(UnitInertia(n), at.W, count, MU)
     parameters = model.p.vector
     shared = {"cse": True}
     newton = ca.Function(
@@ -59,7 +60,7 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     solvers = [least]
     if model.linkage.start_velocity:
         Z = ca.diag(ca.SX(1.0 - _given(model.linkage)))
-        solvers = [ClosedLoopSolver(UnitInertia(n), ca.sparsify(at.W @ Z), MU), least]
+        solvers = [ClosedLoopSolver(UnitInertia(n), ca.sparsify(at.W @ Z), count, MU), least]
     for project in map(projected, solvers):
         for _ in range(RATE_STEPS):
             qd = project(q, qd, parameters)
@@ -79,13 +80,13 @@ def require_assembled(component: Component, model: LinkageModel) -> None:
     n = model.q.numel()
     start = component.initialize(component.start_inputs, component.start_parameters)
     q, qd = start[:n], np.array(start[n : 2 * n]).ravel()
-    gaps = ca.Function("h", [model.q, model.p.vector], [model.h])(q, component.start_parameters)
-    for i, loop in enumerate(model.linkage.loop):
-        left = float(ca.norm_2(gaps[2 * i : 2 * i + 2]))
+    gaps = [ca.norm_2(closure.h) for closure in model.closures]
+    at = ca.Function("gaps", [model.q, model.p.vector], [ca.vertcat(ca.SX(0, 1), *gaps)])
+    left_open = np.array(at(q, component.start_parameters)).ravel().tolist()
+    for closure, left in zip(model.closures, left_open, strict=True):
         if not left < TOLERANCE:
-            name = loop_name(model.linkage, i)
             raise AssemblyError(
-                f"loop `{name}` ({loop.bodies[0]} to {loop.bodies[1]}) does not close: "
+                f"loop `{closure.name}` ({closure.joins}) does not close: "
                 f"{left:.3g} m are left from the start pose given; "
                 "check the lengths, or start nearer to a closed pose"
             )

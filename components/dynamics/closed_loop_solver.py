@@ -8,7 +8,7 @@ Optim. 5, 1995), and iterative refinement on the unregularised system or proxima
 effect of mu again. There is no pivoting and no branch: redundant and singular closures cost the
 same as regular ones.
 
-mu is relative to the mean of S_ii over the two rows of each loop, so that loops of heavy and of
+mu is relative to the mean of S_ii over the rows of each closure, so that loops of heavy and of
 light links count alike, independently of the frame. Where an eigenvalue sigma^2 of S, scaled so, is
 below mu, the closure does not act along its direction. The right mu near a singular pose depends on
 the right-hand side. W D^-1 b is in the range of W by construction, and cutting it would leave the
@@ -20,7 +20,9 @@ and is meant for accelerations that are integrated.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
+from itertools import accumulate
 from typing import Protocol
 
 import casadi as ca
@@ -30,7 +32,7 @@ from hapticlink.components.dynamics.articulated_body import symmetric
 ROUNDING = 1e-16  # of S: a loop whose rows are all below it is ignored
 TINY = 1e-200
 
-# Relative to the mean of S_ii over a loop's rows.
+# Relative to the mean of S_ii over a closure's rows.
 PIVOT = 1e-15
 MU_FOLLOWING = 1e-6  # for c in `follow`
 MU_MULTIPLIERS = 1e-9  # for multipliers of least norm: rounding along null(W') is divided by it
@@ -65,13 +67,12 @@ class UnitInertia:
         return u
 
 
-def loop_scale(S: ca.SX) -> ca.SX:
-    """Mean of S_ii over the two rows of each loop, m x 1; independent of the frame's rotation."""
-    m = S.shape[0]
-    least = ROUNDING * ca.trace(S) / m + TINY
-    pairs = [ca.diag(S)[i : i + 2] for i in range(0, m, 2)]
-    scales = [(pair, ca.fmax(ca.sum1(pair) / pair.numel(), least)) for pair in pairs]
-    return ca.vertcat(*(ca.repmat(scale, pair.numel()) for pair, scale in scales))
+def closure_scale(S: ca.SX, rows: Sequence[int]) -> ca.SX:
+    """Mean of S_ii over the rows of each closure, m x 1; independent of the frame's rotation."""
+    least = ROUNDING * ca.trace(S) / S.shape[0] + TINY
+    parts = ca.vertsplit(ca.densify(ca.diag(S)), [0, *accumulate(rows)])
+    scales = [ca.fmax(ca.sum1(part) / part.numel(), least) for part in parts]
+    return ca.vertcat(*(ca.repmat(s, k) for s, k in zip(scales, rows, strict=True)))
 
 
 class Factored:
@@ -123,9 +124,12 @@ class Regularised(Factored):
 
 
 class ClosedLoopSolver:
-    """Factors of D and W (m x n); for m = 0 it applies D^-1."""
+    """Factors of D and W (m x n), with the number of rows of each closure; for m = 0 it applies
+    D^-1."""
 
-    def __init__(self, inertia: Inertia, W: ca.SX, mu: float | None = None) -> None:
+    def __init__(
+        self, inertia: Inertia, W: ca.SX, rows: Sequence[int], mu: float | None = None
+    ) -> None:
         self.inertia, self.W, self.m = inertia, W, W.shape[0]
         self._d_inv = ca.diag(1 / (inertia.d + inertia.k))
         self._light = inertia.k.sparsity().row()
@@ -133,14 +137,16 @@ class ClosedLoopSolver:
             self._Z = inertia.inward(W.T)
             self._Y = self._d_inv @ self._Z
             self.S = symmetric(self._Z.T @ self._Y)
-            scale = loop_scale(self.S)
+            self.scale = closure_scale(self.S, rows)
             self._sharp = (
-                Factored(self.S, PIVOT * scale) if mu is None else Regularised(self.S, mu * scale)
+                Factored(self.S, PIVOT * self.scale)
+                if mu is None
+                else Regularised(self.S, mu * self.scale)
             )
 
     @cached_property
     def _following(self) -> Regularised:
-        return Regularised(self.S, MU_FOLLOWING * loop_scale(self.S))
+        return Regularised(self.S, MU_FOLLOWING * self.scale)
 
     @cached_property
     def _left_free(self) -> Factored:

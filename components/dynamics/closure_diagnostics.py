@@ -20,9 +20,9 @@ import casadi as ca
 
 from hapticlink.components.component import Variable
 from hapticlink.components.dynamics.articulated_body import symmetric
-from hapticlink.components.dynamics.closed_loop_solver import TINY, ClosedLoopSolver, loop_scale
+from hapticlink.components.dynamics.closed_loop_solver import TINY, ClosedLoopSolver
 
-# Relative to the mean of S_ii over a loop's rows.
+# Relative to the mean of S_ii over a closure's rows.
 TOLERANCE = 1e-9
 MU = 1e-13  # replaces the pivot of a dependent closure, far below TOLERANCE
 ITERATIONS = 30
@@ -37,7 +37,7 @@ def outputs() -> list[Variable]:
 
 
 def values(solver: ClosedLoopSolver) -> dict[str, ca.SX]:
-    S, m, scale = solver.S, solver.m, loop_scale(solver.S)
+    S, m, scale = solver.S, solver.m, solver.scale
     d, upper, _ = ca.ldl(ca.sparsify(S + MU * ca.diag(scale)), False)
     pivots = ca.vec(d)
     counted = ca.if_else(pivots > TOLERANCE * scale, 1, 0)

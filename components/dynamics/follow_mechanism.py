@@ -23,6 +23,7 @@ from hapticlink.components.component import POSE, TWIST, Block, Variable
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.projection import MU, projection
+from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
@@ -37,7 +38,7 @@ def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
     q_ref = Variable("q_ref", (n,), units, description="the mechanism's coordinates")
     qd_ref = Variable("qd_ref", (n,), rates, description="the mechanism's joint rates")
     if copy.sync == "operational":
-        return [x_ref, v_ref, *([q_ref] if linkage.loop else [])]
+        return [x_ref, v_ref, *([q_ref] if linkage.closed else [])]
     return [q_ref, qd_ref]
 
 
@@ -75,13 +76,13 @@ def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX,
     u, p, h, q, qd = block.u, block.p, block.h, model.q, model.qd
     D = TreeInertia(model)
     if joint_sync:
-        solver = ClosedLoopSolver(D, model.W, MU)
+        solver = ClosedLoopSolver(D, model.W, rows(model.linkage), MU)
         pull = D.apply(p["K_g"] * (u["q_ref"] - q) + p["B_g"] * u["qd_ref"])
         weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
         K_g, B_g = ca.diag(p["K_g"]), ca.diag(p["B_g"])
         held = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
-        solver = ClosedLoopSolver(TreeInertia(model, held), model.W, MU)
+        solver = ClosedLoopSolver(TreeInertia(model, held), model.W, rows(model.linkage), MU)
         pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
         weight = ca.SX(1)
     momentum = D.apply(qd) + h * (pull - model.C_qd)

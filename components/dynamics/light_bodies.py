@@ -29,8 +29,8 @@ def groups(linkage: Linkage) -> list[list[Joint]]:
     """Groups of joints whose loops are connected by shared joints; each joint of a loop is in one
     group."""
     found: list[set[str]] = []
-    for loop in linkage.loop:
-        cycle = _way(linkage, loop.bodies[0]) ^ _way(linkage, loop.bodies[1])
+    cycles = [_way(linkage, a) ^ _way(linkage, b) for a, b in (o.bodies for o in linkage.loop)]
+    for cycle in (*cycles, *(set(gear.joints) for gear in linkage.gear)):
         shared = [group for group in found if group & cycle]
         found = [group for group in found if not group & cycle] + [cycle.union(*shared)]
     return [[j for j in linkage.joint if j.name in group] for group in found]

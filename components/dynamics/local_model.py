@@ -21,6 +21,7 @@ from hapticlink.components.dynamics.assembly import assemble
 from hapticlink.components.dynamics.light_bodies import added_inertia
 from hapticlink.components.dynamics.operational_space import Terms
 from hapticlink.components.dynamics.variables import parameters, start_parameters
+from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.linkage import Linkage
@@ -29,7 +30,7 @@ from hapticlink.components.specs.linkage import Linkage
 def ports(linkage: Linkage) -> list[Variable]:
     """The inputs D (n x n), W (m x n), w (m) and J_h (3 x n); their start values are those of the
     assembled start pose."""
-    units, m = coordinate_units(linkage), 2 * len(linkage.loop)
+    units, m = coordinate_units(linkage), sum(rows(linkage))
     n = len(units)
     lengths = tuple("m" if unit == "rad" else "1" for unit in units)
     turns = tuple("1" if unit == "rad" else "1/m" for unit in units)
@@ -49,7 +50,7 @@ def ports(linkage: Linkage) -> list[Variable]:
 def values(model: LinkageModel) -> dict[str, ca.SX]:
     """The values of these ports at the model's pose, for the virtual environment."""
     found = {"D": model.D, "J_h": model.J_h}
-    return found | {"W": model.W, "w": model.w} if model.linkage.loop else found
+    return found | {"W": model.W, "w": model.w} if model.linkage.closed else found
 
 
 def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
@@ -98,7 +99,7 @@ class DenseInertia:
 
 def held(model: LinkageModel, u: Mapping[str, ca.SX]) -> Terms:
     """The terms of (B.15) from the ports `u`."""
-    n, loop = model.q.numel(), bool(model.linkage.loop)
+    n, loop = model.q.numel(), model.linkage.closed
     W = u["W"] if loop else ca.SX(0, n)
     return Terms(
         inertia=DenseInertia(u["D"], added_inertia(model, W), model.leaf_to_root),

@@ -17,6 +17,7 @@ import casadi as ca
 
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
+from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 
 REPEATS = 3  # for the pose
@@ -28,10 +29,10 @@ def projection(model: LinkageModel, inertia: TreeInertia) -> ca.Function:
     """The function (q, qd, p) -> (q, qd) that projects onto h(q) = 0 and W(q) qd = 0; the identity
     for a linkage without loops. inertia: the model's own."""
     p, closed, rate = model.p.vector, model.q, model.qd
-    if model.linkage.loop:
+    if model.linkage.closed:
         h = ca.Function("h", [model.q, p], [model.h])
         W = ca.Function("W", [model.q, p], [model.W])
-        solver = ClosedLoopSolver(inertia, model.W, MU)
+        solver = ClosedLoopSolver(inertia, model.W, rows(model.linkage), MU)
         for _ in range(REPEATS):
             closed = closed - solver.constrain(h(closed, p))
         W_closed = W(closed, p)

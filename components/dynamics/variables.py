@@ -5,6 +5,7 @@ from __future__ import annotations
 from hapticlink.components import forces
 from hapticlink.components.component import ACCELERATION, MOBILITY, POSE, TWIST, Variable
 from hapticlink.components.dynamics.stabilization import Baumgarte
+from hapticlink.components.linkage.closures import gear_parameters, rows
 from hapticlink.components.linkage.parameters import (
     body_parameters,
     coordinate_units,
@@ -16,7 +17,7 @@ from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 
 def parameters(linkage: Linkage) -> tuple[Variable, ...]:
     """Parameters of the linkage: masses, geometry, and those of its forces."""
-    return (*body_parameters(linkage), *forces.parameters(linkage))
+    return (*body_parameters(linkage), *gear_parameters(linkage), *forces.parameters(linkage))
 
 
 def mechanism_parameters(
@@ -25,7 +26,7 @@ def mechanism_parameters(
     """Parameters of the virtual mechanism; `default` are the Baumgarte gains for steps of period_s
     (s), for alpha and beta that the scene does not give."""
     found = [*parameters(linkage), *start_parameters(linkage)]
-    if linkage.loop and mechanism.stabilization == "baumgarte":
+    if linkage.closed and mechanism.stabilization == "baumgarte":
         alpha = default.alpha_T / period_s if mechanism.alpha is None else mechanism.alpha
         beta = default.beta if mechanism.beta is None else mechanism.beta
         found.append(Variable("alpha", (), "1/s", alpha, "Baumgarte frequency of (3.3)"))
@@ -66,7 +67,7 @@ def states(linkage: Linkage) -> list[Variable]:
 
 
 def motion_outputs(linkage: Linkage) -> list[Variable]:
-    units, m = coordinate_units(linkage), 2 * len(linkage.loop)
+    units, m = coordinate_units(linkage), sum(rows(linkage))
     n = (len(units),)
     found = [
         Variable("x", (3,), POSE, description="pose of the operational point"),

@@ -30,10 +30,14 @@ def find_dyads(model: LinkageModel, start: np.ndarray) -> list[Dyad]:
     the reason for each candidate.
     """
     linkage, n = model.linkage, model.q.numel()
+    if linkage.gear:
+        raise ValueError(f"gears have no dyad, and with them no closed form: {OTHERS}")
     taken: dict[str, str] = {}
     found: list[Dyad] = []
     for i, loop in enumerate(linkage.loop):
         name = loop_name(linkage, i)
+        if loop.type != "revolute":
+            raise ValueError(f"loop `{name}`: a {loop.type} cut has no closed form; {OTHERS}")
         fit: list[tuple[bool, float, Candidate]] = []
         reasons: list[str] = []
         for dyad, known in _candidates(linkage, i):

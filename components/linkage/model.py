@@ -1,6 +1,7 @@
 """Kinematics and Lagrangian terms of a planar linkage, by differentiation of the kinematics.
 
-q are relative joint coordinates of the tree; loops are closed by the constraints h(q) = 0 (2.13).
+q are relative joint coordinates of the tree; loops are closed by the constraints h(q) = 0 (2.13),
+closures.py.
 The terms of (2.3), D qdd + C qd + g = J_h' F_h + W' lambda:
 
     D   = sum_i m_i J_i' J_i + I_i J_theta,i' J_theta,i       (2.7), (2.10)
@@ -18,7 +19,8 @@ from functools import cached_property
 import casadi as ca
 
 from hapticlink.components.component import Signals
-from hapticlink.components.linkage.parameters import COORDINATES, loop_name
+from hapticlink.components.linkage.closures import Closure, closures
+from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.linkage import Joint, Linkage
 
 
@@ -47,7 +49,7 @@ def _rotation(angle: ca.SX) -> ca.SX:
 class LinkageModel:
     """The terms of (2.3) at q and qd, each built when it is first used.
 
-    q, qd: n x 1. p: the parameters by name. D is n x n, W is m x n (two rows per loop), J_h is
+    q, qd: n x 1. p: the parameters by name. D is n x n, W is m x n, J_h is
     3 x n. tabled: (y, y') of the drives' tables at the instant t (s), by default NaN. Raises
     ValueError for bodies that no chain of joints connects to the ground.
     """
@@ -191,18 +193,13 @@ class LinkageModel:
         return 0.5 * ca.dot(weights, self.rate(poses) ** 2)
 
     @cached_property
+    def closures(self) -> list[Closure]:
+        return closures(self)
+
+    @cached_property
     def h(self) -> ca.SX:
-        """Loop closures (m), two rows per loop: the gap from the point of bodies[1] to that of
-        bodies[0]."""
-        gaps = []
-        for i, loop in enumerate(self.linkage.loop):
-            name = loop_name(self.linkage, i)
-            ends = [
-                self.frames[body].point(self.p[f"{name}.at{k + 1}"])
-                for k, body in enumerate(loop.bodies)
-            ]
-            gaps.append(ends[0] - ends[1])
-        return ca.vertcat(*gaps) if gaps else ca.SX(0, 1)
+        """Rows of all closures (m), m x 1."""
+        return ca.vertcat(ca.SX(0, 1), *(closure.h for closure in self.closures))
 
     @cached_property
     def W(self) -> ca.SX:
@@ -215,8 +212,8 @@ class LinkageModel:
 
     @cached_property
     def closure_error(self) -> ca.SX:
-        """Largest gap of all loops (m)."""
-        gaps = [ca.norm_2(self.h[2 * i : 2 * i + 2]) for i in range(len(self.linkage.loop))]
+        """Largest gap of all closures (m)."""
+        gaps = [ca.norm_2(closure.h) for closure in self.closures]
         return ca.SX(0) if not gaps else gaps[0] if len(gaps) == 1 else ca.mmax(ca.vertcat(*gaps))
 
     @cached_property

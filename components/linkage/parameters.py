@@ -39,6 +39,11 @@ def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
         name = loop_name(linkage, i)
         for k, (body, at) in enumerate(zip(loop.bodies, loop.at, strict=True)):
             found.append(fixed(f"{name}.at{k + 1}", "m", at, f"{name} on {body}"))
+        if loop.type != "revolute":
+            found.append(fixed(f"{name}.axis", "rad", loop.axis or 0.0, f"direction of {name}"))
+        if loop.type == "prismatic":
+            text = f"angle of {loop.bodies[0]} from {loop.bodies[1]}"
+            found.append(fixed(f"{name}.angle", "rad", loop.angle or 0.0, text))
     if linkage.operational_point.at is not None:
         at, body = linkage.operational_point.at, linkage.operational_point.body
         found.append(fixed("operational_point.at", "m", at, f"operational point on {body}"))

@@ -151,14 +151,37 @@ class Joint:
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """A cut revolute joint, which closes a loop: two points of two bodies that coincide."""
+    """A cut joint, which closes a loop between two bodies."""
 
+    type: Literal["revolute", "slot", "prismatic"] = "revolute"
+    """revolute: the two points coincide; slot: the first body's point, a pin, is on the line
+    through the second body's point along `axis`; prismatic: so it is, and the first body does not
+    turn relative to the second."""
     bodies: tuple[str, str]
     """The two bodies; may be "ground"."""
     at: tuple[Point, Point]
     """The two points, each in the frame of its body."""
+    axis: Angle | None = None
+    """Direction of a slot or prismatic joint in the second body's frame, from its x axis; required
+    there."""
+    angle: Angle | None = None
+    """Angle of the first body from the second in a prismatic joint; by default 0."""
     name: str | None = None
     """Prefix of its FMU parameters; by default loop1, loop2, ..."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gear:
+    """A rigid coupling of two joint coordinates, q_0 = ratio q_1 + offset: gears, belt or rack."""
+
+    joints: tuple[str, str]
+    """The two joints, revolute or prismatic."""
+    ratio: Annotated[float, Quantity("1, m/rad or rad/m")]
+    """Change of the first coordinate for a unit change of the second; negative for outer gears."""
+    offset: Coordinate | None = None
+    """The first coordinate where the second is 0; by default that of `start`."""
+    name: str | None = None
+    """Prefix of its FMU parameters; by default gear1, gear2, ..."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,6 +216,8 @@ class Linkage:
     """Further operational points, for further hands."""
     loop: tuple[Loop, ...] = ()
     """Cut joints that close loops."""
+    gear: tuple[Gear, ...] = ()
+    """Couplings of joint coordinates."""
     spring: tuple[Spring, ...] = ()
     """Springs and dampers between points of bodies."""
     force: tuple[Any, ...] = ()
@@ -206,6 +231,11 @@ class Linkage:
     start_velocity: Mapping[str, Velocity | Twist] = field(default_factory=dict)
     """Joint velocities at t = 0 by the joint's name; three for a free joint. Given ones are kept;
     the others are the smallest that are consistent with the loops."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether it has closures: loops or gears."""
+        return bool(self.loop or self.gear)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from hapticlink.components.device.workspace import links
 from hapticlink.components.linkage.poses import poses
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.linkage import Body, Joint, Linkage
+from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,6 +100,8 @@ class _Drawing:
             for name, at in zip(loop.bodies, loop.at, strict=True):
                 if name == body:
                     yield self._world(body, at)
+            if loop.type != "revolute" and loop.bodies[1] == body:
+                yield self._world(loop.bodies[0], loop.at[0])
         for point in (self.linkage.operational_point, *self.linkage.point):
             if point.body == body:
                 yield self._world(body, point.at)
@@ -162,6 +164,8 @@ class _Drawing:
                 self._text(place, joint.name, (6, -11), "0.35")
         for loop in self.linkage.loop:
             place = self._world(loop.bodies[0], loop.at[0])
+            if loop.type != "revolute":
+                self._slot(loop, place)
             self._circle(place, "k")
             if "ground" in loop.bodies:
                 self._ground("ground", place)
@@ -188,6 +192,14 @@ class _Drawing:
         turned = (4, 0, np.degrees(angle) + 45)
         self.axes.plot(*child, marker=turned, mfc="w", mec="k", ms=12, mew=1.2, zorder=4)
         return child
+
+    def _slot(self, loop: Loop, pin: Pose) -> None:
+        """The line in which a pin slides, from its point on the body to beyond the pin."""
+        angle = self._at[loop.bodies[1]][2] + (loop.axis or 0.0)
+        along = np.array([np.cos(angle), np.sin(angle)]) * 0.15 * self._size()
+        ends = np.array([self._world(loop.bodies[1], loop.at[1]), pin])
+        ends = ends[np.argsort(ends @ along)] + np.array([-along, along])
+        self.axes.plot(*ends.T, color="0.4", lw=1, ls="-.", zorder=1)
 
     def _size(self) -> float:
         found = np.array([p for b in self.linkage.body for p in self._attached(b.name)])

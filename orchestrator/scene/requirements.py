@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach
+from hapticlink.components.linkage.closures import rows
 from hapticlink.orchestrator.scene.blocks import graphics_block, impedance, topology
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -23,11 +24,11 @@ def needs(scene: Scene) -> Iterator[Need]:
     """Every optional part of the equations, for a scene with a linkage."""
     if scene.linkage is None:
         return
-    loops = len(scene.linkage.loop)
+    count = sum(rows(scene.linkage))
     yield Need(
         "loop closures",
-        loops > 0,
-        f"{2 * loops} multipliers" if loops else "no loop: no multiplier, no projection",
+        count > 0,
+        f"{count} multipliers" if count else "no loop: no multiplier, no projection",
     )
     yield from _forces(scene)
     yield from _contacts(scene)

@@ -32,7 +32,7 @@ def check(scene: Scene) -> Iterator[Problem]:
     if scene.mechanism_at == "graphics":
         yield here, "the mechanism runs at the graphics rate itself: take mechanism_at out"
 
-    if scene.linkage and scene.linkage.loop and scene.mechanism.stabilization == "projection":
+    if scene.linkage and scene.linkage.closed and scene.mechanism.stabilization == "projection":
         yield (
             ("mechanism", "stabilization"),
             "'projection' factors the mechanism's own matrices at every step, which the local "

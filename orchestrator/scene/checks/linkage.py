@@ -27,6 +27,8 @@ def check(linkage: Linkage) -> Iterator[Problem]:
                     yield (*here, kind, i, "bodies", k), unknown("body", name, frames)
             if kind == "loop" and pair.bodies[0] == pair.bodies[1]:
                 yield (*here, kind, i, "bodies"), "a loop joins two different bodies"
+    yield from _cuts(linkage)
+    yield from _gears(linkage)
     if linkage.operational_point.body not in bodies:
         message = unknown("body", linkage.operational_point.body, bodies)
         yield (*here, "operational_point", "body"), message
@@ -38,6 +40,39 @@ def check(linkage: Linkage) -> Iterator[Problem]:
             elif isinstance(value, tuple) != (types[name] == "free"):
                 wanted = "three numbers" if types[name] == "free" else "one number"
                 yield (*here, table, name), f"{value!r}: a {types[name]} joint takes {wanted}"
+
+
+def _cuts(linkage: Linkage) -> Iterator[Problem]:
+    """Problems of keys that a kind of cut joint needs, or does not have."""
+    for i, loop in enumerate(linkage.loop):
+        path: Path = ("linkage", "loop", i)
+        if loop.type != "revolute" and loop.axis is None:
+            yield (*path, "axis"), f"a {loop.type} joint needs its direction (rad)"
+        if loop.type == "revolute" and loop.axis is not None:
+            yield (
+                (*path, "axis"),
+                'a revolute joint has no direction: leave it out, or type = "slot"',
+            )
+        if loop.type != "prismatic" and loop.angle is not None:
+            yield (*path, "angle"), f"a {loop.type} joint turns freely: leave its angle out"
+
+
+def _gears(linkage: Linkage) -> Iterator[Problem]:
+    """Problems of the joints of gears."""
+    types = {j.name: j.type for j in linkage.joint}
+    names = [loop.name for loop in linkage.loop]
+    for i, gear in enumerate(linkage.gear):
+        path: Path = ("linkage", "gear", i)
+        for k, name in enumerate(gear.joints):
+            if name not in types:
+                yield (*path, "joints", k), unknown("joint", name, types)
+            elif types[name] == "free":
+                yield (*path, "joints", k), f"{name!r} is free: a gear couples single coordinates"
+        if gear.joints[0] == gear.joints[1]:
+            yield (*path, "joints"), "a gear couples two different joints"
+        if gear.name is not None and gear.name in names:
+            yield (*path, "name"), f"{gear.name!r} is taken: name each loop and gear once"
+        names.append(gear.name)
 
 
 def _tree(linkage: Linkage, frames: Mapping[str, int]) -> Iterator[Problem]:

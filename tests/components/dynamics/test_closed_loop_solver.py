@@ -23,10 +23,16 @@ class DenseInertia:
         return self.L_inv.T @ u
 
 
+def pairs(m):
+    """The rows of loops by revolute cuts, the last one alone where m is odd."""
+    return [2] * (m // 2) + [1] * (m % 2)
+
+
 def solve(D, W, b, c):
     symbols = [ca.SX.sym("D", *D.shape), ca.SX.sym("W", *W.shape)]
     symbols += [ca.SX.sym("b", len(b)), ca.SX.sym("c", len(c))]
-    out = ClosedLoopSolver(DenseInertia(symbols[0]), symbols[1]).solve(*symbols[2:])
+    solver = ClosedLoopSolver(DenseInertia(symbols[0]), symbols[1], pairs(W.shape[0]))
+    out = solver.solve(*symbols[2:])
     f = ca.Function("solve", symbols, list(out))
     return [np.array(v).ravel() for v in f(D, W, b, c)]
 
