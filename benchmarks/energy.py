@@ -24,7 +24,7 @@ ENERGY, END, RATE, NONE = 12.6e-3, 200, 512, (0.0, 0.0, 0.0)
 
 
 def measure(out: Path, told: Callable[[str, int, int], None]) -> list[dict[str, str]]:
-    """Largest closure error (m) and relative energy change over the run, looked at each 1/8 s."""
+    """Largest closure error (m) and relative energy change over the run, sampled every 1/8 s."""
     rows = Rows(out / "energy.csv", COLUMNS, keys=2)
     bar = mechanisms.five_bar()
     slow = replace(bar, start_velocity={"shoulder1": 1.0})

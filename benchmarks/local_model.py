@@ -1,7 +1,8 @@
 """The local model (B.15) against the mechanism's own matrices: cost of a step and error of the tip.
 
-The five-bar of Table 6.1 alone under the wrench of chapter 6, matrices from a joint-synchronised
-copy. Cost: instructions of a step, and the least time of 20 repetitions of 2000 steps.
+The five-bar of Table 6.1 alone under the wrench of chapter 6, with the matrices of a copy that
+follows every joint coordinate. Cost: instructions of a step, and the least time of 20 repetitions
+of 2000 steps.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def costs() -> Iterator[str]:
 
 
 def tip(folder: Path, *options: str) -> tuple[np.ndarray, float]:
-    """(the operational point's way, the largest gap of the loop), m."""
+    """(path of the operational point, largest closure error), m."""
     found = simulate("five-bar", folder, options).results.haptics
     way = np.column_stack([found[f"virtual_mechanism.x[{i}]"] for i in (1, 2)])
     return way, float(found["virtual_mechanism.closure_error"].max())

@@ -151,7 +151,8 @@ def tasks(
 def measure(
     out: Path, quick: bool, told: Callable[[str, int, int], None]
 ) -> tuple[dict[str, list[dict]], list[str]]:
-    """Run what is missing in runs.csv; gives the aggregated rows by case, and who is missing."""
+    """Run the cases that runs.csv lacks; returns the aggregated rows by case and the codes that are
+    not installed."""
     rows = Rows(out / "runs.csv", COLUMNS, keys=5)
     missing: list[str] = []
     codes, found = peers(missing), {}
@@ -215,8 +216,8 @@ def _aggregate(rows: Rows, case: Case, exact: np.ndarray, floor: float) -> list[
 
 
 def advantage(rows: list[dict], peer: str) -> list[tuple[float, float, float]]:
-    """(error, ms per simulated s, that over ours at this error or less) of each of the peer's rows
-    that no other of its rows beats; nan where none of ours is as good."""
+    """(error, ms per simulated s, its ratio to ours at this error or less) of each Pareto-optimal
+    row of the peer; nan if none of ours is as accurate."""
     mine = [r for r in rows if r["code"] == NATIVE and r["error"] > 10 * r["floor"]]
     # Bare calls of the same RK4 have no error of their own: ours with projection stands in.
     stand_in = {r["rate"]: r["error"] for r in mine if r["method"] == "rk4, projection"}

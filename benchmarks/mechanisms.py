@@ -1,4 +1,4 @@
-"""The mechanisms that codes are compared on, as scene data."""
+"""The mechanisms of the comparison with other codes, as records of a scene."""
 
 from __future__ import annotations
 

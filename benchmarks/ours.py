@@ -90,7 +90,7 @@ class Ours:
         return run
 
     def native(self, folder: Path) -> Callable[[int], tuple[float, float, float]]:
-        """As C."""
+        """Compiled as C."""
         advance = self.advance(folder)
 
         def run(steps: int) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""Tables and figures of the mechanism bench."""
+"""Tables and figures of the benchmark `mechanism`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finished rows on disk: an interrupted bench goes on where it stopped."""
+"""Finished rows on disk, so that an interrupted benchmark can be continued."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The mechanism bench as a whole; finished rows of the same code are kept and used again."""
+"""The benchmark `mechanism`; finished rows of the same version of the code are reused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""How far a singular pose throws the tip, over many rates: what a step hits there is luck.
+"""Tip error after motion through singular poses, over many rates, since it depends on how close a
+step comes to the pose.
 
 N-four-bar (IFToMM A02) of two windows, its ground line turned off the axes of the frame, under
 projection: the tip after 10 s against the closed form, at every seventh rate from 400 to 2400 Hz,

@@ -1,4 +1,4 @@
-"""What finished rows belong to; rows of another state of the code are measured again."""
+"""The version of the code that finished rows belong to; rows of another one are measured again."""
 
 from __future__ import annotations
 

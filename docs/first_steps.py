@@ -12,7 +12,7 @@ hl.shipped()
 
 # %% [markdown]
 # A scene runs by its name or path. Options are its keys; here the graphics rate (Hz) and the
-# duration (s). What comes back tells how the run ended and what was recorded at each rate.
+# duration (s). The result says how the run ended and what was recorded at each rate.
 
 # %%
 r = hl.run("closed-loop-direct", {"graphics.rate": 30, "duration": 1.0})
@@ -44,10 +44,10 @@ figures["distance"]
 # %%
 scene = hl.scene("closed-loop-direct", {"duration": 1.0})
 slow = hl.run(scene, {"graphics.rate": 10})
-print(f"at 10 Hz at most {slow.tracking().distance.max():.3g} mm apart")
+print(f"at 10 Hz at most {slow.tracking().distance_mm.max():.3g} mm apart")
 
 # %% [markdown]
-# What a scene cannot mean is refused before anything runs, all of it at once.
+# Invalid keys and values are refused before anything runs, all of them at once.
 
 # %%
 try:
@@ -60,8 +60,8 @@ except hl.InputFault as fault:
 
 # %%
 s = hl.sweep(scene, {"graphics.rate": [20, 40], "hold": ["zoh", "foh"]}, {"duration": 0.25})
-for rate, hold, most in zip(s["graphics.rate"], s["hold"], s["tracking_max_mm"], strict=True):
-    print(f"{hold} at {rate:g} Hz: at most {most:.3g} mm apart")
+for rate, hold, largest in zip(s["graphics.rate"], s["hold"], s["tracking_max_mm"], strict=True):
+    print(f"{hold} at {rate:g} Hz: at most {largest:.3g} mm apart")
 s.figure()
 
 # %% [markdown]

@@ -29,8 +29,8 @@ def page() -> str:
     raised = {n: t for n, t in things.items() if inspect.isclass(t) and issubclass(t, Exception)}
     lines = [
         "# Python API",
-        "Made from the docstrings by `python docs/make_api.py`. [first_steps.py](first_steps.py) "
-        "is a script to start from.",
+        "Generated from the docstrings by `python docs/make_api.py`. "
+        "[first_steps.py](first_steps.py) is a script to start from.",
         _doc(hl),
         "A `Vector` is a NumPy array of floats; `scene` says what `Options` are, `sweep` what "
         "`Vary` and `Runs` are.",

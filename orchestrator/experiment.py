@@ -90,7 +90,7 @@ def _simulated(
         alone = isolated(system.fmus)
         risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
         with RunFolder(folders.ensure(folder), story) as results:
-            with crash_monitor.beside(folder) if risky else nullcontext():
+            with crash_monitor.watched(folder) if risky else nullcontext():
                 outcome = run(plan, results, progress)
             ending = _ending(system, outcome, build_time)
             try:

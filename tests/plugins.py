@@ -1,4 +1,4 @@
-"""Commands with modules of a user's own, each in a process that knows no others."""
+"""Commands with plugins, each in a process of its own."""
 
 import json
 import os

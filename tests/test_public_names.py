@@ -1,4 +1,4 @@
-"""`import hapticlink as hl`: the names, their page and the script that shows them."""
+"""The public names of `import hapticlink as hl`, their page and the script of first steps."""
 
 from __future__ import annotations
 

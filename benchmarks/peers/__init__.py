@@ -1,4 +1,4 @@
-"""Multibody codes to be held against ours, one a file, each an optional install.
+"""Other multibody codes of the comparison, one a file, each an optional dependency.
 
 A peer is a module with
     NAME, METHODS           what tables call it, and the integrators it offers here

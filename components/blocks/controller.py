@@ -49,13 +49,15 @@ def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variabl
         Variable("M", (3, 3), INERTIA, IDENTITY, "inertia of the device"): bool(
             spec.impedance or law
         ),
-        Variable("c", (3,), WRENCH, description="device's velocity term C_d v"): spec.impedance,
         Variable(
-            "Lambda_inv", (3, 3), MOBILITY, IDENTITY, "inverse inertia of the mechanism"
+            "c", (3,), WRENCH, description="C_d v, Coriolis and centrifugal terms of the device"
+        ): spec.impedance,
+        Variable(
+            "Lambda_inv", (3, 3), MOBILITY, IDENTITY, "mobility at the operational point"
         ): spec.impedance,
         Variable("P_c", (3, 3), description="projector on the constrained directions"): bool(law),
         Variable(
-            "a_bias", (3,), ACCELERATION, description="mechanism's acceleration without wrench"
+            "a_bias", (3,), ACCELERATION, description="operational acceleration at zero wrench"
         ): spec.bias == "full",
     }
     return [variable for variable, wanted in needed.items() if wanted]
@@ -75,14 +77,14 @@ def _gains(
     if spec.teleoperation:
         K_pc, B_pc = spec.teleoperation.stiffness, spec.teleoperation.damping
         gains += [
-            Variable("K_pc", (3,), STIFFNESS, K_pc, "stiffness of the position channels"),
-            Variable("B_pc", (3,), DAMPING, B_pc, "damping of the position channels"),
+            Variable("K_pc", (3,), STIFFNESS, K_pc, "stiffness of the virtual coupling"),
+            Variable("B_pc", (3,), DAMPING, B_pc, "damping of the virtual coupling"),
         ]
     if law:
         gains += [
-            Variable("k_j", (), "1/s2", law.stiffness, "joint-constraint stiffness, N/m per kg"),
-            Variable("b_j", (), "1/s", law.damping, "joint-constraint damping, N/(m/s) per kg"),
-            Variable("length_scale", (), "m", length_scale, "L, makes rotations comparable"),
+            Variable("k_j", (), "1/s2", law.stiffness, "stiffness of F_T per unit of inertia"),
+            Variable("b_j", (), "1/s", law.damping, "damping of F_T per unit of inertia"),
+            Variable("length_scale", (), "m", length_scale, "L of S = diag(1, 1, L)"),
         ]
     return gains
 
@@ -102,11 +104,22 @@ def controller(spec: specs.Controller, length_scale: float) -> Component:
             "is false: turn impedance on, or take bias = 'none'"
         )
     law = specs.Topology() if spec.topology is True else (spec.topology or None)
-    outputs = [Variable("F_motor", (3,), WRENCH, description="wrench asked of the motors")]
+    outputs = [Variable("F_motor", (3,), WRENCH, description="u, desired wrench of the motors")]
     if spec.teleoperation:
-        outputs += [Variable("F_drift", (3,), WRENCH, description="+ on device, - on mechanism")]
+        outputs += [
+            Variable(
+                "F_drift",
+                (3,),
+                WRENCH,
+                description="virtual coupling, + on the device, - on the mechanism",
+            )
+        ]
     if law:
-        outputs += [Variable("F_constraint", (3,), WRENCH, description="F_T, topology wrench")]
+        outputs += [
+            Variable(
+                "F_constraint", (3,), WRENCH, description="F_T, wrench of the topology controller"
+            )
+        ]
     block = Block(
         inputs=_signals(spec, law), parameters=_gains(spec, law, length_scale), outputs=outputs
     )

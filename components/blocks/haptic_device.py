@@ -44,7 +44,7 @@ _FIXED = (
 )
 _TUNABLE = (
     ("torque_limit", "N.m", "largest torque of a motor"),
-    ("reach_limit", "1", "share of an arm's full reach at which the stop begins"),
+    ("reach_limit", "1", "fraction of an arm's length at which its stop begins"),
     ("stop_stiffness", "N/m", "stiffness of the stops"),
     ("stop_damping", "N.s/m", "damping of the stops"),
 )
@@ -108,7 +108,7 @@ def haptic_device(device: specs.Device) -> Component:
                 "F_motor",
                 (3,),
                 WRENCH,
-                description="wrench asked of the motors",
+                description="desired wrench of the motors",
                 power=Power("x_true"),
             ),
             Variable(
@@ -134,8 +134,15 @@ def haptic_device(device: specs.Device) -> Component:
                 description="inertia of the device at the handle",
                 kind="semidefinite",
             ),
-            Variable("c", (3,), WRENCH, description="velocity term C_d v at the handle"),
-            Variable("workspace_margin", (), "m", description="least distance to a stop"),
+            Variable(
+                "c", (3,), WRENCH, description="C_d v, Coriolis and centrifugal terms at the handle"
+            ),
+            Variable(
+                "workspace_margin",
+                (),
+                "m",
+                description="smallest distance of an arm to a stop, negative beyond it",
+            ),
             Variable("x_true", (3,), POSE, description="true pose of the handle"),
             Variable(
                 "v_true",

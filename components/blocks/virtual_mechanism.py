@@ -125,7 +125,7 @@ def virtual_mechanism(
         output = {name: ca.substitute(value, tabled, now) for name, value in output.items()}
     component = block.component(
         "virtual_mechanism",
-        "The linkage's own dynamics under the hand's and the drift wrench",
+        "Dynamics of the linkage under the wrenches of the hand and of the virtual coupling",
         "continuous",
         initial=initial,
         step=stepped,
@@ -161,7 +161,7 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
             "F_drift",
             (3,),
             WRENCH,
-            description="drift wrench; acts here as -",
+            description="virtual coupling, acts with - on the mechanism",
             power=Power("x", sign=-1.0),
         ),
     ]

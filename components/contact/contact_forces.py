@@ -45,7 +45,7 @@ def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
     """The port for the contact geometry from the virtual environment to the mechanism, one row per
     place."""
     rows = places(linkage, contacts)
-    text = "active, point in the body, point and normal of the obstacle's plane, a row a contact"
+    text = "one row a place: active, point in the body, point and normal of the obstacle's plane"
     return Variable("contacts", (rows, len(COLUMNS)), COLUMNS, description=text, kind="table")
 
 

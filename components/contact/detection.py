@@ -69,7 +69,7 @@ def obstacle_parameters(contacts: Contacts) -> list[Variable]:
         name = disc.name or f"disc{i + 1}"
         text = f"centre of {name}"
         found.append(Variable(f"{name}.center", (2,), "m", disc.center, text, "fixed"))
-        found.append(Variable(f"{name}.radius", (), "m", disc.radius, f"of {name}", "fixed"))
+        found.append(Variable(f"{name}.radius", (), "m", disc.radius, f"radius of {name}", "fixed"))
     for i, polygon in enumerate(contacts.polygon):
         found.append(corners(polygon.name or f"polygon{i + 1}", polygon.corners))
     return found

@@ -3,10 +3,11 @@
 Two five-bars in parallel planes, A and B, hold the ends of a crank at p -+ (crank/2)
 (cos theta, sin theta). Each five-bar is two arms (proximal and distal link) from a base
 joint to its crank end, plane A reaching toward +y and plane B toward -y, elbows outward:
-arms 1 to 4 are A left, A right, B left, B right. Every angle is explicit in the pose
-(x m, y m, theta rad), so the rest follows by differentiation; theta is not wrapped.
+arms 1 to 4 are A left, A right, B left, B right. Every angle is an explicit function of the pose
+(x m, y m, theta rad), so rates and dynamics follow by differentiation; theta is not wrapped.
 
-`p` maps the names of `specs.Device` to symbols or numbers.
+`p` maps the names of the geometric and inertial keys of [device] (`specs.Device`) to symbols or
+numbers.
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ def arms(pose: ca.SX, p: Parameters) -> Iterator[Arm]:
         proximal = phi + s acos((l1^2 + r^2 - l2^2) / (2 l1 r))
         distal   = phi - s acos((l2^2 + r^2 - l1^2) / (2 l2 r))
 
-    s = +-1 puts the elbow outward. phi is measured from +-y, from which no arm turns by half a
-    turn, so that no angle jumps inside the workspace. NaN where r is outside [|l1 - l2|, l1 + l2].
+    s = +-1 selects the branch with the elbow outward. phi is measured from +y in plane A and -y in
+    plane B; no arm turns by pi from there, so no angle jumps inside the workspace. The angles are
+    NaN where r is outside [|l1 - l2|, l1 + l2].
     """
     l1, l2 = p["proximal_length"], p["distal_length"]
     half_crank = p["crank"] / 2 * ca.vertcat(ca.cos(pose[2]), ca.sin(pose[2]))
@@ -65,9 +67,11 @@ def base_angles(pose: ca.SX, p: Parameters) -> ca.SX:
 
 
 def _rates(arm: Arm, p: Parameters) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Rows of d/dpose, (1, 3), (2, 3) and (1, 3): proximal angle, distal centre, distal angle.
+    """Jacobians with respect to the pose, (1, 3), (2, 3) and (1, 3): of the proximal angle, of the
+    distal link's centre of mass, and of the distal angle.
 
-    With u, n along and across the links, base + l1 u1 + l2 u2 = e(pose) gives, along u2 and u1,
+    With unit vectors u along and n across the links and e the crank end, the derivative of
+    base + l1 u1 + l2 u2 = e(pose), projected on u2 and u1, gives
 
         proximal' = u2 . e' / (l1 u2 . n1),   distal' = -u1 . e' / (l2 u2 . n1)
     """
@@ -90,9 +94,9 @@ def jacobian(pose: ca.SX, p: Parameters) -> ca.SX:
     return ca.vertcat(*(_rates(arm, p)[0] for arm in arms(pose, p)))
 
 
-def _every_rate(pose: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
-    """(J, m): rows of d/dpose of every rotor, link and the handle with its crank, and the
-    inertia of each."""
+def _all_jacobians(pose: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
+    """(J, m): the Jacobians with respect to the pose of the handle with its crank, of every rotor
+    and of every link, stacked, and the mass or moment of inertia that belongs to each row."""
     rows, inertias = [ca.SX.eye(3)], [p["handle_mass"], p["handle_mass"], p["handle_inertia"]]
     about_base = p["proximal_inertia"] + p["proximal_mass"] * p["proximal_center"] ** 2
     for arm in arms(pose, p):
@@ -105,14 +109,14 @@ def _every_rate(pose: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
 def dynamics(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
     """M_d and C_d of (4.5), both (3, 3), M_d vdot + C_d v = wrench.
 
-    With J the rates of all links and m = diag of their inertias,
+    With J the stacked Jacobians of all bodies and m the diagonal matrix of their inertias,
 
         M_d = J' m J,   C_d = J' m Jdot,
 
     so that dM_d/dt - 2 C_d is skew.
     """
     at = ca.SX.sym("pose", 3)
-    J, m = _every_rate(at, p)
+    J, m = _all_jacobians(at, p)
     J_dot = ca.reshape(ca.jtimes(ca.vec(ca.densify(J)), at, v), J.shape)
     weighted = J.T @ ca.diag(m)
     M, C = ca.substitute([weighted @ J, weighted @ J_dot], [at], [pose])
@@ -120,9 +124,10 @@ def dynamics(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
 
 
 def motion(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
-    """M_d and the vector C_d v = J' m (Jdot v) of `dynamics`, which takes less work than C_d."""
+    """M_d and the vector C_d v = J' m (Jdot v) of `dynamics`, with fewer operations than the matrix
+    C_d."""
     at = ca.SX.sym("pose", 3)
-    J, m = _every_rate(at, p)
+    J, m = _all_jacobians(at, p)
     bias = ca.jtimes(J @ v, at, v)
     M, c = ca.substitute([J.T @ ca.diag(m) @ J, J.T @ (m * bias)], [at], [pose])
     return M, c
@@ -131,8 +136,8 @@ def motion(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
 def margins(pose: ca.SX, p: Parameters) -> ca.SX:
     """Distances (m) of the four crank ends to the limits of their arms, shape (8,).
 
-    An arm keeps (1 - reach_limit)(l1 + l2) from both its singular poses, stretched
-    (l1 + l2) and folded (|l1 - l2|). Negative is beyond the workspace.
+    The limits are (1 - reach_limit)(l1 + l2) before the two singular poses of an arm, stretched
+    (l1 + l2) and folded (|l1 - l2|). A negative margin lies outside the workspace.
     """
     l1, l2 = p["proximal_length"], p["distal_length"]
     reach = ca.vertcat(*(arm.reach for arm in arms(pose, p)))
@@ -142,9 +147,8 @@ def margins(pose: ca.SX, p: Parameters) -> ca.SX:
 
 
 def stop_wrench(pose: ca.SX, v: ca.SX, p: Parameters) -> ca.SX:
-    """Wrench (N, N, N.m) of the stops: a spring and damper for each margin that is negative.
-
-    Along each margin m: max(0, -K m - B mdot), so that a stop pushes and never pulls.
+    """Wrench (N, N, N.m) of the stops: a unilateral spring and damper for each negative margin m,
+    with the force max(0, -K m - B mdot) in the direction in which m grows.
     """
     at = ca.SX.sym("pose", 3)
     gap = margins(at, p)

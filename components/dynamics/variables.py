@@ -42,7 +42,14 @@ def start_parameters(linkage: Linkage) -> list[Variable]:
     n = (len(units),)
     return [
         Variable("q_start", n, units, q, "joint coordinates before assembly", "fixed"),
-        Variable("qd_start", n, rates, qd, "joint rates, those of the scene kept", "fixed"),
+        Variable(
+            "qd_start",
+            n,
+            rates,
+            qd,
+            "joint rates before assembly; those that the scene gives are kept",
+            "fixed",
+        ),
     ]
 
 
@@ -55,8 +62,20 @@ def length_parameter(linkage: Linkage, length: float | None) -> Variable:
 def direction_parameters(directions: Directions) -> list[Variable]:
     """Parameters of the detection of constrained directions: tolerance and hysteresis."""
     return [
-        Variable("rank_tolerance", (), "1", directions.rank_tolerance, "share that counts as none"),
-        Variable("hysteresis", (), "1", directions.hysteresis, "factor to leave a direction free"),
+        Variable(
+            "rank_tolerance",
+            (),
+            "1",
+            directions.rank_tolerance,
+            "eigenvalue ratio below which a direction is constrained",
+        ),
+        Variable(
+            "hysteresis",
+            (),
+            "1",
+            directions.hysteresis,
+            "factor on rank_tolerance to become free again",
+        ),
     ]
 
 
@@ -71,7 +90,9 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
     n = (len(units),)
     found = [
         Variable("x", (3,), POSE, description="pose of the operational point"),
-        Variable("v", (3,), TWIST, description="its velocity", derivative_of="x"),
+        Variable(
+            "v", (3,), TWIST, description="velocity of the operational point", derivative_of="x"
+        ),
         Variable("q", n, units, description="joint coordinates"),
         Variable(
             "qd",
@@ -87,7 +108,9 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
             description="joint accelerations",
             derivative_of="qd",
         ),
-        Variable("a_bias", (3,), ACCELERATION, description="operational acceleration at no wrench"),
+        Variable(
+            "a_bias", (3,), ACCELERATION, description="operational acceleration at zero wrench"
+        ),
         Variable("energy", (), "J", description="kinetic and potential energy"),
     ]
     if m:
@@ -104,7 +127,7 @@ def mobility_output() -> Variable:
 
 
 def direction_outputs() -> list[Variable]:
-    text = "projector on the constrained directions, scaled"
+    text = "projector on the constrained directions, scaled by L"
     return [
         Variable("P_c", (3, 3), "1", description=text, kind="projector"),
         Variable("n_constraints", (), "1", description="number of constrained directions"),

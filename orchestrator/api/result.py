@@ -61,7 +61,7 @@ class Run(Results):
         return found["message"] if found else None
 
     def tracking(self) -> Tracking:
-        """Tracking error `(time, distance, angle)`: |x_S - x_D| (mm) and |theta_S - theta_D| (rad)
+        """Tracking error `(time_s, distance_mm, angle_rad)`: |x_S - x_D| and |theta_S - theta_D|
         between operational point and handle at times (s). Raises KeyError if the scene does not
         have both."""
         return pose_error(self)

@@ -1,19 +1,24 @@
-"""Start values: what a variable takes."""
+"""Start values of FMU variables: types, and integers that no double can represent."""
 
 from __future__ import annotations
 
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 Given = bool | int | float | str
+"""A start value as a scene gives it."""
 _WORDS = {bool: "true or false", int: "a whole number", (int, float): "a number", str: "text"}
 WIDE = ("Int64", "UInt64")
+"""Types whose values may not be representable as a double."""
 EXACT = 2**53
-"""Up to here every whole number is a double."""
+"""Every integer of at most this magnitude is a double."""
 
 
 def fitting(scalar: Scalar, given: Given) -> Given:
-    """The value to set; an item of an enumeration may be given by its name. Raises ValueError,
-    saying what fits."""
+    """The value to set for a start value `given` by a scene: itself, or the number of an item of an
+    enumeration that is given by its name.
+
+    Raises ValueError, with the values that are possible, if it does not have the variable's type.
+    """
     if scalar.items and isinstance(given, str):
         if given not in dict(scalar.items):
             names = ", ".join(name for name, _ in scalar.items)
@@ -32,16 +37,18 @@ def fitting(scalar: Scalar, given: Given) -> Given:
 
 
 def _takes(scalar: Scalar) -> type | tuple[type, type]:
+    """The Python types of the start values of a variable."""
     if scalar.type in ("Real", "Float64", "Float32"):
         return (int, float)
     return {"Boolean": bool, "String": str, "Binary": str}.get(scalar.type, int)
 
 
-Starts = tuple[tuple[Scalar, bool | int | float | str], ...]
+Starts = tuple[tuple[Scalar, Given], ...]
+"""Variables with their start values."""
 
 
 def wide(starts: Starts) -> dict[str, int]:
-    """The whole numbers among `starts` that no double holds for sure, by the scalar's name."""
+    """The 64-bit integers among `starts` that are larger than `EXACT`, by the variable's name."""
     return {
         s.name: v for s, v in starts if s.type in WIDE and isinstance(v, int) and abs(v) > EXACT
     }

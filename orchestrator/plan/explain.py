@@ -1,4 +1,5 @@
-"""`--explain`: a plan as text, what runs when and from which sample each input is computed."""
+"""`--explain`: a plan as text: which operation is executed when, and the stamp of the newest sample
+from which each input is computed."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from itertools import groupby
 from hapticlink.orchestrator.base.ticks import Clock
 from hapticlink.orchestrator.plan.operations import Event, Operation, Repeat
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import comes_round
+from hapticlink.orchestrator.plan.sample_ages import pattern_end
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.system.system import System
 
@@ -25,8 +26,8 @@ PRINTED = 600
 
 
 def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
-    """Lines with the clocks, the block of each kind of event, and a table of the events until their
-    pattern repeats (`comes_round`), at most of the first `rows` events."""
+    """The lines of the text: the clocks, the operations of each kind of event, and a table of the
+    events until their pattern repeats (`pattern_end`), limited to the first `rows` events."""
     system, timeline = plan.system, plan.system.timeline
     base = timeline.base
     yield LEGEND
@@ -41,7 +42,7 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
     yield from _holds(system)
     for loop in plan.loops():
         yield f"  loop {loop.ring}: {', '.join(loop.fmus)} in this order"
-    last, names = comes_round(system), dict[Event, str]()
+    last, names = pattern_end(system), dict[Event, str]()
     events: dict[int, str] = {}
     cut = False
     for tick, event in plan:
@@ -53,10 +54,10 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
         yield f"block {name}: {_kind(event)}"
         yield from _lines(plan.block(event), "  ")
     yield ""
-    yield "tick, time (s), block, FMU that is set: each input @ the tick its newest sample is of"
+    yield "tick, time (s), block, FMU that gets inputs: each input @ tick of its newest sample"
     connections = {c.name: c for c in system.connections}
-    made = ((u.tick, connections[u.connection], u.stamp) for u in uses(plan, max(events)))
-    for (tick, target), group in groupby(made, key=lambda use: (use[0], use[1].target)):
+    used = ((u.tick, connections[u.connection], u.stamp) for u in uses(plan, max(events)))
+    for (tick, target), group in groupby(used, key=lambda use: (use[0], use[1].target)):
         inputs = " ".join(f"{c.target_port}@{stamp}" for _, c, stamp in group)
         yield f"{tick:>8}  {timeline.seconds(tick):<12.9g} {events[tick]:<3} {target}: {inputs}"
     if cut:
@@ -64,6 +65,7 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
 
 
 def _letters(n: int) -> str:
+    """A name for the n-th kind of event: A to Z, then AA, AB, ..."""
     return chr(ord("A") + n) if n < 26 else _letters(n // 26 - 1) + _letters(n % 26)
 
 
@@ -84,8 +86,10 @@ def _holds(system: System) -> Iterator[str]:
 
 
 def _kind(event: Event) -> str:
-    told = (f"{f.clock} {f.dticks}" + " (last)" * f.final for f in event.firings)
-    return ("the start, " if event.first else "") + ", ".join(told)
+    """`the start, haptics 15, graphics 256`: the clocks that fire, with the steps that they start
+    (ticks)."""
+    clocks = (f"{f.clock} {f.dticks}" + " (last)" * f.final for f in event.firings)
+    return ("the start, " if event.first else "") + ", ".join(clocks)
 
 
 def _lines(block: Iterable[Operation], indent: str) -> Iterator[str]:
@@ -99,9 +103,9 @@ def _lines(block: Iterable[Operation], indent: str) -> Iterator[str]:
 
 
 def _line(operation: Operation) -> str:
-    """`step virtual_mechanism dticks 15`: the operation, its FMU or connection, and every argument
-    that differs from its default."""
+    """An operation with its FMU or connection and every argument that differs from its default, as
+    in `step virtual_mechanism dticks 15`."""
     first, *others = vars(operation).items() or [("", "")]
-    usual = {f.name: f.default for f in fields(operation)}
-    given = [f"{name} {value}" for name, value in others if value != usual[name]]
+    defaults = {f.name: f.default for f in fields(operation)}
+    given = [f"{name} {value}" for name, value in others if value != defaults[name]]
     return " ".join(filter(None, [type(operation).__name__.lower(), str(first[1]), *given]))

@@ -37,7 +37,7 @@ class Ages:
 
     def __init__(self, plan: Plan) -> None:
         self._seconds = plan.system.timeline.seconds
-        self._last = comes_round(plan.system)
+        self._last = pattern_end(plan.system)
         self._found: dict[str, list[int]] = {}  # min, max, sum, number
         self._stamps = Stamps(plan, self._count)
 
@@ -83,7 +83,7 @@ def delays(plan: Plan) -> dict[str, Delay]:
     return ages.delays()
 
 
-def comes_round(system: System) -> int:
+def pattern_end(system: System) -> int:
     """The last tick of the first hyperperiod that begins after all phases and constant latencies;
     the end of the run if the pattern of events does not repeat."""
     timeline = system.timeline

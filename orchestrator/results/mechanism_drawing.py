@@ -50,12 +50,20 @@ def draw(
     drawing.joints()
     drawing.springs()
     drawing.points()
-    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+    limits = _limits(axes)
     if device:
-        limits = axes.get_xlim(), axes.get_ylim()
         _device(axes, device, drawing.operational_pose())
-        axes.set(xlim=limits[0], ylim=limits[1])
-    axes.set_aspect("equal", adjustable="box" if device else "datalim")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", xlim=limits[0], ylim=limits[1])
+    axes.set_aspect("equal", adjustable="box")
+
+
+def _limits(axes: Axes) -> Pose:
+    """Limits of x and y (mm) that contain what is drawn with a margin for names, (2, 2), in a ratio
+    between 3/4 and 4/3; 100 mm about a single point."""
+    found = np.array([axes.dataLim.intervalx, axes.dataLim.intervaly])
+    size = 1.3 * np.ptp(found, axis=1)
+    half = np.maximum(size, 0.75 * size.max() if size.max() > 1e-6 else 100.0) / 2
+    return found.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
 
 
 def figure(scene: Scene, q: Sequence[float]) -> Figure:
@@ -63,15 +71,15 @@ def figure(scene: Scene, q: Sequence[float]) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(7.4, 6.4), layout="constrained")
-    FigureCanvasAgg(made)
-    axes = made.add_subplot()
+    drawn = Figure(figsize=(6.4, 5.6), layout="constrained")
+    FigureCanvasAgg(drawn)
+    axes = drawn.add_subplot()
     assert scene.linkage is not None
     draw(axes, scene.linkage, q, None, scene.device, scene.contacts)
     axes.set_title(fill(f"{scene.title} at the start", 70), fontsize="medium")
     axes.grid(alpha=0.3)
-    made.legend(fontsize="x-small", ncols=3, loc="outside lower center")
-    return made
+    drawn.legend(fontsize="x-small", ncols=3, loc="outside lower center")
+    return drawn
 
 
 class _Drawing:
@@ -107,16 +115,18 @@ class _Drawing:
                 yield self._world(body, point.at)
 
     def _outline(self, body: Body) -> Pose:
-        """The corners of the convex hull of what is attached, (k, 2); a line has two, a body that
-        holds one thing together one."""
-        from scipy.spatial import ConvexHull, QhullError
+        """The corners of the convex hull of what is attached, (k, 2): two for points on a line, one
+        for a single point."""
+        from scipy.spatial import ConvexHull
 
         found = np.unique(np.round(np.array(list(self._attached(body.name))), 9), axis=0)
-        try:
-            return found[ConvexHull(found).vertices] if len(found) > 2 else found
-        except QhullError:  # all on one line
-            along = found @ (found[-1] - found[0])
-            return found[[along.argmin(), along.argmax()]]
+        if len(found) <= 2:
+            return found
+        _, sizes, (direction, _) = np.linalg.svd(found - found.mean(axis=0), full_matrices=False)
+        if sizes[1] > 1e-6 * sizes[0]:
+            return found[ConvexHull(found).vertices]
+        along = found @ direction
+        return found[[along.argmin(), along.argmax()]]
 
     def outlines(self) -> None:
         """The bodies as thin lines."""
@@ -139,6 +149,8 @@ class _Drawing:
                 )
             else:
                 self.axes.plot(*corners.T, color=color, lw=5, solid_capstyle="round", zorder=3)
+                if len(corners) == 1:
+                    self.axes.plot(*corners.T, "s", color=color, ms=14, alpha=0.5, zorder=3)
             if body.radius:
                 ends = np.array([self._world(body.name, at) for at in body.capsule])
                 self.axes.add_patch(_capsule(ends, body.radius * MM, color))
@@ -146,11 +158,12 @@ class _Drawing:
             mark = "centre of mass" if i == 0 else None
             self.axes.plot(*center, "k+", ms=6, mew=1.2, zorder=6, ls="", label=mark)
             if self._names:
-                self._text(corners.mean(axis=0), body.name, (0, 8), color)
+                self._name(i, body.name, corners, color)
 
     def joints(self) -> None:
         """Revolute joints as circles, prismatic ones as sliders on their axis; closures are
-        filled."""
+        filled. Joints at one place have their names below each other."""
+        names: dict[tuple[float, ...], list[str]] = {}
         for joint in self.linkage.joint:
             if joint.type == "free":
                 continue
@@ -160,8 +173,7 @@ class _Drawing:
             else:
                 self._circle(place, "w")
             self._ground(joint.parent, place)
-            if self._names:
-                self._text(place, joint.name, (6, -11), "0.35")
+            names.setdefault(tuple(np.round(place, 6)), []).append(joint.name)
         for loop in self.linkage.loop:
             place = self._world(loop.bodies[0], loop.at[0])
             if loop.type != "revolute":
@@ -169,6 +181,12 @@ class _Drawing:
             self._circle(place, "k")
             if "ground" in loop.bodies:
                 self._ground("ground", place)
+        middle = self._extent().mean(axis=0)
+        for at, several in names.items() if self._names else ():
+            right, up = at[0] > middle[0], at[1] > middle[1]
+            offset = (7 if right else -7, 6 if up else -6)  # away from the mechanism
+            where = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
+            self._text(at, "\n".join(several), offset, "0.3", **where)
         if self.linkage.loop:
             self.axes.plot([], [], "ko", ms=6, label="joint that closes a loop")
 
@@ -177,7 +195,7 @@ class _Drawing:
 
     def _ground(self, body: str, place: Pose) -> None:
         if body == "ground":
-            self.axes.plot(*place, marker=(3, 0, 0), color="0.4", ms=13, zorder=1)
+            self.axes.plot(*place, marker=(3, 0, 0), color="0.55", ms=17, zorder=1)
 
     def _slider(self, joint: Joint, place: Pose) -> Pose:
         """The place of the slider; its axis is drawn through it."""
@@ -202,8 +220,13 @@ class _Drawing:
         self.axes.plot(*ends.T, color="0.4", lw=1, ls="-.", zorder=1)
 
     def _size(self) -> float:
+        """The larger side of `_extent` (mm)."""
+        return float(np.ptp(self._extent(), axis=0).max()) or 100.0
+
+    def _extent(self) -> Pose:
+        """The least and the largest x and y (mm) of all joints and points, (2, 2)."""
         found = np.array([p for b in self.linkage.body for p in self._attached(b.name)])
-        return float(np.ptp(found, axis=0).max()) or 100.0
+        return np.array([found.min(axis=0), found.max(axis=0)])
 
     def springs(self) -> None:
         """Springs and dampers between points of bodies."""
@@ -226,11 +249,36 @@ class _Drawing:
         held = self.linkage.operational_point
         return np.array([*(self._world(held.body, held.at) / MM), self._at[held.body][2]])
 
-    def _text(self, place: Pose, text: str, offset: tuple[int, int], color: str) -> None:
+    def _name(self, i: int, name: str, corners: Pose, color: str) -> None:
+        """The name of the i-th body: on the inner side of a line, beside a single point."""
+        middle, inward = corners.mean(axis=0), np.array([0.0, 0.7])
+        if len(corners) == 2:
+            low, high = sorted(corners.tolist(), key=lambda corner: corner[1])
+            x, y = np.subtract(high, low)
+            if abs(y) > abs(x):  # neighbours have their names at different heights
+                middle = np.array(low) + (0.6, 0.4)[i % 2] * np.array([x, y])
+            inward = np.array([-y, x]) / np.hypot(x, y)
+            inward = inward if inward @ (self._extent().mean(axis=0) - middle) > 0 else -inward
+        elif len(corners) == 1:
+            right, up = middle > self._extent().mean(axis=0)
+            inward = np.array([0.8 if right else -0.8, -0.6 if up else 0.6])
+        side = "left" if inward[0] > 0.3 else "right" if inward[0] < -0.3 else "center"
+        dark = tuple(0.65 * part for part in _rgb(color))
+        offset = (12 * inward[0], 12 * inward[1])
+        self._text(middle, name, offset, dark, ha=side, va="center")
+
+    def _text(
+        self,
+        place: Sequence[float] | Pose,
+        text: str,
+        offset: tuple[float, float],
+        color: str | tuple[float, ...],
+        **how: Any,
+    ) -> None:
         halo: dict[str, Any] = {"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7}
         self.axes.annotate(
-            text, tuple(place), xytext=offset, textcoords="offset points", fontsize="x-small",
-            color=color, zorder=8, bbox=halo,
+            text, tuple(place), xytext=offset, textcoords="offset points", fontsize="small",
+            color=color, zorder=8, bbox=halo, **how,
         )  # fmt: skip
 
 

@@ -35,12 +35,12 @@ def ending(results: Results) -> str:
 
 def numbers(results: Results) -> Iterator[str]:
     """What one would open the figures for: tracking error, largest forces, closure of the loops."""
-    if has_tracking(results) and len((error := pose_error(results)).time):
-        distance = error.distance
+    if has_tracking(results) and len((error := pose_error(results)).time_s):
+        distance = error.distance_mm
         rms = float(np.sqrt(np.mean(distance**2)))
         yield (
             f"handle at most {short(distance.max())} mm from the operational point, "
-            f"{short(rms)} mm RMS; at most {short(error.angle.max())} rad"
+            f"{short(rms)} mm RMS; at most {short(error.angle_rad.max())} rad"
         )
     if found := wrenches(results):
         peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())

@@ -16,9 +16,9 @@ BRANCH = "virtual_environment.branch_ok"
 class Tracking(NamedTuple):
     """Distance |x_S - x_D| (mm) and angle |theta_S - theta_D| (rad) at times (s)."""
 
-    time: Vector
-    distance: Vector
-    angle: Vector
+    time_s: Vector
+    distance_mm: Vector
+    angle_rad: Vector
 
 
 def table_of(results: Results, signal: str) -> Table | None:

@@ -1,4 +1,8 @@
-"""Binds the operations of a plan to the calls that execute them."""
+"""Binds the operations of a plan to the calls that execute them.
+
+A bound operation is a function of the event's tick. Slices of the signal vector and instants are
+resolved once, when an operation is bound, so that the event loop calls no more than is necessary.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +40,12 @@ class Stop(Exception):
 
 
 class Binder:
-    """Binds operations to the objects of a simulation; `calls` returns the bound operations of a
-    part of the plan, for step control."""
+    """Binds operations to the FMUs, holds and signals of a simulation.
+
+    calls: returns the bound operations of a part of the plan, for step control. `loops` and
+    `advancers` are the fixed-point iterations and the step controls that were bound, whose counts
+    the run reports.
+    """
 
     def __init__(self, simulation: Simulation, calls: Callable[[Part], Sequence[Call]]) -> None:
         self._simulation, self._calls = simulation, calls
@@ -91,10 +99,11 @@ class Binder:
                 return self._stop_when()
 
     def _step(self, fmu: str, dticks: int, part: int, parts: int) -> Call:
+        """doStep over `dticks`, or over substep `part` of `parts`; outputs are stamped at its end,
+        those of a sampled block at its start."""
         simulation = self._simulation
         step, seconds = simulation.instances[fmu].step, simulation.seconds
         size, check = seconds(dticks), simulation.step_checks.get(fmu)
-        # A sampled output is stamped at the start of its step.
         valid = 0 if simulation.system.fmu[fmu].sampled else dticks
         if parts > 1:
             base = simulation.system.timeline.base / parts
@@ -115,6 +124,8 @@ class Binder:
         return lambda tick: step(seconds(tick), seconds(tick + valid), size)
 
     def _push(self, connection: str, ahead: int) -> Call:
+        """Pushes the source's sample into the hold; it arrives at the tick of the event. Sources
+        that are adjacent in the signal vector are passed as a view, without a copy."""
         simulation = self._simulation
         hold, values = simulation.holds[connection], simulation.signals.values
         sources = simulation.signals.sources(simulation.system.connection[connection])
@@ -124,6 +135,7 @@ class Binder:
         return lambda tick: hold.push(tick + ahead, values[sources], tick)
 
     def _evaluate(self, connection: str, ahead: float) -> Call:
+        """Writes the hold's value `ahead` ticks after the event to the target's held input."""
         simulation = self._simulation
         hold, view = (
             simulation.holds[connection],
@@ -136,6 +148,9 @@ class Binder:
         return evaluate
 
     def _derive(self, connection: str, ahead: float, order: int, width: float) -> Call:
+        """Writes the hold's value at the beginning of a step of `width` ticks, the derivatives
+        there up to `order`, and the mean over the step, from the polynomial through order + 1
+        equidistant values."""
         simulation = self._simulation
         hold, values, signals = (
             simulation.holds[connection],
@@ -161,6 +176,7 @@ class Binder:
         return self.advancers[clock]
 
     def _blend(self, connection: str, points: tuple[tuple[float, Fraction], ...]) -> Call:
+        """Writes a weighted sum of the hold's values at several instants."""
         simulation = self._simulation
         hold, view = (
             simulation.holds[connection],
@@ -192,6 +208,7 @@ class Binder:
         return loop
 
     def _stop_when(self) -> Call:
+        """Raises Stop as soon as the scene's stop condition holds."""
         simulation = self._simulation
         condition = simulation.system.ends_when
         assert condition is not None

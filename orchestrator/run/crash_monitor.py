@@ -1,5 +1,8 @@
-"""A watchdog process for runs that load foreign FMUs into their own process: if such an FMU crashes
-the run, it records that in run.json and removes the temporary folders."""
+"""A watchdog process for runs that load foreign FMUs into their own process.
+
+If such an FMU crashes the process of the run, the watchdog records a fault of kind `Crash` in
+run.json and removes the temporary folders.
+"""
 
 from __future__ import annotations
 
@@ -16,25 +19,30 @@ from hapticlink.orchestrator.base import interrupt, temporary_folders
 
 
 @contextmanager
-def beside(folder: Path) -> Iterator[None]:
-    """Context in which a crash of this process is recorded in `folder`/run.json, and in which
-    Python code that ends the process (os._exit) does not end it with 0, which is a good end."""
+def watched(folder: Path) -> Iterator[None]:
+    """Context in which a crash of this process is recorded in `folder`/run.json.
+
+    Within it os._exit, with which Python code of an FMU can end the process, changes exit status 0
+    to 1, since 0 would mean a regular end of the run.
+    """
     command = [sys.executable, "-P", "-m", __name__, str(folder.resolve()), str(os.getpid())]
-    # In a session of its own, so that it gets no Ctrl-C. Its stdin ends when this process ends.
+    # A session of its own keeps the terminal's Ctrl-C from it. Its standard input is closed by the
+    # operating system when this process ends.
     with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
         interrupt.add(process.kill)
-        leave = os._exit
-        os._exit = lambda status: leave(status or 1)
+        exit_at_once = os._exit
+        os._exit = lambda status: exit_at_once(status or 1)
         try:
             yield
         finally:
-            os._exit = leave
+            os._exit = exit_at_once
             interrupt.remove(process.kill)
             process.kill()
 
 
-def finish(folder: Path, process: int) -> None:
-    """Completes run.json and removes the temporary folders of the run that died in `process`."""
+def record_crash(folder: Path, process: int) -> None:
+    """Records in run.json that the run with the given process ID has crashed, and removes its
+    temporary folders. Without a row of that run, only prints a message."""
     from hapticlink.orchestrator.results.files import write_json
     from hapticlink.orchestrator.results.tables import load
 
@@ -45,23 +53,23 @@ def finish(folder: Path, process: int) -> None:
         "an FMU may have crashed it: with isolate = true each FMU has a process of its own, and "
         "the run names the one that crashes"
     )
-    if _process(folder) != process:  # that run has written no row
+    if _process(folder) != process:  # the crashed run has written no row
         print(f"hapticlink: the process ended before its first row; {remedy}", file=sys.stderr)
         return
     results = load(folder)
-    story = dict(results.run)
-    time = float(results.tables[story["rates"][0]]["time"][-1])
+    content = dict(results.run)
+    time = float(results.tables[content["rates"][0]]["time"][-1])
     message = f"the process of the run ended after t = {time!r} s; {remedy}"
-    story |= {
+    content |= {
         "end": {"reason": "fault", "time": time},
         "fault": {"kind": "Crash", "message": message},
     }
-    write_json(folder / "run.json", story)
+    write_json(folder / "run.json", content)
     print(f"hapticlink: {message}; results are in {folder}", file=sys.stderr)
 
 
 def _process(folder: Path) -> int | None:
-    """The process of the run in progress in `folder`, from its run.json; None without one."""
+    """The process ID of the run in progress in `folder`, from its run.json; None without one."""
     try:
         end = json.loads((folder / "run.json").read_text(encoding="utf-8"))["end"]
         process: int | None = end.get("process")
@@ -71,12 +79,12 @@ def _process(folder: Path) -> int | None:
 
 
 def main() -> None:
-    """Waits for the end of the run's process; a run that ends regularly kills this one first."""
+    """Waits until the run's process ends. A run that ends regularly kills this process first."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     sys.stdin.buffer.read()
     with suppress(OSError):  # a full disk, or a folder that was removed
-        finish(Path(sys.argv[1]), int(sys.argv[2]))
+        record_crash(Path(sys.argv[1]), int(sys.argv[2]))
 
 
 if __name__ == "__main__":

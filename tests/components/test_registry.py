@@ -1,4 +1,4 @@
-"""The registry of parts: names, what is near them, who registered which."""
+"""The registry of parts: names, suggestions for misspelt ones, and who registered them."""
 
 import pytest
 

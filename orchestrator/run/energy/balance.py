@@ -4,7 +4,7 @@ The mechanism: E(t) - E(0) <= W, the work of the wrenches held on its inputs. Th
 integrator stays far below the energies involved; a gain of more than these means divergence.
 
 The loop: sum of generated <= sum of the work of the hands as ideal sources. Sampling and holding
-that generate more energy than was ever put in have made the loop unstable.
+that generate more energy than was ever put in indicate an unstable loop.
 """
 
 from __future__ import annotations

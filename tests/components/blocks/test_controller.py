@@ -48,7 +48,7 @@ def projector(vectors):
     return basis @ basis.T
 
 
-def resisted(length_scale):
+def constrained(length_scale):
     """P_c of a mechanism that resists one wrench direction, in coordinates scaled by L."""
     S = np.diag([1, 1, length_scale])
     _, vector = np.linalg.eigh(S @ LAMBDA_INV @ S)
@@ -99,7 +99,7 @@ def test_moving_device_accelerates_like_the_mechanism():
 def test_whole_law():
     rng = np.random.default_rng(5)
     x_S, v_S, x_D, v_D, F_env, c, a_bias, x_ref = rng.normal(size=(8, 3)) * [1, 1, 10] / 10
-    P_c = resisted(L)
+    P_c = constrained(L)
     K_pc, B_pc = np.array([100, 100, 0.5]), np.array([70, 70, 0.375])
     B_d, K_d = np.array([1.0, 2, 0.01]), np.array([30.0, 20, 0.1])
     running = block(
@@ -197,8 +197,8 @@ def test_plain_form_leaks_onto_free_motion_and_depends_on_the_scale():
     """The form for comparison fails what the default meets, on the report's own Lambda^-1."""
     pull = np.array([1.0, -2.0, 30.0])
     free = LAMBDA_INV @ np.array([1.0, 0.5, -0.05])  # any motion that the mechanism can make
-    plain = {n: constraint_map(resisted(n), n, _plain) @ pull for n in (0.02, L, 0.3)}
-    F_T = {n: constraint_map(resisted(n), n) @ pull for n in (0.02, L, 0.3)}
+    plain = {n: constraint_map(constrained(n), n, _plain) @ pull for n in (0.02, L, 0.3)}
+    F_T = {n: constraint_map(constrained(n), n) @ pull for n in (0.02, L, 0.3)}
     size = np.linalg.norm(F_T[L]) * np.linalg.norm(free)
     assert abs(F_T[L] @ free) < 1e-10 * size
     assert abs(plain[L] @ free) > 1e-3 * size
@@ -210,7 +210,7 @@ def test_plain_form_leaks_onto_free_motion_and_depends_on_the_scale():
 @settings(max_examples=60, deadline=None)
 @given(pulls)
 def test_constraint_wrench_at_both_ends(pull):
-    """Nothing resisted: no wrench. Everything: the device's whole inertia, M_d pull."""
+    """No constrained direction: no wrench. All: the device's whole inertia, M_d pull."""
     np.testing.assert_array_equal(constraint_map(np.zeros((3, 3))) @ pull, 0)
     np.testing.assert_allclose(constraint_map(np.eye(3)) @ pull, M @ pull, atol=1e-13)
 
@@ -223,8 +223,8 @@ def test_constraint_wrench_accelerates_the_device_by_the_pull_where_resisted():
 
 
 def test_topology_form_plain_is_used_when_named():
-    inputs = {"x_S": (0.01, 0, 0.2), "M": M, "P_c": resisted(L)}
+    inputs = {"x_S": (0.01, 0, 0.2), "M": M, "P_c": constrained(L)}
     spec = {"impedance": False, "teleoperation": False}
     y = block(inputs, **spec, topology=specs.Topology(form="plain")).y
-    expected = constraint_map(resisted(L), f=_plain) @ [2.0, 0, 40.0]
+    expected = constraint_map(constrained(L), f=_plain) @ [2.0, 0, 40.0]
     np.testing.assert_allclose(y["F_constraint"], expected, rtol=1e-12)

@@ -32,9 +32,9 @@ def test_mobility_and_projector_at_the_start():
     np.testing.assert_allclose(y["Lambda_inv"], Lambda_inv, atol=1e-12 * 522)
     S = np.diag([1, 1, L])
     U, values, _ = np.linalg.svd(S @ Lambda_inv @ S)  # (B.14), by LAPACK
-    resisted = U[:, values / values[0] < 0.1]
-    np.testing.assert_allclose(y["P_c"], resisted @ resisted.T, atol=1e-10)
-    assert y["n_constraints"] == resisted.shape[1] == 1
+    constrained = U[:, values / values[0] < 0.1]
+    np.testing.assert_allclose(y["P_c"], constrained @ constrained.T, atol=1e-10)
+    assert y["n_constraints"] == constrained.shape[1] == 1
     np.testing.assert_allclose(y["P_c"] @ S @ y["Lambda_inv"] @ S @ y["P_c"], 0, atol=1e-10)
 
 

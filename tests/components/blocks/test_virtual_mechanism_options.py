@@ -1,4 +1,4 @@
-"""What a scene can ask of the mechanism: more hands, rank of the closures, a local model."""
+"""Options of the mechanism: further hands, rank of the closures, the local model."""
 
 import dataclasses
 import math

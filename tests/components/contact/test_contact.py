@@ -219,8 +219,8 @@ def test_the_hand_feels_what_all_contacts_do_at_the_operational_point():
     np.testing.assert_allclose(J_h @ five.y["qdd"], free + caused, rtol=1e-7)
     # Least norm in the scaled metric: nothing along the constrained direction.
     S = np.diag([1, 1, np.mean(L)])
-    resisted = np.linalg.eigh(S @ Lambda_inv @ S)[1][:, 0]
-    assert resisted @ np.linalg.solve(S, F_env) == pytest.approx(0, abs=1e-9)
+    constrained = np.linalg.eigh(S @ Lambda_inv @ S)[1][:, 0]
+    assert constrained @ np.linalg.solve(S, F_env) == pytest.approx(0, abs=1e-9)
 
 
 def test_geometry_found_by_the_graphics_block_gives_the_same_forces_at_its_pose():

@@ -1,4 +1,4 @@
-"""Links that sink in deeper than their radius are pushed back, and return what they brought."""
+"""Links that penetrate deeper than their radius are pushed back and keep their energy."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Start rates: what a scene gives is kept, the rest is that of the geometry, by hand."""
+"""Start rates: those of the scene are kept, the others follow from the geometry (by hand)."""
 
 from __future__ import annotations
 

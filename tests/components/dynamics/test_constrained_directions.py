@@ -1,4 +1,4 @@
-"""Eigenvalues in bounded work, and the count and projector made of them."""
+"""Eigenvalues with bounded work; number and projector of the constrained directions."""
 
 import casadi as ca
 import numpy as np

@@ -1,4 +1,4 @@
-"""The linearly implicit method where explicit ones blow up: L-stability on a stiff joint."""
+"""L-stability of the linearly implicit method on a stiff joint, where explicit methods diverge."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Files made from a scene, and what would run, from Python."""
+"""Building, exporting and explaining a scene from Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs from Python: in memory, in a folder, beside what the command does."""
+"""Runs from Python, in memory and in a folder, compared with those of the command."""
 
 from __future__ import annotations
 

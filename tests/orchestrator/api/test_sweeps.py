@@ -1,4 +1,4 @@
-"""Sweeps from Python, beside those of the command."""
+"""Sweeps from Python, compared with those of the command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What nobody has foreseen is told in two lines, with a report in a file."""
+"""An unexpected error is reported in two lines, with its traceback in a file."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`info` tells and draws where the device's workspace lies; a start outside it is told."""
+"""`info` prints and draws the device's workspace, and warns if a scene starts outside it."""
 
 from pathlib import Path
 

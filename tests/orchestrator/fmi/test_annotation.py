@@ -1,4 +1,4 @@
-"""What FMUs declare of their ports: what a component says comes back, what is malformed is told."""
+"""Declarations of ports in the annotation: read back as written; malformed ones are refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Malformed FMUs and SSPs are refused with a reason, and nothing of them lands anywhere."""
+"""Malformed FMUs and SSPs are refused with a reason and write no file."""
 
 import stat
 import zipfile

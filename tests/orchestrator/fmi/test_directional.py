@@ -1,4 +1,4 @@
-"""Directional derivatives of compiled FMUs in Newton's method: used, doubted, and done without."""
+"""Directional derivatives of compiled FMUs in Newton's method: correct, wrong and missing ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What FMUs say is kept, but not all of it."""
+"""Log messages of FMUs are kept up to their bounds."""
 
 from hapticlink.orchestrator.fmi import messages
 

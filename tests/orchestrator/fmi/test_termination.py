@@ -1,4 +1,4 @@
-"""An FMU that asks to end the simulation ends it in good order, with its last row."""
+"""An FMU that requests the end of the simulation: a regular end with the last row."""
 
 from pathlib import Path
 

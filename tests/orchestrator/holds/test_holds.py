@@ -1,4 +1,4 @@
-"""Laws of the holds, on samples without FMUs: what each reproduces, and what stays what it is."""
+"""Laws of the holds on samples, without FMUs: polynomials that each reproduces, and invariants."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`--explain`, phases and recorded traces: what runs when is told, and is what runs."""
+"""`--explain`, phases and recorded traces: the printed plan is the plan that is executed."""
 
 from __future__ import annotations
 

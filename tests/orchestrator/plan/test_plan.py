@@ -12,7 +12,7 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Get, Record, Set, Step
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import Delay, comes_round, delays
+from hapticlink.orchestrator.plan.sample_ages import Delay, delays, pattern_end
 from hapticlink.orchestrator.plan.schemes import SCHEMES
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.system.system import System
@@ -102,12 +102,12 @@ def test_nothing_reads_the_future_and_holds_give_the_newest(
 
 @shared
 @given(timelines, couplings)
-def test_ages_are_those_of_every_use_until_the_plan_comes_round(
+def test_ages_are_those_of_every_use_until_the_pattern_repeats(
     stamped: Make, timeline: Timeline, coupling: str
 ) -> None:
     plan = Plan(stamped(timeline, coupling))
     ages: dict[str, list[int]] = {}
-    for tick, connection, stamp in uses(plan, comes_round(plan.system)):
+    for tick, connection, stamp in uses(plan, pattern_end(plan.system)):
         if tick:
             ages.setdefault(connection, []).append(tick - stamp)
     seconds = timeline.seconds
@@ -119,7 +119,7 @@ def test_ages_are_those_of_every_use_until_the_plan_comes_round(
 
 @shared
 @given(timelines, st.sampled_from(CAUSAL))
-def test_what_comes_round_is_no_older_later(
+def test_ages_do_not_grow_after_the_first_repetition(
     stamped: Make, timeline: Timeline, coupling: str
 ) -> None:
     plan = Plan(stamped(timeline, coupling))

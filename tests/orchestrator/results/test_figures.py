@@ -1,4 +1,4 @@
-"""Figures say what a run has: in their titles, and by what is drawn."""
+"""Figures: their titles, and the signals that they draw."""
 
 from pathlib import Path
 from typing import Any

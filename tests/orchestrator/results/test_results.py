@@ -1,4 +1,4 @@
-"""CSV files give back the very floats."""
+"""CSV files preserve every double exactly."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""A run that leaves physics says so and does not end with 0, though all its numbers are finite."""
+"""A run that diverges with finite values is reported and does not end with status 0."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Isolated FMUs that step at the same time: they do, and nobody can tell from results or faults."""
+"""Isolated FMUs step concurrently, with the same results and faults as one after the other."""
 
 from pathlib import Path
 

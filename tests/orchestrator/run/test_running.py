@@ -1,4 +1,4 @@
-"""What a run leaves in its folder, what it tells of itself, and how it takes a signal."""
+"""Result folder and messages of a run, and its reaction to signals."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""Scenes and options from anywhere: refused with a place, in time that grows with their size."""
+"""Untrusted scenes and options: refused with their place, in time proportional to their size."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Keys of a scene in every spelling of TOML, and faults told where the key really stands."""
+"""Keys of a scene in every notation of TOML, and the line at which their faults are reported."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""An exported SSP in other masters: what starts elsewhere or is read in another order shows."""
+"""An exported SSP in other masters, compared with the project's own run."""
 
 from __future__ import annotations
 

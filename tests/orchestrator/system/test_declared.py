@@ -1,4 +1,5 @@
-"""What ports mean comes from the FMU: under any name, twice, in an SSP, and never from a name."""
+"""Declarations of ports come from the FMU, under any instance name, for two instances and in an
+SSP; nothing is inferred from a port's name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Latency and loss on connections: no value is used before it can be there, seeds repeat."""
+"""Latency and loss: no sample is used before it has arrived, and seeds are reproducible."""
 
 from __future__ import annotations
 

@@ -1,0 +1,70 @@
+"""What pages state about the results of their examples."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from tests.docs.pages import ROOT, blocks
+
+
+def written(page: str, title: str, folder: Path) -> Path:
+    """A file that a page gives, in `folder`."""
+    (found,) = (b for b in blocks(ROOT / page, "toml", "python") if b.title == title)
+    path = folder / title
+    path.write_text(found.text, encoding="utf-8")
+    return path
+
+
+def test_watt_s_linkage_draws_watt_s_curve(tmp_path: Path) -> None:
+    """With levers b = 60 mm, pivots 2a apart and a coupler of 2c = 30 mm, in the frame of the
+    pivots: (x^2 + y^2) (x^2 + y^2 - a^2 - b^2 + c^2)^2 + 4 a^2 y^2 (x^2 + y^2 - b^2) = 0."""
+    run = hl.run(written("docs/mechanisms.md", "watt.toml", tmp_path))
+    assert run.fault is None
+    x, y, theta = run["virtual_mechanism.x"].T
+    a, b, c = np.hypot(0.06, 0.015), 0.06, 0.015
+    along = np.array([0.06, -0.015]) / a
+    u, v = along[0] * x + along[1] * y, along[0] * y - along[1] * x
+    r2 = u**2 + v**2
+    curve = r2 * (r2 - a**2 - b**2 + c**2) ** 2 + 4 * a**2 * v**2 * (r2 - b**2)
+    # Slope of the left side at the double point, where the curve crosses itself: second order.
+    assert np.abs(curve).max() < 1e-8 * a**6
+    q = run["virtual_mechanism.q"]
+    np.testing.assert_allclose(theta, q[:, 0] + q[:, 1], rtol=0, atol=1e-12)
+    assert theta[0] == pytest.approx(-np.pi / 2, abs=1e-6)
+    assert np.abs(x).max() < 0.15e-3
+    assert [y.min(), y.max()] == pytest.approx([-0.02, 0.02], abs=0.5e-3)
+    assert run.tracking().distance_mm.max() < 0.03
+    assert set(run["virtual_environment.n_constraints"]) == {2.0}
+
+
+def test_the_first_variation_ends_early() -> None:
+    run = hl.run("closed-loop", {"graphics.rate": 10, "controller.topology": False})
+    assert run.fault is None
+    end = run.run["end"]
+    assert end["reason"] == "stop_when"
+    assert end["time"] == pytest.approx(2.1, abs=0.05)
+
+
+def test_the_handle_stays_within_5_mm() -> None:
+    distance = hl.run("closed-loop").tracking().distance_mm
+    assert 4 < distance.max() < 5
+
+
+def test_an_own_controller_acts_as_the_scene_s_own_block(tmp_path: Path) -> None:
+    """The FMU of pythonfmu and the block with the same law: the same to rounding."""
+    script = written("docs/foreign-fmus.md", "spring_coupling.py", tmp_path)
+    build = str(Path(sys.executable).with_name("pythonfmu"))
+    command = [build, "build", "-f", script.name]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    swap = {"fmu.+": {"replaces": "controller", "path": str(tmp_path / "SpringCoupling.fmu")}}
+    law = {"controller.impedance": False, "controller.topology": False}
+    own, built_in = (hl.run("closed-loop", {"duration": 0.5, **o}) for o in (swap, law))
+    for signal in ("virtual_mechanism.x", "haptic_device.x_true", "controller.F_drift"):
+        assert np.ptp(built_in[signal], axis=0).min() > 0
+        np.testing.assert_allclose(own[signal], built_in[signal], rtol=1e-9, atol=1e-12)

@@ -1,0 +1,142 @@
+"""The examples of the pages: files, commands and scripts run as they are printed.
+
+docs/extending.md has a test of its own (tests/test_extending.py), docs/first_steps.py too
+(tests/test_public_names.py); docs/api.md is generated from the docstrings.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from itertools import groupby
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.commands import COMMANDS, _commands, app
+from hapticlink.orchestrator.plan import schemes  # noqa: F401 (registers the schemes)
+from hapticlink.orchestrator.scene.json_schema import json_schema
+from hapticlink.orchestrator.sweep.grid import grid, parse
+from tests.docs.pages import PAGES, ROOT, Block, blocks, name, prose
+from tests.plugins import hapticlink
+
+ELSEWHERE = {"docs/extending.md", "docs/api.md"}
+WITH_EXAMPLES = [p for p in PAGES if name(p) not in ELSEWHERE and [*blocks(p, "sh", "python")]]
+SHORTER = {"hapticlink sweep": 0.02, "hapticlink run closed-loop": 0.2}
+"""Duration (s) of commands that take longer than their page needs."""
+NOT_RUN = {
+    "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,foh":
+        "many runs; docs/holds.md has a sweep that is run",
+    "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh":
+        "many runs",
+    "hapticlink study": "more than 1,000 runs; tests/orchestrator/study/test_study.py",
+    "hapticlink reproduce": "its runs: tests/reference/test_closed_loop.py",
+    "hapticlink bench mechanism": "needs other codes",
+    "hapticlink bench singular": "is long",
+    "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
+        "compiles for minutes; tests/orchestrator/scene/test_packaging.py",
+    "hapticlink sweep closed-loop --vary graphics.rate=10..60 --scheduler tcp://10.0.0.5:8786":
+        "needs a cluster; tests/orchestrator/sweep/test_sweep.py",
+    "hapticlink run their.ssp --set haptics.rate=100 --set duration=10 --set fmu.engine.rate=20":
+        "is of somebody else's file; tests/orchestrator/ssp/test_ssp.py",
+}  # fmt: skip
+"""Commands that are parsed, with their scene, keys and values, but not run; the reason."""
+TOOLS = ("fmpy", "pythonfmu")
+"""Commands of other packages, which are installed beside Python."""
+
+
+def shown(command: str) -> str:
+    """A command as it is run, some with a shorter duration."""
+    limits = (f" --set duration={limit}" for key, limit in SHORTER.items() if key in command)
+    return command + next(limits, "")
+
+
+def failures(folder: Path, block: Block) -> dict[str, str]:
+    """Executes a block in `folder`; what each of its commands that failed has printed."""
+    if block.title:
+        (folder / block.title).write_text(block.text, encoding="utf-8")
+        return {}
+    if block.language == "python":
+        return _failed(folder, sys.executable, "-c", block.text)
+    found = {}
+    wanted = [c for c in block.commands if c not in NOT_RUN]
+    for ours, commands in groupby(wanted, lambda c: c.startswith("hapticlink ")):
+        if ours:
+            each = [*commands]
+            ended = hapticlink(folder, *map(shown, each))
+            found |= {c: e.said for c, e in zip(each, ended, strict=True) if e.status}
+            continue
+        for command in commands:
+            words = shlex.split(command)
+            if words[0] in TOOLS:
+                found |= _failed(folder, str(Path(sys.executable).with_name(words[0])), *words[1:])
+    return found
+
+
+def _failed(folder: Path, *words: str) -> dict[str, str]:
+    done = subprocess.run(
+        words, cwd=folder, capture_output=True, text=True, check=False,
+        env={**os.environ, "MPLBACKEND": "agg"},
+    )  # fmt: skip
+    return {" ".join(words): done.stdout + done.stderr} if done.returncode else {}
+
+
+@pytest.mark.parametrize("page", WITH_EXAMPLES, ids=name)
+def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
+    failed: dict[str, str] = {}
+    for block in blocks(page, "toml", "python", "sh"):
+        if block.title or block.language != "toml":
+            failed |= failures(tmp_path, block)
+    assert failed == {}
+
+
+def every_command(page: Path) -> list[str]:
+    """The commands in the shell blocks of a page and within its text, except for those of which it
+    only gives the name."""
+    inline = re.findall(r"`(hapticlink [^`]+)`", prose(page))
+    several = [c.strip() for text in inline for c in text.partition(" > ")[0].split(";")]
+    found = [*several, *(c for block in blocks(page, "sh") for c in block.commands)]
+    named = {f"hapticlink {name}" for name in COMMANDS} - {"hapticlink info", "hapticlink schema"}
+    ours = re.compile(rf"hapticlink ({'|'.join(COMMANDS)})( |$)")
+    return [command for command in found if ours.match(command) and command not in named]
+
+
+PARSED = [p for p in PAGES if name(p) not in ELSEWHERE and every_command(p)]
+
+
+@pytest.mark.parametrize("page", PARSED, ids=name)
+def test_every_command_can_be_parsed(page: Path) -> None:
+    """Options, and keys and values of shipped scenes; those of sweeps too."""
+    _commands([])
+    for command in every_command(page):
+        _, bound, _ = app.parse_args(shlex.split(command)[1:], exit_on_error=False)
+        scene = bound.args[0] if bound.args else None
+        if scene in hl.shipped():
+            for point in grid([parse(text) for text in bound.kwargs.get("vary") or ()]):
+                varied = (f"{key}={value}" for key, value in point.items())
+                hl.scene(scene, [*(bound.kwargs.get("set") or ()), *varied])
+
+
+def test_extras_that_are_installed_exist() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    text = "".join(block.text for page in PAGES for block in blocks(page, "sh"))
+    named = set(re.findall(r"'\.\[(\w+)\]'", text))
+    assert named >= {"test", "native"}
+    assert named <= {*project["optional-dependencies"]}
+
+
+WITH_EXCERPTS = [p for p in PAGES if name(p) not in ELSEWHERE and [*blocks(p, "toml")]]
+
+
+@pytest.mark.parametrize("page", WITH_EXCERPTS, ids=name)
+def test_excerpts_of_scenes_follow_the_schema(page: Path) -> None:
+    """Tables and keys, without the rest of their scene."""
+    valid = jsonschema.Draft202012Validator(json_schema())
+    for block in blocks(page, "toml"):
+        valid.validate({"extends": "any", **tomllib.loads(block.text)})

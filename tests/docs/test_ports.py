@@ -1,0 +1,66 @@
+"""docs/ports.md lists every port of the project's blocks, with the unit that its FMU declares."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import hapticlink as hl
+from hapticlink.components.component import Variable
+from hapticlink.fmus.blocks import component
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.system.fmu_files import settled
+from hapticlink.orchestrator.system.timeline import timeline
+from tests.docs.pages import ROOT
+
+SCENES: list[tuple[str, Mapping[str, Any]]] = [
+    ("closed-loop", {"sensing": "encoders", "controller.bias": "full"}),
+    ("closed-loop", {"mechanism.directions": True, "mechanism.diagnostics": True}),
+    ("closed-loop", {"graphics.sync": "operational", "hand.damping": (1.0, 1.0, 0.1)}),
+    ("enclosure", {"controller.contact": True}),
+    ("local-model", {}),
+    ("two-hands", {"mechanism.directions": True}),
+]
+"""Scenes that have every port among them; n = 4 joint coordinates and one loop, m = 2, in each."""
+SIZES = {4: "n", 2: "m", 12: "k"}
+Row = tuple[str, str, str, str]
+"""Block, "input" or "output", port with its sizes, and units."""
+
+
+def declared() -> Iterator[Row]:
+    for name, options in SCENES:
+        scene = hl.scene(name, options)
+        time = timeline(scene)
+        for block in blocks(scene):
+            step = time.seconds(time.clock(time.of[block.name]).longest)
+            made = component(block.made_by, settled(scene, block, time), step)
+            for side, variables in (("input", made.inputs), ("output", made.outputs)):
+                yield from ((block.made_by, side, port(v), units(v)) for v in variables)
+
+
+def port(variable: Variable) -> str:
+    sizes = ",".join(SIZES.get(size, str(size)) for size in variable.shape)
+    return re.sub(r"^left\.", "POINT.", variable.name) + f"[{sizes}]" * bool(sizes)
+
+
+def units(variable: Variable) -> str:
+    return ", ".join(dict.fromkeys(variable.units))
+
+
+def listed() -> Iterator[Row]:
+    block = side = ""
+    for line in (ROOT / "docs" / "ports.md").read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("## "):
+            block = line[3:]
+        elif cells[0] in ("input", "output"):
+            side = cells[0]
+        elif line.startswith("| `"):
+            assert len(cells) == 4, line
+            assert cells[3], line
+            yield block, side, cells[0].strip("`"), cells[1]
+
+
+def test_the_page_lists_every_port_and_no_other() -> None:
+    assert sorted(listed()) == sorted(set(declared()))
