@@ -14,7 +14,7 @@ from tests.blocks import Running
 from tests.reference.absolute_coordinates import Absolute
 
 H = 1 / 512
-FREE = ("scotch-yoke", "peaucellier", "watt", "pantograph", "scissor-lift", "geared-five-bar")
+FREE = ("scotch-yoke", "peaucellier", "watt-six-bar", "pantograph", "scissor-lift", "geared-five-bar")
 DRIVEN = ("quick-return", "jansen")
 
 
@@ -100,7 +100,7 @@ def test_peaucellier_draws_a_straight_line():
 
 
 def test_watt_closes_as_two_pairs_of_circles():
-    for y in motion("watt", 0.5):
+    for y in motion("watt-six-bar", 0.5):
         crank, wrist, rocker = y["q"][:3]
         tip = polar(0.04, crank)
         elbow = circles(tip, 0.12, [0.1, 0.0], 0.09, 1)
