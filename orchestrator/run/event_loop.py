@@ -10,7 +10,7 @@ from time import perf_counter
 
 import numpy as np
 
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
 from hapticlink.orchestrator.plan.operations import (
     Event,
@@ -99,6 +99,10 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
     except OSError as error:  # a full disk, most of all
         full = Fault(f"{results.folder}: {error.strerror or error}")
         outcome.reason, outcome.fault = "fault", full
+    except Exception as error:
+        if (told := plugins.blamed(error)) is None:
+            raise
+        outcome.reason, outcome.fault = "fault", Fault(told)
     except KeyboardInterrupt:  # a second signal does not wait for the end of the event
         outcome.reason, outcome.fault = "interrupted", Interrupted(results.last)
     finally:
