@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import inspect
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -17,23 +19,31 @@ class Registry(dict[str, Part]):
     """The parts of one kind ("hold") by the names that a scene uses.
 
     The package's own parts are listed where the registry is created; those of plugins are added by
-    `register`. Looking up an unknown name raises ValueError with the nearest known one.
+    `register`. Looking up an unknown name raises ValueError with the nearest known one. misfit: why
+    a part cannot be one of this kind, "" where it can.
     """
 
-    def __init__(self, kind: str, parts: Mapping[str, Part]) -> None:
+    def __init__(
+        self, kind: str, parts: Mapping[str, Part], misfit: Callable[[Any], str] = lambda part: ""
+    ) -> None:
         super().__init__(parts)
-        self.kind = kind
+        self.kind, self.misfit = kind, misfit
         self.origins: dict[str, str] = {}
         """The module that has registered a part, by the part's name."""
         _REGISTRIES.append(self)
 
     def register(self, name: str, part: Part) -> None:
-        """Add a part. Raises ValueError for a name that another module has registered."""
+        """Add a part. Raises ValueError for a name that another module has registered or that is no
+        name, and for a part of another kind."""
         # A process of a pool runs the main module under another name.
         module = str(sys._getframe(1).f_globals["__name__"]).replace("__mp_main__", "__main__")
         if name in self and self.origins.get(name) != module:
             owner = self.origins.get(name, "hapticlink")
             raise ValueError(f"{self.kind} {name!r} is one of {owner}: take another name")
+        if not isinstance(name, str) or not re.fullmatch(r"\w[\w-]*", name):
+            raise ValueError(f"{self.kind} {name!r}: name it by letters, digits, _ and -")
+        if why := self.misfit(part):
+            raise ValueError(f"{self.kind} {name!r}: {part!r} {why}")
         self[name] = part
         self.origins[name] = module
 
@@ -49,6 +59,24 @@ class Registry(dict[str, Part]):
         """The names of the parts for which `fits` holds, for `Annotated[str, ...]` of a scene's
         key."""
         return Names(self, fits)
+
+
+def no_subclass(part: object, base: type) -> str:
+    """Why a part is no class that is derived from `base` and complete, "" if it is."""
+    if not inspect.isclass(part) or not issubclass(part, base):
+        return f"is no class derived from {base.__name__}"
+    missing = sorted(getattr(part, "__abstractmethods__", ()))
+    return f"does not define {', '.join(missing)}" if missing else ""
+
+
+def no_instance(part: object, base: type) -> str:
+    """Why a part is no `base`, "" if it is."""
+    return "" if isinstance(part, base) else f"is no {base.__name__}"
+
+
+def no_function(part: object) -> str:
+    """Why a part is no function, "" if it is."""
+    return "" if callable(part) else "is no function"
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,6 +31,10 @@ def component(
         made = BLOCKS[name](step_size, **settings)
     except (ValueError, ArithmeticError) as error:
         raise FmuError(f"{name}: {error}") from error
+    from hapticlink.components.component import Component  # loads casadi, as the block has done
+
+    if not isinstance(made, Component):
+        raise FmuError(f"{name}: the block gives {made!r}, no Component")
     parameters = tuple(replace(p, start=starts.get(p.name, p.start)) for p in made.parameters)
     return replace(made, parameters=parameters)
 

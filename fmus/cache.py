@@ -22,7 +22,6 @@ from types import ModuleType
 from typing import Any
 
 import hapticlink.components
-import hapticlink.fmus
 from hapticlink.components import registry
 
 LONGEST = 3600.0
@@ -51,10 +50,11 @@ def key(material: Mapping[str, Any]) -> str:
     """SHA-256 of the JSON `material`, the versions in VERSIONS and the sources of the equations,
     also those of plugins."""
     plugins = registry.origins("block", "force", "integrator")
+    package = sys.modules[__package__]  # this one, which imports this file
     whole = {
         "material": material,
         "versions": {name: version(name) for name in VERSIONS},
-        "sources": sources(hapticlink.components, hapticlink.fmus),
+        "sources": sources(hapticlink.components, package),
         "plugins": {name: source(name) for name in plugins},
     }
     return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()

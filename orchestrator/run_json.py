@@ -106,7 +106,14 @@ def _story(scene: Scene, plan: Plan) -> dict[str, Any]:
         "clocks": clocks(system.timeline),
         "stop_when": str(system.ends_when or ""),
         "base": f"{base.numerator}/{base.denominator} s",
-        "fmus": {u.name: {"rate": u.clock, "timing": u.description.timing} for u in system.fmus},
+        "fmus": {
+            u.name: {
+                "rate": u.clock,
+                "timing": u.description.timing,
+                "block": system.block(u.name),
+            }
+            for u in system.fmus
+        },
         "coupling": system.coupling,
         "loops": [asdict(loop) for loop in plan.loops()],
         "connections": [c.name for c in system.connections],
@@ -149,7 +156,7 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
             "steps": outcome.step_time,
         },
         "iterations": outcome.iterations and asdict(outcome.iterations),
-        "unstable": unstable(outcome.energies),
+        "unstable": unstable(system, outcome.energies),
         "step_errors": {name: asdict(errors) for name, errors in outcome.step_errors.items()},
         "controlled_steps": {clock: asdict(steps) for clock, steps in outcome.steps.items()},
     } | energies(system, outcome.energies)

@@ -7,10 +7,11 @@ functions here import their equations when they are called, so that reading a sc
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from hapticlink.components.registry import Registry
+from hapticlink.components.registry import Registry, no_function
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
@@ -89,6 +90,19 @@ def _discrete_equivalent(step_s: float, rule: str) -> Component:
     return discrete_equivalent(rule)
 
 
+def _misfit(part: Any) -> str:
+    """Why a part is no block, "" if it is one."""
+    if why := no_function(part):
+        return why
+    arguments = [*inspect.signature(part).parameters.values()]
+    if not arguments:
+        return "takes no communication step size"
+    for a in arguments[1:]:
+        if a.kind not in (a.POSITIONAL_OR_KEYWORD, a.KEYWORD_ONLY) or a.annotation is a.empty:
+            return f"has an argument {a}: a setting has a name and an annotation"
+    return ""
+
+
 BLOCKS: Registry[Callable[..., Component]] = Registry(
     "block",
     {
@@ -99,4 +113,5 @@ BLOCKS: Registry[Callable[..., Component]] = Registry(
         "hand": _hand,
         "discrete_equivalent": _discrete_equivalent,
     },
+    _misfit,
 )

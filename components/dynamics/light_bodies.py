@@ -19,8 +19,8 @@ import math
 import casadi as ca
 
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import UNITS, mean_link_length
-from hapticlink.components.specs.linkage import Body, Joint, Linkage
+from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.specs.linkage import COORDINATE_UNITS, Body, Joint, Linkage
 
 LIGHT = 1e-2  # relative to the mean
 
@@ -67,7 +67,8 @@ def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
         turning, light = [], []
         for joint in group:
             for i, own in enumerate(own_inertia(joint, bodies[joint.child])):
-                index, turns = model.coordinate(joint.name) + i, UNITS[joint.type][i] == "rad"
+                index = model.coordinate(joint.name) + i
+                turns = COORDINATE_UNITS[joint.type][i] == "rad"
                 turning += [index] if turns else []
                 light += [index] if own < LIGHT * mean * (length**2 if turns else 1) else []
         arm = ca.sumsqr(W[:, turning]) / len(turning) if turning else ca.SX(1)

@@ -16,14 +16,14 @@ import casadi as ca
 from hapticlink.components.component import Variable
 from hapticlink.components.forces import drives, gravity, joints, springs
 from hapticlink.components.forces.base import Force
-from hapticlink.components.registry import Registry
+from hapticlink.components.registry import Registry, no_subclass
 from hapticlink.components.specs.linkage import Linkage
 
 if TYPE_CHECKING:
     from hapticlink.components.linkage.model import LinkageModel
 
 KINDS = (gravity, springs, joints, drives)
-FORCES: Registry[type[Force]] = Registry("force", {})
+FORCES: Registry[type[Force]] = Registry("force", {}, lambda part: no_subclass(part, Force))
 
 
 def named(linkage: Linkage) -> tuple[Force, ...]:
@@ -51,6 +51,8 @@ def efforts(model: LinkageModel) -> ca.SX:
             Q = ca.SX(force.efforts(model))
         except KeyError as error:  # of frames, joints or parameters
             raise ValueError(f"force `{force.name}`: the linkage has no {error}") from error
+        except NotImplementedError as error:  # CasADi's, of what is no expression
+            raise ValueError(f"force `{force.name}`: efforts are no expression") from error
         if Q.shape != (n, 1):
             raise ValueError(f"force `{force.name}`: efforts of {Q.shape}, not {(n, 1)}")
         found.append(Q)

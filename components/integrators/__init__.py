@@ -14,7 +14,7 @@ from hapticlink.components.integrators import dormand_prince_8, heun, rk4
 from hapticlink.components.integrators.base import Integrator
 from hapticlink.components.integrators.linearly_implicit import LinearlyImplicit
 from hapticlink.components.integrators.semi_implicit_euler import SemiImplicitEuler
-from hapticlink.components.registry import Registry
+from hapticlink.components.registry import Registry, no_instance
 
 if TYPE_CHECKING:  # a scene is checked against the names, and that needs no equations
     import casadi as ca
@@ -28,6 +28,7 @@ METHODS: Registry[Integrator] = Registry(
         "rk4": rk4.METHOD,
         "dormand-prince-8": dormand_prince_8.METHOD,
     },
+    lambda part: no_instance(part, Integrator),
 )
 
 
@@ -41,5 +42,10 @@ def step(
     h: ca.SX,
     positions: Sequence[int],
 ) -> ca.SX:
-    """x(t + h) by the named method. Raises ValueError for an unknown name."""
-    return METHODS[method].step(ode, x, u, p, t, h, positions)
+    """x(t + h) by the named method. Raises ValueError for an unknown name, and for a method that
+    gives no expression of x's size."""
+    after = METHODS[method].step(ode, x, u, p, t, h, positions)
+    shape = getattr(after, "shape", type(after).__name__)
+    if shape != x.shape:
+        raise ValueError(f"integrator {method!r}: its step gives {shape}, not {x.shape}")
+    return after

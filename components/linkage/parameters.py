@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import COORDINATE_UNITS, Linkage
 from hapticlink.components.specs.quantities import Point
 
 
@@ -59,7 +59,7 @@ def loop_name(linkage: Linkage, index: int) -> str:
 
 
 def coordinate_units(linkage: Linkage) -> tuple[str, ...]:
-    return tuple(unit for j in linkage.joint for unit in UNITS[j.type])
+    return tuple(unit for j in linkage.joint for unit in COORDINATE_UNITS[j.type])
 
 
 def coordinates(linkage: Linkage, values: Mapping[str, float | tuple[float, ...]]) -> list[float]:
@@ -92,7 +92,5 @@ def mean_link_length(linkage: Linkage) -> float:
     return sum(lengths) / len(lengths) if lengths else 1.0
 
 
-COORDINATES = {"revolute": 1, "prismatic": 1, "free": 3}
-
-
-UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}
+COORDINATES = {joint: len(units) for joint, units in COORDINATE_UNITS.items()}
+"""Number of coordinates of a joint, by its type."""

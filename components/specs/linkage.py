@@ -149,6 +149,10 @@ class Joint:
     """A motor."""
 
 
+COORDINATE_UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}
+"""The units of a joint's coordinates, by its type."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Loop:
     """A cut joint, which closes a loop between two bodies."""

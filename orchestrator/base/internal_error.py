@@ -1,5 +1,5 @@
-"""An exception that nobody has foreseen: a mistake in hapticlink or in a plugin, told in a line;
-the traceback goes to a file for whoever mends it."""
+"""An exception that nobody has foreseen: a mistake in hapticlink, told in a line; the traceback
+goes to a file for whoever mends it. Those of a plugin are told by `plugins.blamed`."""
 
 from __future__ import annotations
 

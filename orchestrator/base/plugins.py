@@ -50,6 +50,18 @@ def loaded() -> dict[str, dict[str, str | None]]:
     }
 
 
+def blamed(error: BaseException) -> str | None:
+    """What to tell of an error that a plugin has raised, with its last line in the traceback; None
+    for an error in which no plugin takes part."""
+    modules = registry.origins()
+    for frame, line in reversed([*traceback.walk_tb(error.__traceback__)]):
+        name = str(frame.f_globals.get("__name__"))
+        if any(f"{name}.".startswith(f"{module.partition('.')[0]}.") for module in modules):
+            place = f"{frame.f_code.co_filename}, line {line}"
+            return f"plugin {name}: {place}: {type(error).__name__}: {error}"
+    return None
+
+
 def _load(module: str, what: str) -> None:
     try:
         importlib.import_module(module)
@@ -61,7 +73,7 @@ def _load(module: str, what: str) -> None:
     except SyntaxError as error:
         place = f"{error.filename}, line {error.lineno}"
         raise InputFault(f"{what}: {place}: SyntaxError: {error.msg}") from error
-    except Exception as error:  # whatever a user's module can do
+    except (Exception, SystemExit) as error:  # whatever a user's module can do
         frames = traceback.extract_tb(error.__traceback__)
         at = [f for f in frames if not f.filename.startswith((PACKAGE, "<"))][-1]
         place = f"{at.filename}, line {at.lineno}"

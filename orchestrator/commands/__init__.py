@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
-from hapticlink.components.registry import Registry
+from hapticlink.components.registry import Registry, no_function
 from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.base.say import say
@@ -33,6 +33,7 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
         "bench": "Measure run time against error, beside other codes.",
         "reproduce": "Reproduce the report's figures, with a page of the findings.",
     },
+    no_function,
 )
 """For each command, the help of a function in the file of that name, which is imported when it is
 called; or a function itself. Its arguments and docstring define the command, and it returns the
@@ -114,6 +115,9 @@ def _status(arguments: Sequence[str] | None) -> int:
         say(f"hapticlink: {error}", file=sys.stderr)
         return 1
     except Exception as error:
+        if told := plugins.blamed(error):
+            say(f"hapticlink: {told}", file=sys.stderr)
+            return InputFault.exit_status
         from hapticlink.orchestrator.base import internal_error  # slow to load
 
         say(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)

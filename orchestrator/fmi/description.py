@@ -63,6 +63,8 @@ class Description:
     """What the FMU declares of its ports, by port (`annotation`)."""
     declares_timing: bool = False
     """Whether the FMU itself says its timing."""
+    block: str | None = None
+    """The block of this project that it was built from; None for FMUs of others."""
 
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
         """The entries of the vector `name` (or the scalar of exactly that name), sorted by index:
@@ -161,6 +163,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         power=declared.power,
         springs=declared.springs,
         declares_timing=declared.timing is not None,
+        block=None if block is None else model.modelName,
     )
 
 

@@ -53,13 +53,12 @@ class Scalar:
     @cached_property
     def port(self) -> str:
         """`x` of `x[1]`: the vector or matrix that the scalar is an entry of."""
-        return _ENTRY.sub("", self.name)
+        return entry_of(self.name)[0]
 
     @cached_property
     def indices(self) -> tuple[int, ...]:
         """(2, 3) of `x[2,3]`, () of a scalar."""
-        found = _ENTRY.search(self.name)
-        return tuple(map(int, re.findall(r"\d+", found[0]))) if found else ()
+        return entry_of(self.name)[1]
 
     @property
     def settable(self) -> bool:
@@ -78,6 +77,13 @@ class Scalar:
         (FMI 2.0.5 section 2.2.7, FMI 3.0 section 2.4.7)."""
         started = self.initial in ("exact", "approx") and self.variability != "constant"
         return self.settable or self.structural or started
+
+
+def entry_of(name: str) -> tuple[str, tuple[int, ...]]:
+    """`x` and (2, 3) of `x[2,3]`: the vector or matrix that a scalar is an entry of, and its
+    indices; () for a scalar by itself."""
+    found = _ENTRY.search(name)
+    return _ENTRY.sub("", name), tuple(map(int, re.findall(r"\d+", found[0]))) if found else ()
 
 
 def differences(tree: ElementTree.Element) -> set[str | None]:

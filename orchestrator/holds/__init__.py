@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from hapticlink.components.registry import Registry
+from typing import Any, get_args
+
+from hapticlink.components.registry import Registry, no_subclass
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.delayed import Delayed
 from hapticlink.orchestrator.holds.first_order import FirstOrder
 from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDerivative
 from hapticlink.orchestrator.holds.hermite import Hermite
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.hold import Hold, Needs
 from hapticlink.orchestrator.holds.lead import Lead
 from hapticlink.orchestrator.holds.mean import Mean
 from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
@@ -19,6 +21,15 @@ from hapticlink.orchestrator.holds.smooth import Smooth
 from hapticlink.orchestrator.holds.zero_order import Latest, ZeroOrder
 
 __all__ = ["HOLDS", "Hold", "HoldContext"]
+
+
+def _misfit(part: Any) -> str:
+    """Why a part is no hold, "" if it is one."""
+    if why := no_subclass(part, Hold):
+        return why
+    known = (None, *get_args(Needs))
+    return "" if part.needs in known else f"needs {part.needs!r}, which is none of {known}"
+
 
 HOLDS: Registry[type[Hold]] = Registry(
     "hold",
@@ -37,4 +48,5 @@ HOLDS: Registry[type[Hold]] = Registry(
         "latest": Latest,
         "mean": Mean,
     },
+    _misfit,
 )

@@ -13,6 +13,9 @@ from hapticlink.orchestrator.holds.context import HoldContext
 Vector = NDArray[np.float64]
 
 
+Needs = Literal["derivative", "power", "spring"]
+
+
 class Hold(ABC):
     """Gives the value of an input between two samples of its source. Times are in ticks.
 
@@ -22,7 +25,7 @@ class Hold(ABC):
     must contain its whole state.
     """
 
-    needs: ClassVar[Literal["derivative", "power", "spring"] | None] = None
+    needs: ClassVar[Needs | None] = None
     """derivative: a sample is the signal followed by its time derivative (its unit per s). power:
     the connection carries power, and the context reads the conjugate displacement. spring: the
     connection sets a spring-damper, whose energy tank is in the context."""

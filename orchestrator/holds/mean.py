@@ -22,17 +22,18 @@ class Mean(Hold):
     downsamples = True
 
     def __init__(self, context: HoldContext) -> None:
-        self._stamp: int | None = None
+        self._stamp, self._width = -1, 0
         self._newest, self._held = np.zeros(context.size), np.zeros(context.size)
         self._sum, self._span = np.zeros(context.size), 0
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        if self._stamp is None:
-            self._held[:] = sample
-        elif stamp > self._stamp:
-            self._sum += (self._newest + sample) * ((stamp - self._stamp) / 2)
-            self._span += stamp - self._stamp
-        elif not self._span:
+        if stamp > self._stamp >= 0:
+            self._width = stamp - self._stamp
+            self._sum += (self._newest + sample) * (self._width / 2)
+            self._span += self._width
+        elif self._span:  # in place of the newest sample, the end of the last interval
+            self._sum += (sample - self._newest) * (self._width / 2)
+        elif not self._width:
             self._held[:] = sample
         self._stamp = stamp
         self._newest[:] = sample

@@ -13,10 +13,20 @@ from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from typing import NamedTuple
 
+from hapticlink.orchestrator.base.faults import InputFault, shortened
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.plan import dependency_order
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
-from hapticlink.orchestrator.plan.operations import Advance, Event, Firing, Operation, Part, flat
+from hapticlink.orchestrator.plan.operations import (
+    Advance,
+    Event,
+    Firing,
+    Operation,
+    Part,
+    Record,
+    Step,
+    flat,
+)
 from hapticlink.orchestrator.plan.schemes import SCHEMES, step_control
 from hapticlink.orchestrator.system.system import System
 
@@ -42,17 +52,33 @@ class Plan:
         return self._blocks[kind]
 
     def _made(self, kind: Event | Part) -> Block:
-        scheme = SCHEMES[self.system.coupling].block
         if isinstance(kind, Part):
-            return step_control.part(self.system, kind, scheme)
+            return step_control.part(self.system, kind, self._ordered)
         if self.system.step_control:
-            return step_control.block(self.system, kind, scheme)
-        return scheme(self.system, kind)
+            return step_control.block(self.system, kind, self._ordered)
+        return self._ordered(self.system, kind)
+
+    def _ordered(self, system: System, event: Event) -> Block:
+        """The operations of `event` in the order of the coupling scheme. Raises InputFault for a
+        scheme of a plugin that gives anything else."""
+        block = SCHEMES[system.coupling].block(system, event)
+        if not isinstance(block, tuple) or not all(isinstance(op, Operation) for op in block):
+            what = shortened(repr(block))
+            raise InputFault(f"coupling = {system.coupling!r}: {what} is no tuple of operations")
+        return block
 
     def check(self) -> None:
-        """Raises InputFault if the scheme cannot order the FMUs. The first event suffices, since
-        all clocks fire there."""
-        tuple(self.unrolled(next(iter(self)).event))
+        """Raises InputFault if the scheme cannot order the FMUs, or leaves out the step of one or
+        the rows of a clock. The first event suffices, since all clocks fire there."""
+        event = next(iter(self)).event
+        operations = tuple(self.unrolled(event))
+        stepped = {op.fmu for op in operations if isinstance(op, Step)}
+        recorded = {op.clock for op in operations if isinstance(op, Record)}
+        going = {f.clock for f in event.firings if not f.final}
+        left = [u.name for u in self.system.fmus if u.clock in going and u.name not in stepped]
+        left += [f"the rows of {f.clock}" for f in event.firings if f.clock not in recorded]
+        if left:
+            raise InputFault(f"coupling = {self.system.coupling!r} leaves out {', '.join(left)}")
 
     def loops(self) -> tuple[AlgebraicLoop, ...]:
         """The algebraic loops among FMUs that the scheme puts in an order, in that order."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import TypeAdapter
 
+from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
@@ -21,7 +22,13 @@ from hapticlink.orchestrator.results import mechanism_drawing
 from hapticlink.orchestrator.results.figure_axes import last_time, short, titled
 from hapticlink.orchestrator.results.force_figure import forces
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-from hapticlink.orchestrator.results.tracking import DEVICE, MECHANISM, table_of, tracking
+from hapticlink.orchestrator.results.tracking import (
+    DEVICE,
+    MECHANISM,
+    constrained,
+    of_block,
+    tracking,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,19 +42,19 @@ def figures(results: Results) -> dict[str, Figure]:
     if not last_time(results):
         return drawn
     linkage = _part(results, "linkage", Linkage)  # an SSP has the block, but not its description
-    if linkage and (coordinates := table_of(results, COORDINATES)):
+    size = len(coordinate_units(linkage)) if linkage else 0
+    if linkage and (coordinates := of_block(results, COORDINATES, size)):
         drawn["mechanism"] = _mechanism(results, linkage, coordinates)
-    if table_of(results, MECHANISM):
+    if of_block(results, MECHANISM, 3):
         drawn["trajectories"] = _trajectories(results)
-        if table_of(results, DEVICE):
+        if of_block(results, DEVICE, 3):
             drawn["distance"] = _distance(results)
     if found := forces(results, _part(results, "device", Device)):
         drawn["forces"] = found
-    if contact := table_of(results, CONTACT):
+    if contact := of_block(results, CONTACT, 3):
         drawn["contact"] = _contact(results, contact)
-    counting = next((t for t in results.tables.values() if _count(t)), None)
-    if counting:
-        drawn["constraints"] = _constraints(results, counting)
+    if counted := constrained(results):
+        drawn["constraints"] = _constraints(results, *counted)
     if generated := _generated(results):
         drawn["energies"] = _energies(results, generated)
     return drawn
@@ -95,13 +102,13 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
             (DEVICE, "handle x_D", "--"),
             *further,
         )
-        if (table := table_of(results, signal))
+        if (table := of_block(results, signal, 3))
     ]
 
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if table_of(results, DEVICE):
+    if of_block(results, DEVICE, 3):
         apart = short(tracking(results)[1].max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:
@@ -139,14 +146,7 @@ def _contact(results: Results, table: Table) -> Figure:
     return figure
 
 
-def _count(table: Table) -> str | None:
-    names = (c for c in table.columns if c.endswith(".n_constraints"))
-    return next(names, None)
-
-
-def _constraints(results: Results, table: Table) -> Figure:
-    name = _count(table)
-    assert name is not None
+def _constraints(results: Results, table: Table, name: str) -> Figure:
     count, time = table[name], table["time"]
     most = int(count.max())
     share = 100 * float((count == most).mean())

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.results.figure_axes import short
 from hapticlink.orchestrator.results.force_figure import wrenches
 from hapticlink.orchestrator.results.tables import Results
@@ -15,8 +16,8 @@ from hapticlink.orchestrator.results.tracking import (
     DEVICE,
     folded,
     has_tracking,
+    of_block,
     pose_error,
-    table_of,
 )
 
 
@@ -45,7 +46,7 @@ def numbers(results: Results) -> Iterator[str]:
     if found := wrenches(results):
         peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())
         yield f"largest forces: {'; '.join(peaks)}"
-    table = table_of(results, CLOSURE)
+    table = of_block(results, CLOSURE)
     if table and len(table["time"]):
         yield f"loops close within {table[CLOSURE].max():.2g} m"
 
@@ -114,12 +115,15 @@ def replaced(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _start(results: Results) -> Iterator[str]:
-    device = table_of(results, MARGIN)
-    if device and len(device["time"]) and device[MARGIN][0] < 0:
+    device = of_block(results, MARGIN)
+    if device and of_block(results, DEVICE, 3) and len(device["time"]) and device[MARGIN][0] < 0:
         yield outside(device[DEVICE][0], device[MARGIN][0])
     linkage = results.run["scene"]["linkage"]
-    table = table_of(results, f"{MECHANISM}.q")
-    if linkage and table and len(table["time"]):
+    if not linkage:
+        return
+    size = sum(len(COORDINATE_UNITS[joint["type"]]) for joint in linkage["joint"])
+    table = of_block(results, f"{MECHANISM}.q", size)
+    if table and len(table["time"]):
         yield from moved(linkage, table[f"{MECHANISM}.q"][0])
 
 
@@ -142,7 +146,7 @@ def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
 def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
     rest = iter(q)
     for joint in linkage["joint"]:
-        units = _UNITS[joint["type"]]
+        units = COORDINATE_UNITS[joint["type"]]
         found = list(islice(rest, len(units)))
         if joint["name"] not in linkage["start"]:
             continue
@@ -154,9 +158,6 @@ def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
 
 REPORTED = {"rad": 0.1, "m": 0.01}
 """Moves of a joint by more than this are reported."""
-
-
-_UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}
 
 
 MECHANISM = "virtual_mechanism"

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from textwrap import fill
@@ -14,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.variables import entry_of
 
 Vector = NDArray[np.float64]
 
@@ -21,7 +24,8 @@ Vector = NDArray[np.float64]
 @dataclass(frozen=True, repr=False, eq=False)
 class Table(Mapping[str, Vector]):
     """The samples of one rate by name: `table["device.x"]` stacks the columns `device.x[1]`,
-    `device.x[2]`, ... into (rows, n), those of a matrix into (rows, n, m); the full name of a
+    `device.x[2]`, ... into (rows, n), those of a matrix into (rows, n, m), by their indices,
+    whichever column comes first; entries with gaps between them into (rows, k). The full name of a
     column gives that column, (rows,). Raises KeyError for an unknown name. `others` are the tables
     of the same run, for that message.
     """
@@ -33,17 +37,25 @@ class Table(Mapping[str, Vector]):
     def __getitem__(self, name: str) -> Vector:
         if name in self.columns:
             return self.rows[:, self.columns.index(name)]
-        entries = [(i, c) for i, c in enumerate(self.columns) if c.startswith(f"{name}[")]
-        if not entries:
+        if name not in self._arrays:
             there = [other for other, table in self.others.items() if name in table]
             found = f"; it is in tables[{there[0]!r}]" if there else ""
             raise KeyError(f"no signal {name!r}{found}; there are {', '.join(self.columns)}")
-        last = entries[-1][1]
-        shape = tuple(int(n) for n in last[len(name) + 1 : -1].split(","))
-        return self.rows[:, [i for i, _ in entries]].reshape(-1, *shape)
+        indices, places = zip(*sorted(self._arrays[name]), strict=True)
+        return self.rows[:, places].reshape(-1, *_shape(indices))
+
+    @cached_property
+    def _arrays(self) -> dict[str, list[tuple[tuple[int, ...], int]]]:
+        """The indices and columns of the entries of each vector and matrix."""
+        found: dict[str, list[tuple[tuple[int, ...], int]]] = {}
+        for place, column in enumerate(self.columns):
+            name, indices = entry_of(column)
+            if indices:
+                found.setdefault(name, []).append((indices, place))
+        return found
 
     def __contains__(self, name: object) -> bool:
-        return any(c == name or c.startswith(f"{name}[") for c in self.columns)
+        return name in self.columns or name in self._arrays
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -57,7 +69,17 @@ class Table(Mapping[str, Vector]):
     @property
     def signals(self) -> tuple[str, ...]:
         """The names of scalars, vectors and matrices, `time` the first."""
-        return tuple(dict.fromkeys(column.partition("[")[0] for column in self.columns))
+        return tuple(dict.fromkeys(entry_of(column)[0] for column in self.columns))
+
+
+def _shape(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
+    """The shape of the array that has entries at `indices`, which may begin at 0 or 1; one
+    dimension where they fill none."""
+    if len({len(each) for each in indices}) == 1:
+        shape = tuple(max(axis) - min(axis) + 1 for axis in zip(*indices, strict=True))
+        if math.prod(shape) == len({*indices}) == len(indices):
+            return shape
+    return (len(indices),)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 MECHANISM, DEVICE = "virtual_mechanism.x", "haptic_device.x_true"
 BRANCH = "virtual_environment.branch_ok"
+COUNTS = ("virtual_environment.n_constraints", "virtual_mechanism.n_constraints")
 
 
 class Tracking(NamedTuple):
@@ -26,15 +27,25 @@ def table_of(results: Results, signal: str) -> Table | None:
     return next((t for t in results.tables.values() if signal in t), None)
 
 
+def of_block(results: Results, signal: str, *shape: int) -> Table | None:
+    """The table that contains a signal of a block of the haptic loop, or of the FMU in its place,
+    of that shape; None for an FMU of others that only has the same name, of whose ports nothing is
+    known."""
+    name, table = signal.partition(".")[0], table_of(results, signal)
+    if table is None or results.run["fmus"][name].get("block", name) != name:
+        return None
+    return table if table[signal].shape[1:] == shape else None
+
+
 def has_tracking(results: Results) -> bool:
     """Whether a run has both an operational point and a handle."""
-    return all(table_of(results, signal) for signal in (MECHANISM, DEVICE))
+    return all(of_block(results, signal, 3) for signal in (MECHANISM, DEVICE))
 
 
 def pose_error(results: Results) -> Tracking:
     """Tracking error at the mechanism's samples up to the device's last one; the handle's pose is
     interpolated linearly where its clock differs. Raises KeyError without these signals."""
-    mechanism, device = table_of(results, MECHANISM), table_of(results, DEVICE)
+    mechanism, device = of_block(results, MECHANISM, 3), of_block(results, DEVICE, 3)
     if mechanism is None or device is None:
         raise KeyError(f"tracking needs the signals {MECHANISM} and {DEVICE}")
     if not len(device["time"]):  # a fault before the first row
@@ -55,10 +66,19 @@ def tracking(results: Results) -> tuple[Vector, Vector]:
     return time, distance
 
 
+def constrained(results: Results) -> tuple[Table, str] | None:
+    """The table with the number of constrained directions, at the rate of the block that the
+    controller gets it from, and the signal's name; None where there is none."""
+    for signal in COUNTS:
+        if table := of_block(results, signal):
+            return table, signal
+    return None
+
+
 def folded(results: Results) -> tuple[int, int]:
     """Number of frames in which the graphics copy is on another assembly of its loops than the
     mechanism, and number of all frames; (0, 0) if the run has no such output."""
-    table = table_of(results, BRANCH)
+    table = of_block(results, BRANCH)
     if table is None:
         return 0, 0
     return int((table[BRANCH] == 0).sum()), len(table[BRANCH])

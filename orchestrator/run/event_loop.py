@@ -10,7 +10,7 @@ from time import perf_counter
 
 import numpy as np
 
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
 from hapticlink.orchestrator.plan.operations import (
     Event,
@@ -101,6 +101,10 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
     except OSError as error:  # a full disk, most of all
         full = Fault(f"{results.folder}: {error.strerror or error}")
         outcome.reason, outcome.fault = "fault", full
+    except Exception as error:
+        if (told := plugins.blamed(error)) is None:
+            raise
+        outcome.reason, outcome.fault = "fault", Fault(told)
     except KeyboardInterrupt:  # a second signal does not wait for the end of the event
         outcome.reason, outcome.fault = "interrupted", Interrupted(results.last)
     finally:
@@ -129,12 +133,16 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
 
 def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
     """The fault of a run that reached its end but has diverged; None if it has not."""
-    condition = simulation.system.ends_when
-    left = condition and (condition.fmu, condition.variable) == WORKSPACE
-    if outcome.reason == "stop_when" and left and (why := unstable(outcome.energies)):
+    system, condition = simulation.system, simulation.system.ends_when
+    if (
+        outcome.reason == "stop_when"
+        and condition
+        and (system.block(condition.fmu), condition.variable) == WORKSPACE
+        and (why := unstable(system, outcome.energies))
+    ):
         what = f"left its workspace, and {why}: the loop is unstable"
         remedy = "take higher rates, weaker gains, another coupling or hold"
-        return Diverged(WORKSPACE[0], f"{what} ({remedy})", outcome.end_time, repeatable=True)
+        return Diverged(condition.fmu, f"{what} ({remedy})", outcome.end_time, repeatable=True)
     return simulation.balance.judge(outcome.energies, outcome.end_time)
 
 

@@ -146,13 +146,12 @@ def require_finite(instances: Mapping[str, Instance]) -> None:
     """Raises FmuFault if an output is not finite. If the device's arms do not reach the start pose,
     which makes its angles and all that depends on them NaN, the fault says so instead of naming the
     first such output."""
-    device = instances.get(DEVICE)
-    if device is not None and not np.isfinite(device.outputs).all():
-        names = (s.name for s in device.description.outputs)
-        start = dict(zip(names, device.outputs.tolist(), strict=True))
-        margin = start.get("workspace_margin", 0.0)
-        if margin < 0:
-            pose = [start.get(f"x_true[{i}]", np.nan) for i in (1, 2, 3)]
-            raise FmuFault(DEVICE, outside(pose, margin), 0.0, repeatable=True)
+    for fmu, instance in instances.items():
+        if instance.description.block == DEVICE and not np.isfinite(instance.outputs).all():
+            names = (s.name for s in instance.description.outputs)
+            start = dict(zip(names, instance.outputs.tolist(), strict=True))
+            if (margin := start["workspace_margin"]) < 0:
+                pose = [start[f"x_true[{i}]"] for i in (1, 2, 3)]
+                raise FmuFault(fmu, outside(pose, margin), 0.0, repeatable=True)
     for instance in instances.values():
         instance.require_finite()

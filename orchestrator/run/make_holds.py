@@ -11,6 +11,7 @@ from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.hold import Hold, Vector
 from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.run.checked_hold import CheckedHold
 from hapticlink.orchestrator.run.energy.bonds import bond, reader
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.records import SetSpring
@@ -39,14 +40,21 @@ def make_hold(
     assert connection.hold is not None
     kind, size = HOLDS[connection.hold], len(connection.inputs)
     context = _context(connection, system, signals, shared)
-    hold = kind(context)
+
+    def make() -> Hold:
+        made = kind(context)
+        if connection.hold not in HOLDS.origins:
+            return made
+        return CheckedHold(made, size, connection.hold, connection.name)
+
+    hold = make()
     if connection.kind == "projector" and not kind.gives_samples:
-        hold = Projector(lambda: kind(context), size)
+        hold = Projector(make, size)
     elif connection.kind == "semidefinite" and not kind.gives_samples:
-        hold = Semidefinite(lambda: kind(context), size)
+        hold = Semidefinite(make, size)
     elif connection.kind == "angle":
         turned = turns(connection, system.fmu)
-        hold = Unwrapped(lambda: kind(context), list(turned), list(turned.values()))
+        hold = Unwrapped(make, list(turned), list(turned.values()))
     if connection.latency:
         hold = Late(hold, Link(connection.latency, system.timeline.base))
     if kind.needs == "derivative" and (slope := derivative(connection, system.fmu)):

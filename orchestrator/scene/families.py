@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from hapticlink.components.registry import Registry
+from hapticlink.components.registry import Registry, no_function
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.scene.toml_keys import Path
@@ -81,7 +81,9 @@ def n_four_bar(n: int) -> dict[str, Any]:
     }
 
 
-FAMILIES: Registry[Callable[[int], dict[str, Any]]] = Registry("family", {"n-four-bar": n_four_bar})
+FAMILIES: Registry[Callable[[int], dict[str, Any]]] = Registry(
+    "family", {"n-four-bar": n_four_bar}, no_function
+)
 
 
 def members(arguments: dict[str, Any]) -> dict[str, Any]:
@@ -92,7 +94,10 @@ def members(arguments: dict[str, Any]) -> dict[str, Any]:
         raise FamilyError("family", FAMILIES.unknown(family))
     if not isinstance(n, int) or isinstance(n, bool) or n not in MEMBERS:
         raise FamilyError("n", f"{n!r} is out of range: give a whole number {MEMBERS.range}")
-    return FAMILIES[family](n)
+    tables = FAMILIES[family](n)
+    if not isinstance(tables, dict):
+        raise FamilyError("family", f"{family} gives {tables!r} for n = {n}, no tables")
+    return tables
 
 
 def is_argument(names: Path) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 import pydantic
 from pydantic_core import to_json
 
+from hapticlink.orchestrator.base.faults import InputFault, shortened
 from hapticlink.orchestrator.scene.part_tables import record_of, tables
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
@@ -61,7 +62,15 @@ def _reader(record: Any) -> pydantic.TypeAdapter[Any]:
     """A pydantic reader of a record with a scene's strictness: no unknown keys, no text for a
     number."""
     rules = {"__pydantic_config__": Scene.__pydantic_config__}
-    return pydantic.TypeAdapter(make_dataclass("Holder", [("table", record)], namespace=rules))
+    holder = make_dataclass("Holder", [("table", record)], namespace=rules)
+    try:
+        reader: pydantic.TypeAdapter[Any] = pydantic.TypeAdapter(holder)
+        reader.rebuild(raise_errors=True)
+        return reader
+    except (pydantic.errors.PydanticUserError, NameError) as error:
+        why = shortened(str(error).partition("\n")[0])
+        said = f"{record.__module__}: the annotations of {record.__name__} cannot be read: {why}"
+        raise InputFault(said) from error
 
 
 def put(scene: Scene, found: Mapping[Path, Any]) -> Scene:

@@ -11,7 +11,13 @@ import numpy as np
 
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.tables import Results, Vector
-from hapticlink.orchestrator.results.tracking import folded, has_tracking, pose_error
+from hapticlink.orchestrator.results.tracking import (
+    constrained,
+    folded,
+    has_tracking,
+    of_block,
+    pose_error,
+)
 
 Row = dict[str, Any]
 
@@ -74,8 +80,10 @@ def _rms(values: Vector) -> float:
 
 
 def _largest(results: Results, column: str, signal: str) -> Row:
-    found = next((t[signal] for t in results.tables.values() if signal in t), None)
-    return {} if found is None or not len(found) else {column: float(np.abs(found).max())}
+    table = of_block(results, signal)
+    if table is None or not len(table["time"]):
+        return {}
+    return {column: float(np.abs(table[signal]).max())}
 
 
 def _folded(results: Results) -> Row:
@@ -84,11 +92,8 @@ def _folded(results: Results) -> Row:
 
 
 def _switches(results: Results) -> Row:
-    """How often the number of constrained directions changes, at the rate of the block that the
-    controller gets it from."""
-    for fmu in ("virtual_environment", "virtual_mechanism"):
-        signal = f"{fmu}.n_constraints"
-        count = next((t[signal] for t in results.tables.values() if signal in t), None)
-        if count is not None:
-            return {"switches": int(np.count_nonzero(np.diff(count)))}
-    return {}
+    """How often the number of constrained directions changes."""
+    if (found := constrained(results)) is None:
+        return {}
+    table, signal = found
+    return {"switches": int(np.count_nonzero(np.diff(table[signal])))}

@@ -113,6 +113,11 @@ class System:
     def connection(self) -> Mapping[str, Connection]:
         return {c.name: c for c in self.connections}
 
+    def block(self, fmu: str) -> str | None:
+        """The block that an FMU is, or that it replaces; None for other FMUs, whatever they are
+        called."""
+        return fmu if fmu in self.replacements else self.fmu[fmu].description.block
+
     def into(self, name: str) -> tuple[Connection, ...]:
         """Connections to the inputs of an FMU."""
         return tuple(c for c in self.connections if c.target == name and not c.initial)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hapticlink.components.registry import Registry
+from hapticlink.components.registry import Registry, no_instance
 from hapticlink.orchestrator.plan.operations import Event, Operation
 from hapticlink.orchestrator.plan.schemes import gauss_seidel, gauss_seidel_plants, iterated, jacobi
 from hapticlink.orchestrator.scene import records
@@ -30,6 +30,7 @@ class Scheme:
 
 
 SCHEMES: Registry[Scheme] = records.SCHEMES
+SCHEMES.misfit = lambda part: no_instance(part, Scheme)
 SCHEMES |= {
     "gauss-seidel": Scheme(gauss_seidel.block, gauss_seidel.ordered),
     "jacobi": Scheme(jacobi.block),

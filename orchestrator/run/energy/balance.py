@@ -51,11 +51,12 @@ class Balance:
         return Diverged(MECHANISM, f"{what} {remedy}", time, repeatable=True)
 
 
-def unstable(booked: Mapping[str, Energy]) -> str:
-    """A message if sampling and holding have generated more energy than was put in, else ""."""
+def unstable(system: System, booked: Mapping[str, Energy]) -> str:
+    """A message if sampling and holding have generated more energy than was put in, else "". What a
+    controller passes on was not put in by it."""
     generated = sum(e.generated for e in booked.values())
-    sources = (e for name, e in booked.items() if not name.startswith(f"{CONTROLLER}."))
-    put_in = sum(max(e.ideal, 0.0) for e in sources)
+    source = {name: system.block(system.connection[name].source) for name in booked}
+    put_in = sum(max(e.ideal, 0.0) for n, e in booked.items() if source[n] != CONTROLLER)
     if generated <= put_in + LEAST:
         return ""
     return f"sampling and holding generated {generated:.3g} J, where {put_in:.3g} J were put in"

@@ -41,10 +41,11 @@ def test_table_must_increase_in_time():
 
 
 def test_arm_starts_at_the_handle_with_no_force():
-    x = (0.01, -0.02, 3.6)
-    running = Running(hand(specs.ArmHand(target=((0.0, 0.1, 0, 0),))), {"x": x})
+    x, v = (0.01, -0.02, 3.6), (0.3, -0.1, 2.0)
+    running = Running(hand(specs.ArmHand(target=((0.0, 0.1, 0, 0),))), {"x": x, "v": v})
     np.testing.assert_array_equal(running.y["F"], 0)
     np.testing.assert_array_equal(running.state["x_arm"], x)
+    np.testing.assert_array_equal(running.state["v_arm"], v)
 
 
 def test_arm_output_belongs_to_the_start_of_the_step():

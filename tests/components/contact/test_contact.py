@@ -164,6 +164,17 @@ def test_contacts_push_and_never_pull(height, speed):
 M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
 
 
+@pytest.mark.parametrize("omega", [-1.0, 0.02, 1.0])
+def test_damping_takes_the_velocity_of_the_touching_point(omega):
+    """The end of a bar 1 mm deep in a disc, while the bar turns about its centre of mass at its
+    other end: k depth - b omega l, and no pull."""
+    linkage = loose(BAR, velocity=(0.0, 0.0, omega))
+    disc = Disc(center=(LENGTH, -(R + 0.1 - 1e-3)), radius=0.1)
+    F = max(0.0, 15000.0 * 1e-3 - 300.0 * omega * LENGTH)
+    qdd = block(linkage, {"disc": (disc,)}).y["qdd"]
+    np.testing.assert_allclose(qdd, (0.0, F / 2.0, LENGTH * F / 0.03), rtol=1e-9, atol=1e-9)
+
+
 def shaped():
     """The report's five-bar with capsules of 3 mm."""
     linkage = five_bar()

@@ -116,6 +116,16 @@ def test_damper_between_points_takes_what_the_linkage_loses():
     assert block.y["qd"][0] == pytest.approx(2.0 * np.exp(-0.7 / (1 / 3)), rel=1e-10)
 
 
+def test_a_damper_with_a_free_length_damps_along_its_line():
+    """At 0.6 of the rail's direction: the force -b (v . u) u, u the line's direction."""
+    spring = Spring(
+        bodies=("ground", "block"), at=((3.1, 4.0), (0.0, 0.0)), damping=3.0, length=1.0
+    )
+    fields = {**vars(slider()), "spring": (spring,), "start_velocity": {"rail": 2.0}}
+    qdd = running(Linkage(**fields)).y["qdd"][0]
+    assert qdd == pytest.approx(-3.0 * (2.0 * 0.6) * 0.6 / 2.0, rel=1e-12)
+
+
 def test_a_spring_whose_points_meet_pushes_nowhere():
     """k l and no direction for it; a nudge later it pushes with all of it."""
     spring = Spring(

@@ -75,6 +75,130 @@ def test_modules_that_are_no_plugins(tmp_path: Path) -> None:
         assert len(ended.said.splitlines()) == 1
 
 
+HOLDING = """
+import numpy as np
+from hapticlink.orchestrator.holds import HOLDS, Hold
+
+class Mine(Hold):
+    def __init__(self, context):
+        self.size, self.pushed = context.size, 0
+    def push(self, stamp, sample, arrival):
+        self.pushed += 1
+    def value(self, tick, ahead=0.0):
+        {value}
+
+HOLDS.register("mine", Mine)
+"""
+REGISTER = "from hapticlink.{0} import {1}\n{2}\n{1}.register('mine', {3})\n"
+HOLDS, METHODS, BLOCKS, FAMILIES, SCHEMES, COMMANDS, FORCES = (
+    ("orchestrator.holds", "HOLDS"), ("components.integrators", "METHODS"),
+    ("components.blocks", "BLOCKS"), ("orchestrator.scene.families", "FAMILIES"),
+    ("orchestrator.plan.schemes", "SCHEMES"), ("orchestrator.commands", "COMMANDS"),
+    ("components.forces", "FORCES"),
+)  # fmt: skip
+
+
+def test_parts_of_another_kind_are_refused_where_they_are_registered(tmp_path: Path) -> None:
+    vague = "from hapticlink.orchestrator.holds import Hold\nclass Vague(Hold): needs = 'speed'"
+    speed = (
+        "from hapticlink.orchestrator.holds.zero_order import ZeroOrder\n"
+        "class Speed(ZeroOrder): needs = 'speed'"
+    )
+    parts = {
+        (*HOLDS, "", "3"): "hold 'mine': 3 is no class derived from Hold",
+        (*HOLDS, vague, "Vague"): "does not define __init__, push, value",
+        (*HOLDS, speed, "Speed"): "needs 'speed', which is none of (None, 'derivative',",
+        (*METHODS, "", "7"): "integrator 'mine': 7 is no Integrator",
+        (*FORCES, "", "dict"): "force 'mine': <class 'dict'> is no class derived from Force",
+        (*BLOCKS, "", "3"): "block 'mine': 3 is no function",
+        (*BLOCKS, "", "lambda: 0"): "takes no communication step size",
+        (*BLOCKS, "", "lambda h, x: 0"): "has an argument x: a setting has a name and an annot",
+        (*FAMILIES, "", "{}"): "family 'mine': {} is no function",
+        (*SCHEMES, "", "print"): "scheme 'mine': <built-in function print> is no Scheme",
+        (*COMMANDS, "", "'Help'"): "command 'mine': 'Help' is no function",
+    }
+    for i, part in enumerate(parts):
+        write(tmp_path, **{f"part{i}": REGISTER.format(*part)})
+    write(tmp_path, named=HOLD.format(name="my hold"), ends="import sys\nsys.exit('usage')")
+    messages = {f"part{i}": message for i, message in enumerate(parts.values())} | {
+        "named": "hold 'my hold': name it by letters, digits, _ and -",
+        "ends": "ends.py, line 2: SystemExit: usage",
+    }
+    lines = (f"{EXPLAIN} --plugin {module}" for module in messages)
+    for ended, message in zip(hapticlink(tmp_path, *lines), messages.values(), strict=True):
+        assert ended.status == 2
+        assert message in ended.said
+        assert len(ended.said.splitlines()) == 1
+
+
+def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path: Path) -> None:
+    late = "if self.pushed > 3: 1 / 0\n        return np.ones(self.size)"
+    values = {
+        late: "plugin mine0: {}/mine0.py, line 11: ZeroDivisionError: division by zero",
+        "return None": "its value is None, where 9 finite numbers in a NumPy array are needed",
+        "return np.ones(2)": "its value is array([1., 1.]), where 9 finite numbers",
+        "return np.full(self.size, np.nan)": "its value is array([nan, nan, nan,",
+        "return np.array(['1'] * 9)": "its value is array(['1', '1',",
+    }
+    for i, value in enumerate(values):
+        write(tmp_path, **{f"mine{i}": HOLDING.format(value=value)})
+    lines = (
+        f"hapticlink run closed-loop --plugin mine{i} --set hold=mine --out {i} "
+        "--set graphics.rate=100 --set duration=0.1"
+        for i in range(len(values))
+    )
+    for ended, message in zip(hapticlink(tmp_path, *lines), values.values(), strict=True):
+        assert ended.status == 1
+        assert message.format(tmp_path) in ended.said
+        assert "error of hapticlink itself" not in ended.said
+    told = json.loads((tmp_path / "0" / "run.json").read_text())
+    assert (told["end"]["reason"], told["fault"]["kind"]) == ("fault", "Fault")
+    assert len((tmp_path / "0" / "haptics.csv").read_text().splitlines()) > 3
+
+
+def test_parts_that_fail_or_give_something_else(tmp_path: Path) -> None:
+    integrator = (
+        "from hapticlink.components.integrators.base import Integrator\n"
+        "class Mine(Integrator):\n    order = 1\n"
+        "    def step(self, ode, x, u, p, t, h, positions): return {}"
+    )
+    scheme = "from hapticlink.orchestrator.plan.schemes import Scheme"
+    raising = "def mine(*_, n: int = 0): raise RuntimeError('no')"
+    (tmp_path / "block.toml").write_text(
+        'title = "b"\nduration = 1.0\n[[fmu]]\nname = "a"\nblock = "mine"\n'
+    )
+    (tmp_path / "family.toml").write_text(
+        'title = "f"\nduration = 1.0\nlinkage = { family = "mine", n = 4 }\n'
+    )
+    run, mine = "hapticlink run", "pendulum --set mechanism.integrator=mine"
+    coupled = "sampled-spring --set coupling=mine"
+    cases = [
+        (METHODS, integrator.format("x[:1]"), "Mine()", f"{run} {mine}",
+         "integrator 'mine': its step gives (1, 1), not (2, 1)"),
+        (METHODS, integrator.format("[][1]"), "Mine()", f"{run} {mine}",
+         "plugin part1: {}/part1.py, line 5: IndexError"),
+        (SCHEMES, scheme, "Scheme(lambda *_: None)", f"{run} {coupled}",
+         "coupling = 'mine': None is no tuple of operations"),
+        (SCHEMES, scheme, "Scheme(lambda *_: ())", f"{run} {coupled}",
+         "coupling = 'mine' leaves out "),
+        (BLOCKS, "", "lambda h: h", f"{run} block.toml", "mine: the block gives 0.0019"),
+        (BLOCKS, "def mine(h, n: 'Never' = 0): return h", "mine", f"{run} block.toml",
+         "part5: the annotations of Settings cannot be read"),
+        (FAMILIES, "", "lambda n: None", f"{run} family.toml",
+         "line 3: linkage.family: mine gives None for n = 4, no tables"),
+        (FAMILIES, raising, "mine", f"{run} family.toml",
+         "plugin part7: {}/part7.py, line 2: RuntimeError: no"),
+        (COMMANDS, raising.replace("*_, ", ""), "mine", "hapticlink mine",
+         "plugin part8: {}/part8.py, line 2: RuntimeError: no"),
+    ]  # fmt: skip
+    for i, (registry, text, part, _, _) in enumerate(cases):
+        write(tmp_path, **{f"part{i}": REGISTER.format(*registry, text, part)})
+    lines = (f"{line} --plugin part{i}" for i, (*_, line, _) in enumerate(cases))
+    for ended, (*_, message) in zip(hapticlink(tmp_path, *lines), cases, strict=True):
+        assert ended.status == 2, ended.said
+        assert message.format(tmp_path) in ended.said
+
+
 def test_a_part_is_known_where_its_plugin_is_named(tmp_path: Path) -> None:
     write(tmp_path, mine=HOLD.format(name="mine"), yours=HOLD.format(name="yours"))
     line = f"{EXPLAIN} --set hold=mine --set downsampling=latest"

@@ -122,6 +122,36 @@ def test_mean_over_a_slow_step_is_the_integral_of_the_samples(times: Vector) -> 
     np.testing.assert_allclose(hold.value(int(times[-1]) + 5), 1.5 * times[-1], rtol=1e-12)
 
 
+UNAIDED = [name for name, hold in HOLDS.items() if hold.needs is None]
+
+
+@pytest.mark.parametrize("name", UNAIDED)
+@given(times=stamps, asked=st.booleans())
+def test_a_second_sample_of_a_stamp_replaces_the_first(
+    name: str, times: Vector, asked: bool
+) -> None:
+    """Before the hold is asked for a value at its tick."""
+    once, twice = (HOLDS[name](HoldContext(1)) for _ in range(2))
+    for stamp in (0, *times.tolist()):
+        sample = np.array([np.sin(stamp)])
+        twice.push(stamp, sample + 5.0, stamp)
+        for hold in (once, twice):
+            hold.push(stamp, sample, stamp)
+            if asked:
+                hold.value(stamp)
+    later = int(times[-1]) + 3
+    np.testing.assert_allclose(twice.value(later), once.value(later), rtol=1e-12, atol=1e-12)
+
+
+def test_a_mean_that_has_been_read_stays() -> None:
+    hold = HOLDS["mean"](HoldContext(1))
+    for stamp in (0, 10, 20):
+        hold.push(stamp, np.array([float(stamp)]), stamp)
+    assert hold.value(20) == 10.0
+    hold.push(20, np.array([7.0]), 20)
+    assert hold.value(25) == 10.0
+
+
 def projector(generator: np.random.Generator, rank: int) -> Vector:
     basis = np.linalg.qr(generator.normal(size=(3, 3)))[0][:, :rank]
     return (basis @ basis.T).ravel()

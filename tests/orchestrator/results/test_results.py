@@ -61,6 +61,37 @@ def test_vectors_and_matrices_stack(tmp_path: Path) -> None:
         read_table(path)["e.K"]
 
 
+@pytest.mark.parametrize(
+    ("columns", "value"),
+    [
+        (["a.x[0]", "a.x[1]", "a.x[2]"], [0, 1, 2]),  # tools that count from 0
+        (["a.x[10]", *(f"a.x[{i}]" for i in range(1, 10))], [*range(1, 10), 0]),
+        (["a.x[1,1]", "a.x[2,1]", "a.x[1,2]", "a.x[2,2]"], [[0, 2], [1, 3]]),  # column by column
+        (["a.x[3]", "a.x[1]"], [1, 0]),  # a gap
+        (["a.x[1,1]", "a.x[2,2]"], [0, 1]),
+        (["a.x", "a.x[1]"], 0),
+    ],
+)
+def test_entries_stack_by_their_indices(tmp_path: Path, columns: list[str], value: Any) -> None:
+    path = tmp_path / "x.csv"
+    with recorder_of(path, columns, np.arange(float(len(columns)))) as recorder:
+        recorder.row(0.0)
+        recorder.row(1.0)
+    found = read_table(path)["a.x"]
+    assert found.shape[0] == 2
+    assert found[1].tolist() == value
+
+
+def test_arrays_of_records_have_their_own_names(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    with recorder_of(path, ["a.leg[1].x[1]", "a.leg[1].x[2]", "a.leg[2].y"], np.arange(3.0)) as r:
+        r.row(0.0)
+    table = read_table(path)
+    assert table.signals == ("time", "a.leg[1].x", "a.leg[2].y")
+    assert [table[name].tolist() for name in table.signals] == [[0], [[0, 1]], [2]]
+    assert "a.leg" not in table
+
+
 def test_nan_is_written_as_such(tmp_path: Path) -> None:
     with recorder_of(tmp_path / "n.csv", ["y"], np.array([math.nan])) as recorder:
         recorder.row(0.0)

@@ -135,10 +135,11 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
             ("time", *columns("haptic_device.x_true", 3)), np.column_stack([fast, device])
         ),
         "graphics": Table(
-            (*names, *columns("virtual_mechanism.closure_error", 1)),
+            (*names, "virtual_mechanism.closure_error"),
             np.column_stack([slow, rest, count, closure]),
         ),
     }
+    fmus = {name: {"block": name} for name in ("virtual_mechanism", "haptic_device")}
     held = SimpleNamespace(name="a -> b", hold="zoh")
     within = SimpleNamespace(name="c -> d", hold=None)
     outcome = SimpleNamespace(
@@ -152,7 +153,7 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
         SimpleNamespace(  # type: ignore[arg-type]
             outcome=outcome,
             system=SimpleNamespace(connections=[held, within]),
-            results=Results(tmp_path, {}, tables),
+            results=Results(tmp_path, {"fmus": fmus}, tables),
         )
     )
     assert made["tracking_max_mm"] == pytest.approx(5, rel=1e-12)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
@@ -19,7 +20,7 @@ from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
 from tests.orchestrator.conftest import status
-from tests.orchestrator.foreign_fmus import python_fmu_of, run, scene
+from tests.orchestrator.foreign_fmus import python_fmu, python_fmu_of, run, scene, with_units
 
 
 def system(path: object, folder: Path, *options: str) -> System:
@@ -106,6 +107,57 @@ def test_nothing_is_guessed_from_the_name_of_a_foreign_port(
     text = rotating(tmp_path, "M") + wire + more
     with pytest.raises(SceneFault, match=why):
         system(scene(tmp_path, text), tmp_path)
+
+
+NAMESAKE = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        for name, value in {outputs}.items():
+            self.register_variable(Real(name, causality=Fmi2Causality.output,
+                                        getter=lambda value=value: value))
+
+    def do_step(self, time, size):
+        return True
+"""
+POSES = {f"{name}[{i}]": -1.0 for name in ("x", "x_true", "F", "F_drift") for i in (1, 2, 3)}
+SCALARS = {"x": 1.0, "F": 1.0, "F_env": 1.0, "q": 1.0, "n_constraints": 1e5, "branch_ok": 0.0,
+           "x_true": 1.0, "workspace_margin": -1.0, "closure_error": 1.0}  # fmt: skip
+
+
+@pytest.mark.parametrize("outputs", [POSES | {"workspace_margin": -1.0}, SCALARS])
+@pytest.mark.parametrize("more", ["", 'stop_when = "haptic_device.workspace_margin < 0"\n'])
+def test_an_fmu_is_no_block_for_its_name(tmp_path: Path, outputs: object, more: str) -> None:
+    """Neither what its outputs are, nor that it has diverged or left a workspace."""
+    python_fmu_of(tmp_path, NAMESAKE.format(name="Any", outputs=outputs), uuid.uuid4().hex)
+    names = (
+        "virtual_mechanism", "haptic_device", "virtual_environment", "hand", "controller", "other"
+    )  # fmt: skip
+    fmus = "".join(f'[[fmu]]\nname = "{name}"\npath = "Any.fmu"\n' for name in names)
+    made = hl.run(scene(tmp_path, more + fmus), out=tmp_path / "out")
+    assert made.fault is None
+    assert made.figures() == {}
+    assert made.run["warnings"] == []
+    assert {fmu["block"] for fmu in made.run["fmus"].values()} == {None}
+
+
+@pytest.mark.parametrize("name", ["controller", "gives"])
+def test_what_an_fmu_puts_in_counts_whatever_its_name(tmp_path: Path, name: str) -> None:
+    """A force of 3 N and more, held over 1/16 s and pushed along 2 m, generates less than it
+    does."""
+    for fmu, body in (("Gives", "self.y = 3.0 + time"), ("Takes", "self.y = 4.0 * time")):
+        with_units(python_fmu(tmp_path, fmu, body), y="N" if fmu == "Gives" else "m", u="N")
+    wire = f'[[connection]]\nfrom = "{name}.y"\nto = "takes.u"\n'
+    power = '[[power]]\neffort = "takes.u"\ndisplacement = "takes.y"\n'
+    fmus = f'[[fmu]]\nname = "{name}"\npath = "Gives.fmu"\nrate = 16\n'
+    fmus += '[[fmu]]\nname = "takes"\npath = "Takes.fmu"\n'
+    wire += "hold = 'foh'\n"
+    _, found = run(tmp_path, fmus + wire + power)
+    (energy,) = found.run["energies"].values()
+    assert 1e-6 < energy["generated"] < energy["ideal"]
+    assert found.run["unstable"] == ""
 
 
 DERIVATIVES = """

@@ -76,7 +76,8 @@ def test_by_one_option_and_what_does_not_meet_is_listed(
     assert all(name in told for name in ("own", *lost))
     assert "virtual_mechanism.x -> controller.x_S" in run["connections"]
     assert not any("F_drift" in name for name in run["connections"])
-    assert run["fmus"]["controller"] == {"rate": "haptics", "timing": "sampled"}
+    own = {"rate": "haptics", "timing": "sampled", "block": "controller"}
+    assert run["fmus"]["controller"] == own
 
 
 def test_a_port_of_another_size_is_refused_by_its_connection(tmp_path: Path) -> None:
