@@ -8,9 +8,14 @@ from hapticlink.orchestrator.base import interrupt
 
 def main() -> None:
     with interrupt.held(interrupt.end_process, after=signal.SIG_IGN):
+        from hapticlink.orchestrator.base.process_end import leave_threads
         from hapticlink.orchestrator.commands import main as command
 
-        command()
+        try:
+            command()
+        except SystemExit as ended:
+            leave_threads(int(ended.code or 0))
+            raise
 
 
 if __name__ == "__main__":
