@@ -27,6 +27,7 @@ from hapticlink.orchestrator.fmi.variables import (
     derivatives,
     differences,
     numbers,
+    require_unique,
     text,
 )
 
@@ -130,6 +131,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
             written = ("String", "Binary")
             strings = (v for v in model.modelVariables if v.type in written and not v.shape)
             texts, of = tuple(text(v) for v in strings), derivatives(model)
+            require_unique(s.name for s in (*scalars, *texts))
             dependencies = {
                 output.variable.name: frozenset(v.name for v in output.dependencies)
                 for output in model.outputs

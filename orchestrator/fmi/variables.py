@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -159,6 +160,14 @@ def check(variable: Any) -> None:
         raise ValueError(
             f"variable {name!r}: value reference {reference} is not from 0 to 2^32 - 1"
         )
+
+
+def require_unique(names: Iterable[str]) -> None:
+    """Raises ValueError for a name that two variables have (FMI 2.0.5 section 2.2.7, FMI 3.0
+    section 2.4.7), entries of arrays included: both would be one column of the results."""
+    name, count = next(iter(Counter(names).most_common(1)), ("", 0))
+    if count > 1:
+        raise ValueError(f"variable {name!r}: {count} variables have this name")
 
 
 def text(v: Any) -> Scalar:
