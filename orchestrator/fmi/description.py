@@ -27,6 +27,7 @@ from hapticlink.orchestrator.fmi.variables import (
     derivatives,
     differences,
     numbers,
+    require_countable,
     require_unique,
     text,
 )
@@ -116,6 +117,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
         try:
             model = read_model_description(_only_xml(content), validate=False)
+            require_countable(model)
             relative, units = differences(tree), {u.name: _unit(u) for u in model.unitDefinitions}
             scalars = tuple(
                 s

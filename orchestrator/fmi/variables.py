@@ -125,6 +125,17 @@ def numbers(
         )
 
 
+MOST = 10**6
+"""Numbers of an FMU; the largest have some 10^5."""
+
+
+def require_countable(model: Any) -> None:
+    """Raises ValueError for arrays with more entries than memory could hold."""
+    count = sum(math.prod(variable.shape or ()) for variable in model.modelVariables)
+    if count > MOST:
+        raise ValueError(f"{count} numbers with all entries of its arrays; at most {MOST}")
+
+
 def derivatives(model: Any) -> dict[str, str]:
     """By name of an output, the name of its time derivative: by the attribute `derivative`, or
     der(y) if variable names are structured (FMI 2.0.5 sections 2.2.7 and 2.2.9)."""
