@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import TypeAdapter
 
+from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
@@ -21,7 +22,14 @@ from hapticlink.orchestrator.results import mechanism_drawing
 from hapticlink.orchestrator.results.figure_axes import last_time, short, titled
 from hapticlink.orchestrator.results.force_figure import forces
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-from hapticlink.orchestrator.results.tracking import DEVICE, MECHANISM, table_of, tracking
+from hapticlink.orchestrator.results.tracking import (
+    DEVICE,
+    MECHANISM,
+    POSE,
+    has_tracking,
+    table_of,
+    tracking,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,15 +43,15 @@ def figures(results: Results) -> dict[str, Figure]:
     if not last_time(results):
         return drawn
     linkage = _part(results, "linkage", Linkage)  # an SSP has the block, but not its description
-    if linkage and (coordinates := table_of(results, COORDINATES)):
-        drawn["mechanism"] = _mechanism(results, linkage, coordinates)
-    if table_of(results, MECHANISM):
+    if linkage and (found := table_of(results, COORDINATES, (len(coordinate_units(linkage)),))):
+        drawn["mechanism"] = _mechanism(results, linkage, found)
+    if table_of(results, MECHANISM, POSE):
         drawn["trajectories"] = _trajectories(results)
-        if table_of(results, DEVICE):
+        if has_tracking(results):
             drawn["distance"] = _distance(results)
-    if found := forces(results, _part(results, "device", Device)):
-        drawn["forces"] = found
-    if contact := table_of(results, CONTACT):
+    if pushed := forces(results, _part(results, "device", Device)):
+        drawn["forces"] = pushed
+    if contact := table_of(results, CONTACT, POSE):
         drawn["contact"] = _contact(results, contact)
     counting = next((t for t in results.tables.values() if _count(t)), None)
     if counting:
@@ -95,13 +103,13 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
             (DEVICE, "handle x_D", "--"),
             *further,
         )
-        if (table := table_of(results, signal))
+        if (table := table_of(results, signal, POSE))
     ]
 
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if table_of(results, DEVICE):
+    if has_tracking(results):
         apart = short(tracking(results)[1].max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:
@@ -153,7 +161,8 @@ def _constraints(results: Results, table: Table) -> Figure:
     title = f"{most} constrained directions in {share:.3g} % of the samples"
     figure, axes = titled(results, title, "time (s)", "constrained directions")
     axes.step(time, count, where="post")
-    axes.set_yticks(range(most + 2))
+    if most < 10:
+        axes.set_yticks(range(most + 2))
     return figure
 
 

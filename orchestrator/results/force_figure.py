@@ -9,7 +9,7 @@ import numpy as np
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.figure_axes import short, titled
 from hapticlink.orchestrator.results.tables import Results, Vector
-from hapticlink.orchestrator.results.tracking import table_of
+from hapticlink.orchestrator.results.tracking import POSE, table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +28,7 @@ def wrenches(results: Results) -> dict[str, tuple[Vector, Vector, Vector]]:
     """By name: times (s), force (N) and moment (N.m) of each wrench that the run has."""
     found = {}
     for signal, name in WRENCHES.items():
-        if (table := table_of(results, signal)) and len(table["time"]):
+        if (table := table_of(results, signal, POSE)) and len(table["time"]):
             F = table[signal]
             found[name] = table["time"], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
     return found
@@ -39,8 +39,8 @@ def torques(results: Results, device: Device | None) -> tuple[Vector, Vector] | 
     # casadi, which the terminal's lines, of the same module, can do without
     from hapticlink.components.device.torques import motor_torques
 
-    table = table_of(results, MOTOR)
-    if device is None or table is None or HANDLE not in table or not len(table["time"]):
+    table, handle = table_of(results, MOTOR, POSE), table_of(results, HANDLE, POSE)
+    if device is None or table is None or table is not handle or not len(table["time"]):
         return None
     return table["time"], motor_torques(device, table[MOTOR], table[HANDLE])
 

@@ -13,6 +13,8 @@ from hapticlink.orchestrator.results.force_figure import wrenches
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import (
     DEVICE,
+    POSE,
+    SCALAR,
     folded,
     has_tracking,
     pose_error,
@@ -45,7 +47,7 @@ def numbers(results: Results) -> Iterator[str]:
     if found := wrenches(results):
         peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())
         yield f"largest forces: {'; '.join(peaks)}"
-    table = table_of(results, CLOSURE)
+    table = table_of(results, CLOSURE, SCALAR)
     if table and len(table["time"]):
         yield f"loops close within {table[CLOSURE].max():.2g} m"
 
@@ -95,11 +97,13 @@ def replaced(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _start(results: Results) -> Iterator[str]:
-    device = table_of(results, MARGIN)
-    if device and len(device["time"]) and device[MARGIN][0] < 0:
+    device = table_of(results, MARGIN, SCALAR)
+    posed = device and device is table_of(results, DEVICE, POSE)
+    if device and posed and len(device["time"]) and device[MARGIN][0] < 0:
         yield outside(device[DEVICE][0], device[MARGIN][0])
     linkage = results.run["scene"]["linkage"]
-    table = table_of(results, f"{MECHANISM}.q")
+    q = sum(len(_UNITS[joint["type"]]) for joint in linkage["joint"]) if linkage else 0
+    table = table_of(results, f"{MECHANISM}.q", (q,))
     if linkage and table and len(table["time"]):
         yield from moved(linkage, table[f"{MECHANISM}.q"][0])
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
@@ -33,17 +35,26 @@ class Table(Mapping[str, Vector]):
     def __getitem__(self, name: str) -> Vector:
         if name in self.columns:
             return self.rows[:, self.columns.index(name)]
-        entries = [(i, c) for i, c in enumerate(self.columns) if c.startswith(f"{name}[")]
+        entries = self._entries(name)
         if not entries:
             there = [other for other, table in self.others.items() if name in table]
             found = f"; it is in tables[{there[0]!r}]" if there else ""
             raise KeyError(f"no signal {name!r}{found}; there are {', '.join(self.columns)}")
-        last = entries[-1][1]
-        shape = tuple(int(n) for n in last[len(name) + 1 : -1].split(","))
-        return self.rows[:, [i for i, _ in entries]].reshape(-1, *shape)
+        (first, _), (last, _) = entries[0], entries[-1]
+        shape = tuple(b - a + 1 for a, b in zip(first, last, strict=False))
+        if math.prod(shape) != len(entries):  # of an array with gaps, or names that form none
+            shape = (len(entries),)
+        return self.rows[:, [i for _, i in entries]].reshape(-1, *shape)
+
+    def _entries(self, name: object) -> list[tuple[tuple[int, ...], int]]:
+        """Indices and column of each entry of a vector or matrix, in the order of the indices: some
+        tools write x[10] before x[2], or count from 0."""
+        entry = re.compile(rf"{re.escape(str(name))}\[(\d+(?:, *\d+)*)\]")
+        found = ((entry.fullmatch(c), i) for i, c in enumerate(self.columns))
+        return sorted((tuple(map(int, m[1].split(","))), i) for m, i in found if m)
 
     def __contains__(self, name: object) -> bool:
-        return any(c == name or c.startswith(f"{name}[") for c in self.columns)
+        return name in self.columns or bool(self._entries(name))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)

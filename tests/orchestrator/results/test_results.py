@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
-from hapticlink.orchestrator.results.tables import load, read_table
+from hapticlink.orchestrator.results.tables import Table, load, read_table
 
 
 def recorder_of(path: Path, columns: list[str], view: Any) -> Recorder:
@@ -59,6 +59,27 @@ def test_vectors_and_matrices_stack(tmp_path: Path) -> None:
     assert read_table(path)["e.L"].tolist() == [[[0, 1, 2], [3, 4, 5]]]
     with pytest.raises(KeyError, match=r"no signal 'e.K'"):
         read_table(path)["e.K"]
+
+
+def test_entries_stack_by_their_indices() -> None:
+    """Some tools count from 0, or write x[10] before x[2]; others put brackets in any name."""
+    names = (
+        "a[1]",
+        "a[0]",
+        "b[1]",
+        "b[3]",
+        "c[0,0]",
+        "c[0,1]",
+        "c[1,0]",
+        "c[1,1]",
+        "d[1].e",
+        "d[x]",
+    )
+    found = Table(names, np.arange(20.0).reshape(2, 10))
+    assert found["a"].tolist() == [[1.0, 0.0], [11.0, 10.0]]
+    assert found["b"].tolist() == [[2.0, 3.0], [12.0, 13.0]]
+    assert found["c"][1].tolist() == [[14.0, 15.0], [16.0, 17.0]]
+    assert "d" not in found
 
 
 def test_nan_is_written_as_such(tmp_path: Path) -> None:
