@@ -3,14 +3,20 @@ imports, and from here to the end of the process."""
 
 import signal
 
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, standard_streams
 
 
 def main() -> None:
+    standard_streams.ensure()
     with interrupt.held(interrupt.end_process, after=signal.SIG_IGN):
+        from hapticlink.orchestrator.base.process_end import leave_threads
         from hapticlink.orchestrator.commands import main as command
 
-        command()
+        try:
+            command()
+        except SystemExit as ended:
+            leave_threads(int(ended.code or 0))
+            raise
 
 
 if __name__ == "__main__":

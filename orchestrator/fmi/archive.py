@@ -26,6 +26,8 @@ def opened(path: Path, kind: str) -> Iterator[zipfile.ZipFile]:
     larger than MOST or MOST_ENTRIES, or holds an entry that would land outside the folder that it
     is unpacked to."""
     try:
+        if path.exists() and not path.is_file():  # a pipe, which may never be written to
+            raise InputFault(f"{path}: it is no file; give the path of an {kind}")
         with zipfile.ZipFile(path) as archive:
             entries = archive.infolist()
             for entry in entries:

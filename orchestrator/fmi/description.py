@@ -27,6 +27,8 @@ from hapticlink.orchestrator.fmi.variables import (
     derivatives,
     differences,
     numbers,
+    require_countable,
+    require_unique,
     text,
 )
 
@@ -117,6 +119,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
         try:
             model = read_model_description(_only_xml(content), validate=False)
+            require_countable(model)
             relative, units = differences(tree), {u.name: _unit(u) for u in model.unitDefinitions}
             scalars = tuple(
                 s
@@ -132,6 +135,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
             written = ("String", "Binary")
             strings = (v for v in model.modelVariables if v.type in written and not v.shape)
             texts, of = tuple(text(v) for v in strings), derivatives(model)
+            require_unique(s.name for s in (*scalars, *texts))
             dependencies = {
                 output.variable.name: frozenset(v.name for v in output.dependencies)
                 for output in model.outputs

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -130,6 +131,17 @@ def numbers(
         )
 
 
+MOST = 10**6
+"""Numbers of an FMU; the largest have some 10^5."""
+
+
+def require_countable(model: Any) -> None:
+    """Raises ValueError for arrays with more entries than memory could hold."""
+    count = sum(math.prod(variable.shape or ()) for variable in model.modelVariables)
+    if count > MOST:
+        raise ValueError(f"{count} numbers with all entries of its arrays; at most {MOST}")
+
+
 def derivatives(model: Any) -> dict[str, str]:
     """By name of an output, the name of its time derivative: by the attribute `derivative`, or
     der(y) if variable names are structured (FMI 2.0.5 sections 2.2.7 and 2.2.9)."""
@@ -165,6 +177,14 @@ def check(variable: Any) -> None:
         raise ValueError(
             f"variable {name!r}: value reference {reference} is not from 0 to 2^32 - 1"
         )
+
+
+def require_unique(names: Iterable[str]) -> None:
+    """Raises ValueError for a name that two variables have (FMI 2.0.5 section 2.2.7, FMI 3.0
+    section 2.4.7), entries of arrays included: both would be one column of the results."""
+    name, count = next(iter(Counter(names).most_common(1)), ("", 0))
+    if count > 1:
+        raise ValueError(f"variable {name!r}: {count} variables have this name")
 
 
 def text(v: Any) -> Scalar:

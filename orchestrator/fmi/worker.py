@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
+from hapticlink.orchestrator.base.process_end import leave_threads
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 
@@ -126,6 +127,7 @@ def main() -> None:
     os.dup2(nothing, 0)
     os.dup2(2, 1)
     serve(requests, answers)
+    leave_threads(0)
 
 
 if __name__ == "__main__":

@@ -153,7 +153,8 @@ def _constraints(results: Results, table: Table, name: str) -> Figure:
     title = f"{most} constrained directions in {share:.3g} % of the samples"
     figure, axes = titled(results, title, "time (s)", "constrained directions")
     axes.step(time, count, where="post")
-    axes.set_yticks(range(most + 2))
+    if most < 10:
+        axes.set_yticks(range(most + 2))
     return figure
 
 

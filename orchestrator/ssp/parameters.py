@@ -17,7 +17,8 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element, tostring
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.faults import SHOWN, InputFault
+from hapticlink.orchestrator.base.say import printable
 from hapticlink.orchestrator.fmi.archive import read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
 from hapticlink.orchestrator.ssp.connections import Reach, Wires
@@ -77,8 +78,10 @@ class Parameters:
                 if not targets:
                     self.unused.append(dotted(part.place, given.name))
         if self.unused:
-            message = "%s: parameters that match nothing are ignored: %s"
-            logging.getLogger(__name__).warning(message, self.path, ", ".join(self.unused))
+            names = printable(", ".join(self.unused[:SHOWN]))
+            more = f" and {n} more" if (n := len(self.unused) - SHOWN) > 0 else ""
+            message = "%s: parameters that match nothing are ignored: %s%s"
+            logging.getLogger(__name__).warning(message, self.path, names, more)
         return found
 
     def _given(self, part: Part) -> Iterator[Given]:

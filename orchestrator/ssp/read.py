@@ -47,12 +47,7 @@ def tables(path: Path) -> dict[str, Any]:
         system, defined = tree(path, element), units(root)
         names = _names(part.place for part in system if part.source is not None)
         with _room() as room:
-            files = {
-                part.place: _fmu(path, archive, part, names[part.place], room)
-                for part in system
-                if part.source is not None
-            }
-        described = {place: describe(file) for place, file in files.items()}
+            described = _described(path, archive, system, room)
         wires = Wires(path, system, described, defined)
         starts = Parameters(path, archive, wires).starts()
     rest = annotation.read(path, root)
@@ -62,9 +57,9 @@ def tables(path: Path) -> dict[str, Any]:
     }
     about = rest.get("fmu", {})
     found["fmu"] = [
-        {"path": str(file), "start": starts[place], "name": names[place]}
+        {"path": str(fmu.path), "start": starts[place], "name": names[place]}
         | about.get(dotted(place), {})
-        for place, file in files.items()
+        for place, fmu in described.items()
     ]
     found["connection"] = [
         {"from": f"{names[a]}.{p}", "to": f"{names[b]}.{q}", **how}
@@ -113,28 +108,44 @@ def _seconds(text: str) -> Fraction:
 def _names(places: Iterable[Place]) -> dict[Place, str]:
     """The name of each component in [[fmu]]: its own, numbered where it is not unique."""
     found: dict[Place, str] = {}
+    counts: dict[str, int] = {}  # by the names that are taken
     for place in places:
         name = wanted = re.sub(r"\W", "_", "_".join(place))
-        count = 1
-        while name in found.values():
-            count += 1
-            name = f"{wanted}_{count}"
-        found[place] = name
+        while name in counts:
+            counts[wanted] += 1
+            name = f"{wanted}_{counts[wanted]}"
+        counts[name], found[place] = 1, name
     return found
 
 
-def _fmu(path: Path, archive: zipfile.ZipFile, part: Part, name: str, room: Path) -> Path:
-    """The FMU of a component, unpacked into the cache, or `room` where that is off."""
-    if part.source not in archive.NameToInfo:
+def _described(
+    path: Path, archive: zipfile.ZipFile, system: Part, room: Path
+) -> dict[Place, Description]:
+    """The FMU of each component; an entry that several of them have is read once."""
+    known: dict[str, Description] = {}
+    found = {}
+    for part in system:
+        if part.source is None:
+            continue
+        if part.source not in known:
+            known[part.source] = describe(_unpacked(path, archive, part, part.source, room))
+        found[part.place] = known[part.source]
+    return found
+
+
+def _unpacked(path: Path, archive: zipfile.ZipFile, part: Part, source: str, room: Path) -> Path:
+    """The FMU at an entry of the archive, in the cache, or in `room` where that is off."""
+    if source not in archive.NameToInfo:
         held = ", ".join(n for n in archive.namelist() if n.endswith(".fmu")) or "none"
         where = f"{path}: {dotted(part.place)}"
-        raise InputFault(f"{where}: there is no {part.source!r} in it; FMUs in it: {held}")
-    file = f"{name}.fmu"
-    with archive.open(part.source) as content:
+        raise InputFault(f"{where}: there is no {source!r} in it; FMUs in it: {held}")
+    name = re.sub(r"\W", "_", Path(source).stem)
+    file = f"{name[:100]}.fmu"
+    with archive.open(source) as content:
         digest = hashlib.file_digest(content, "sha256").hexdigest()  # type: ignore[arg-type]
 
     def unpack(folder: Path) -> Path:
-        with archive.open(part.source or "") as content, (folder / file).open("wb") as unpacked:
+        with archive.open(source) as content, (folder / file).open("wb") as unpacked:
             shutil.copyfileobj(content, unpacked)
         return folder / file
 

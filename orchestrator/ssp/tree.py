@@ -3,6 +3,7 @@ connections (SSP 1.0, chapter 5). Unsupported elements are errors."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -116,7 +117,7 @@ def tree(path: Path, element: Element, place: Place = ()) -> Part:
             "by one"
         )
     names = [e.get("name", "") for e in element.iterfind(f"{{{SSD}}}Elements/*")]
-    if twice := {n for n in names if names.count(n) > 1}:
+    if twice := {n for n, count in Counter(names).items() if count > 1}:
         raise InputFault(f"{path}: {where} has two elements named {min(twice)!r}: name each once")
     parts = (
         tree(path, e, (*place, name))

@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.process_end import leave_threads
 from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.row import DIED, Row, failed
 
@@ -75,6 +76,10 @@ class _Worker(SpawnProcess):
             return SpawnProcess._Popen(process)
         finally:
             sys.modules["__main__"] = main
+
+    def run(self) -> None:
+        super().run()
+        leave_threads(0)
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """Malformed FMUs and SSPs are refused with a reason and write no file."""
 
+import os
 import stat
 import zipfile
 from collections.abc import Callable
@@ -68,6 +69,22 @@ def test_malformed_fmus(tmp_path: Path, make: Callable[[Path], Path], message: s
         describe(path)
     assert str(path) in str(refused.value)
     assert {p.name for p in tmp_path.iterdir()} <= {"model.fmu"}
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "model.fmu")
+    with pytest.raises(InputFault, match="it is no file"):
+        describe(tmp_path / "model.fmu")
+
+
+def test_arrays_have_a_bound(tmp_path: Path) -> None:
+    """A kilobyte of XML can declare more entries than memory holds."""
+    variable = '<Float64 name="x" valueReference="1" causality="output"><Dimension start="{}"/>'
+    text = f"""<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="m">
+        <CoSimulation modelIdentifier="faults"/><ModelVariables>{variable}</Float64>
+        </ModelVariables><ModelStructure/></fmiModelDescription>"""
+    with pytest.raises(InputFault, match=r"100000000000 numbers with .*; at most 1000000"):
+        describe(fmu(tmp_path / "model.fmu", text.format(10**11)))
 
 
 def test_a_damaged_entry_is_found(tmp_path: Path) -> None:

@@ -35,3 +35,10 @@ def test_value_references_are_of_32_bits(tmp_path: Path, reference: int) -> None
     text = DESCRIPTION.replace('valueReference="1"', f'valueReference="{reference}"')
     with pytest.raises(InputFault, match=f"'y': value reference {reference} is not from 0 to"):
         describe(fmu(tmp_path / "model.fmu", text))
+
+
+def test_two_variables_of_one_name_are_refused(tmp_path: Path) -> None:
+    """They would be one column, and all columns after it those of their neighbours."""
+    text = DESCRIPTION.replace('name="mode"', 'name="y"')
+    with pytest.raises(InputFault, match="'y': 2 variables have this name"):
+        describe(fmu(tmp_path / "model.fmu", text))

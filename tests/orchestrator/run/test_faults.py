@@ -253,6 +253,22 @@ def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
     assert log.read_text().splitlines() == ["terminate", "free", "unloaded after its interpreter"]
 
 
+@pytest.mark.parametrize("command", ["run", "run isolated", "sweep"])
+def test_threads_that_an_fmu_leaves_running_keep_no_process(tmp_path: Path, command: str) -> None:
+    """Python waits for them before it ends."""
+    wait = "__import__('threading').Thread(target=__import__('time').sleep, args=[600]).start()"
+    python_fmu(tmp_path, "Bad", f"self.steps > 1 or {wait}")
+    path = scene(tmp_path, ONE.format("Bad.fmu") + ISOLATED * ("isolated" in command))
+    arguments = [command.split()[0], str(path), "--out", str(tmp_path / "out")]
+    arguments += ["--vary", "duration=0.1,0.2", "--jobs", "2"] if command == "sweep" else []
+    ended = subprocess.run(
+        [sys.executable, "-m", "hapticlink.orchestrator", *arguments],
+        capture_output=True, timeout=60, text=True, check=False,
+    )  # fmt: skip
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.startswith("scene: ")
+
+
 TERMINATE = """
     def terminate(self):
         {}

@@ -11,6 +11,8 @@ from fmpy.ssp.simulation import simulate_ssp
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.ssp import read
 from tests.orchestrator.foreign_fmus import edited, python_fmu
 from tests.orchestrator.run.test_bonds import fmus
 from tests.orchestrator.ssps import (
@@ -130,6 +132,26 @@ def test_names_stay_apart(tmp_path: Path) -> None:
         ("a_b_3.y", "a_b.u"),
     }
     assert read.fmu[1].rate == 25
+
+
+def test_an_fmu_of_many_components_is_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Under names that differ in signs alone: all are numbered."""
+    opened: list[Path] = []
+
+    def counted(path: Path) -> Description:
+        opened.append(path)
+        return describe(path)
+
+    monkeypatch.setattr(read, "describe", counted)
+    signs = [a + b for a in "!?.:,;-+*/()" for b in "!?.:,;-+*/()"]
+    many = "".join(component(sign, "Plain") for sign in signs)
+    root = system("top", "", many, line("!!.y", "!?.u"))
+    tables = read.tables(Path(ssp(tmp_path, root)))
+    names = [fmu["name"] for fmu in tables["fmu"]]
+    assert names == ["__", *(f"___{i}" for i in range(2, len(signs) + 1))]
+    assert len(opened) == 1
 
 
 @pytest.mark.parametrize(

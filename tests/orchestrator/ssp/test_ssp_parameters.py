@@ -129,6 +129,14 @@ def test_values_that_match_nothing_are_passed_over_and_told(
     assert "ignored: box.no, box.away" in caplog.text
 
 
+def test_of_what_is_passed_over_few_are_told_without_escape_codes(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    bound = binding(values(*((f"&#155;31m{i}", "1") for i in range(1000))))
+    starts(tmp_path, box=bindings(bound))
+    assert "box.\\x9b31m19 and 980 more" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("bound", "message"),
     [
