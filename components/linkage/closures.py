@@ -19,8 +19,8 @@ from typing import Any, Protocol
 import casadi as ca
 
 from hapticlink.components.component import Signals, Variable
-from hapticlink.components.linkage.parameters import UNITS, loop_name, mean_link_length
-from hapticlink.components.specs.linkage import Gear, Linkage
+from hapticlink.components.linkage.parameters import loop_name, mean_link_length
+from hapticlink.components.specs.linkage import COORDINATE_UNITS, Gear, Linkage
 
 ROWS = {"revolute": 2, "slot": 1, "prismatic": 2}
 
@@ -61,7 +61,7 @@ def gear_parameters(linkage: Linkage) -> list[Variable]:
     found = []
     for i, gear in enumerate(linkage.gear):
         name = gear_name(linkage, i)
-        unit, per = (UNITS[_type(linkage, joint)][0] for joint in gear.joints)
+        unit, per = (COORDINATE_UNITS[_type(linkage, joint)][0] for joint in gear.joints)
         text = f"{gear.joints[0]} over {gear.joints[1]}"
         ratio_unit = "1" if unit == per else f"{unit}/{per}"
         found.append(Variable(f"{name}.ratio", (), ratio_unit, gear.ratio, text, "fixed"))

@@ -14,8 +14,6 @@ from hapticlink.orchestrator.results.force_figure import wrenches
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import (
     DEVICE,
-    POSE,
-    SCALAR,
     folded,
     has_tracking,
     of_block,

@@ -22,11 +22,9 @@ class Tracking(NamedTuple):
     angle_rad: Vector
 
 
-def table_of(results: Results, signal: str, shape: tuple[int, ...] | None = None) -> Table | None:
-    """The table that contains `signal`, whose rate depends on the scene; None if there is none, or
-    if its values are not of `shape`: FMUs of others may have a block's name."""
-    found = next((t for t in results.tables.values() if signal in t), None)
-    return None if found and shape not in (None, found[signal].shape[1:]) else found
+def table_of(results: Results, signal: str) -> Table | None:
+    """The table that contains `signal`, whose rate depends on the scene; None if there is none."""
+    return next((t for t in results.tables.values() if signal in t), None)
 
 
 def of_block(results: Results, signal: str, *shape: int) -> Table | None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
-from hapticlink.orchestrator.results.tables import Table, load, read_table
+from hapticlink.orchestrator.results.tables import load, read_table
 
 
 def recorder_of(path: Path, columns: list[str], view: Any) -> Recorder:
