@@ -3,7 +3,8 @@
     D qdd + C qd = Q + J_h' (F_hand - F_drift) + W' lambda,   W qdd + w_stab = 0   (B.6)
     w_stab = w + 2 alpha beta W qd + alpha^2 h                                  (B.5) as corrected
 
-Contacts add Q = sum_i J_i' F_i (contact_forces.py). The scene chooses how the closures are
+Contacts add Q = sum_i J_i' F_i (contact_forces.py), and steps locate where they begin and end
+(located_events.py). The scene chooses how the closures are
 stabilised: not at all, by Baumgarte's method, or by projection of position and velocity after each
 step. The start pose is assembled in initialisation mode.
 """
@@ -16,8 +17,10 @@ import casadi as ca
 
 from hapticlink.components import forces, integrators, time_tables
 from hapticlink.components.component import WRENCH, Block, Component, Variable
-from hapticlink.components.contact import contact_forces
+from hapticlink.components.contact import contact_forces, located_events
+from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
+from hapticlink.components.contact.located_events import LocatedEvents
 from hapticlink.components.dynamics import (
     closure_diagnostics,
     further_points,
@@ -42,6 +45,7 @@ from hapticlink.components.dynamics.variables import (
 from hapticlink.components.forces import drives
 from hapticlink.components.formulations import independent_coordinates
 from hapticlink.components.formulations.embedding import Embedding
+from hapticlink.components.formulations.independent_coordinates import Formulation
 from hapticlink.components.formulations.partitioning import Partitioning
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
@@ -81,6 +85,7 @@ def virtual_mechanism(
     applied += further_points.efforts(model, block.u)
     energy = model.kinetic_energy + forces.energy(model)
     output: dict[str, ca.SX] = {}
+    touching = None
     if contacts:
         here = contacts.detection == "haptics"
         found = (
@@ -88,15 +93,15 @@ def virtual_mechanism(
             if here
             else contact_forces.held(linkage, contacts, block.u["contacts"])
         )
-        touching = contact_forces.contact_forces(model, contacts, block.p, found)
-        applied += touching.Q
+        touching = ContactForces(model, contacts, block.p, found)
+        pushed = touching.efforts()
         energy += touching.energy
-        felt = space.terms.J_h @ space.response(touching.Q)[0]
+        felt = space.terms.J_h @ space.response(pushed)[0]
         F_env = contact_forces.equivalent_wrench(
             space.Lambda_inv, space.open_mobility, felt, block.p["length_scale"]
         )
         output |= {"F_env": F_env, "contact_gap": touching.gap}
-    qdd, multipliers = space.motion(applied)
+    qdd, multipliers = space.motion(applied + pushed if touching else applied)
     output |= {
         "x": model.x_h,
         "v": model.v_h,
@@ -113,7 +118,8 @@ def virtual_mechanism(
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
-    q1, qd1 = ca.vertsplit(_step(block, model, mechanism, applied, space, tables), model.q.numel())
+    after = _step(block, model, mechanism, applied, touching, space, tables)
+    q1, qd1 = ca.vertsplit(after, model.q.numel())
     stepped = ca.vertcat(carried(model, q1, qd1, block.h), qd1)
     if directions:
         constrained = constrained_directions(block, space, q0, q1)
@@ -133,7 +139,7 @@ def virtual_mechanism(
         substeps=mechanism.substeps,
         state_notes=notes(model),
         documentation=__doc__ or "",
-        shared=not frame_s,
+        shared=not frame_s and not touching,
         tables=tables,
     )
     require_assembled(component, model)
@@ -197,12 +203,13 @@ def _step(
     model: LinkageModel,
     mechanism: Mechanism,
     applied: ca.SX,
+    touching: ContactForces | None,
     space: OperationalSpace,
     tables: list[TimeTable],
 ) -> ca.SX:
     """(q, qd) after h: integration of the stabilised equations, followed by projection if chosen;
     or integration in independent coordinates."""
-    n = model.q.numel()
+    n, linkage = model.q.numel(), model.linkage
     efforts = space.terms.efforts + applied
     x, u, p, t = ca.vertcat(model.q, model.qd), block.u.vector, block.p.vector, block.t
     given = u
@@ -210,25 +217,34 @@ def _step(
         over = ca.SX.sym("over", time_tables.size_over(tables))
         efforts = ca.substitute(efforts, model.tabled, time_tables.within(tables, over, t))
         u, given = ca.vertcat(u, over), ca.vertcat(u, time_tables.over(tables, t, block.h))
+    integrator = integrators.METHODS[mechanism.integrator]
+    if touching and mechanism.events and integrator.order > 1:
+        laws = ca.SX.sym("laws", len(touching.sides))
+        efforts += touching.efforts(laws)
+        located = located_events.functions(touching.sides, x, u, p)
+        integrator, u = LocatedEvents(integrator, mechanism.events, located), ca.vertcat(laws, u)
+    elif touching:
+        efforts += touching.efforts()
     closing = -space.terms.w
-    if model.linkage.closed and mechanism.stabilization == "baumgarte":
+    if linkage.closed and mechanism.stabilization == "baumgarte":
         alpha, beta = block.p["alpha"], block.p["beta"]
         closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
-    if model.linkage.closed and mechanism.formulation == "embedding":
+    independent: Formulation | None = None
+    if linkage.closed and mechanism.formulation == "embedding":
         pushing = ca.Function("efforts", [x, u, p, t], [efforts], {"cse": True})
-        embedded = Embedding(
-            model, block.p, independent_coordinates.start_pose(model, block.p), pushing
-        )
-        return independent_coordinates.step(mechanism.integrator, embedded, x, given, p, t, block.h)
-    extrapolates = integrators.METHODS[mechanism.integrator].extrapolates
-    qdd = space.solver.follow(efforts, closing, refined=extrapolates)
-    ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
-    if model.linkage.closed and mechanism.formulation == "partitioning":
-        parted = Partitioning(
-            model, block.p, independent_coordinates.start_pose(model, block.p), ode
-        )
-        return independent_coordinates.step(mechanism.integrator, parted, x, given, p, t, block.h)
-    after = integrators.step(mechanism.integrator, ode, x, given, p, t, block.h, range(n))
+        start = independent_coordinates.start_pose(model, block.p)
+        independent = Embedding(model, block.p, start, pushing)
+    else:
+        qdd = space.solver.follow(efforts, closing, refined=integrator.extrapolates)
+        ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
+        if linkage.closed and mechanism.formulation == "partitioning":
+            start = independent_coordinates.start_pose(model, block.p)
+            independent = Partitioning(model, block.p, start, ode)
+    if independent:
+        if isinstance(integrator, LocatedEvents):
+            integrator = integrator.completed(independent.complete)
+        return independent_coordinates.step(integrator, independent, x, given, p, t, block.h)
+    after = integrator.step(ode, x, given, p, t, block.h, range(n))
     if mechanism.stabilization == "projection":
         own = space.terms.inertia
         project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))

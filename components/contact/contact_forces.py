@@ -1,7 +1,7 @@
 """Penalty contact of capsule-shaped links that never pulls (k_contact, b_contact of section B.6).
 
     g  = n . (x - x_plane) - r,   g' = n . v          gap (m) and its rate at the contact point
-    F  = n max(0, -k g - b g')  where g < 0, else 0
+    F  = n max(0, -k g - b g')  where g < 0, else 0   (unilateral.py)
     Q  = sum_i J_i' F_i
 
 F_env (2.18) is the wrench at the operational point that has the same effect there as all contacts,
@@ -11,8 +11,6 @@ and the least norm in the scaled metric S = diag(1, 1, L):
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -25,6 +23,7 @@ from hapticlink.components.contact.detection import (
     shape_parameters,
     touches,
 )
+from hapticlink.components.contact.unilateral import Unilateral
 from hapticlink.components.dynamics import constrained_directions
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts
@@ -98,41 +97,44 @@ def held(linkage: Linkage, contacts: Contacts, rows: ca.SX) -> list[Touch]:
     ]
 
 
-@dataclass(frozen=True)
 class ContactForces:
-    """Generalised forces Q (n x 1) of all contacts, the energy (J) stored in them, and the smallest
-    gap (m)."""
+    """The forces of all contacts at the model's pose and velocity, acting on the touching points as
+    material points of the bodies.
 
-    Q: ca.SX
-    energy: ca.SX
-    gap: ca.SX
+    sides: the contacts. energy (J): stored in all of them. gap (m): the smallest one.
+    """
 
+    def __init__(
+        self, model: LinkageModel, contacts: Contacts, p: Signals, found: list[Touch]
+    ) -> None:
+        self._model, self._touches = model, found
+        self._arms: list[ca.SX] = []
+        self.sides: list[Unilateral] = []
+        for touch in found:
+            frame = model.frames[touch.body]
+            arm = frame.rotation @ touch.point
+            v = model.rate(frame.origin) + model.rate(frame.angle) * ca.vertcat(-arm[1], arm[0])
+            rate, damped = ca.dot(touch.normal, v), (p["k_contact"], p["b_contact"])
+            self.sides.append(Unilateral(gap(model, touch), rate, *damped, touch.active))
+            self._arms.append(arm)
+        self.energy = sum((side.energy for side in self.sides), start=ca.SX(0))
+        least = ca.SX(FAR)
+        for side in self.sides:
+            least = ca.fmin(least, ca.if_else(side.active, side.gap, FAR))
+        self.gap = ca.if_else(least < FAR, least, contacts.margin)
 
-def contact_forces(
-    model: LinkageModel, contacts: Contacts, p: Signals, found: list[Touch]
-) -> ContactForces:
-    """Contact forces at the model's pose and velocity, acting on the touching point as a material
-    point of the body."""
-    wrenches: dict[str, ca.SX] = {}
-    energy, least = ca.SX(0), ca.SX(FAR)
-    for touch in found:
-        frame = model.frames[touch.body]
-        arm = frame.rotation @ touch.point
-        turning = model.rate(frame.angle)
-        v = model.rate(frame.origin) + turning * ca.vertcat(-arm[1], arm[0])
-        g, rate = gap(model, touch), ca.dot(touch.normal, v)
-        touching = ca.logic_and(touch.active, g < 0)
-        push = ca.fmax(0, -p["k_contact"] * g - p["b_contact"] * rate)
-        F = touch.normal * ca.if_else(touching, push, 0)
-        wrench = ca.vertcat(F, arm[0] * F[1] - arm[1] * F[0])
-        wrenches[touch.body] = wrenches.get(touch.body, ca.SX(3, 1)) + wrench
-        energy += ca.if_else(touching, 0.5 * p["k_contact"] * g**2, 0)
-        least = ca.fmin(least, ca.if_else(touch.active, g, FAR))
-    poses = [ca.vertcat(model.frames[b].origin, model.frames[b].angle) for b in wrenches]
-    Q = ca.SX(model.q.numel(), 1)
-    if poses:
-        Q = ca.jtimes(ca.vertcat(*poses), model.q, ca.vertcat(*wrenches.values()), True)
-    return ContactForces(Q, energy, ca.if_else(least < FAR, least, contacts.margin))
+    def efforts(self, laws: ca.SX | None = None) -> ca.SX:
+        """Generalised forces Q (n x 1), each contact by its law (unilateral.py)."""
+        wrenches: dict[str, ca.SX] = {}
+        for i, (touch, arm) in enumerate(zip(self._touches, self._arms, strict=True)):
+            F = touch.normal * self.sides[i].force(None if laws is None else laws[i])
+            wrench = ca.vertcat(F, arm[0] * F[1] - arm[1] * F[0])
+            wrenches[touch.body] = wrenches.get(touch.body, ca.SX(3, 1)) + wrench
+        frames, q = self._model.frames, self._model.q
+        poses = [ca.vertcat(frames[b].origin, frames[b].angle) for b in wrenches]
+        if not poses:
+            return ca.SX(q.numel(), 1)
+        return ca.jtimes(ca.vertcat(*poses), q, ca.vertcat(*wrenches.values()), True)
 
 
 def equivalent_wrench(

@@ -13,9 +13,9 @@ from typing import Protocol
 import casadi as ca
 import numpy as np
 
-from hapticlink.components import integrators
 from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.assembly import assemble
+from hapticlink.components.integrators.base import Integrator
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Mechanism
 
@@ -54,7 +54,7 @@ def start_pose(model: LinkageModel, parameters: Signals) -> tuple[np.ndarray, np
 
 
 def step(
-    method: str,
+    integrator: Integrator,
     formulation: Formulation,
     x: ca.SX,
     u: ca.SX,
@@ -67,5 +67,5 @@ def step(
     near = x[:n]
     z = x[[*formulation.independent, *(n + i for i in formulation.independent)]]
     inputs = ca.vertcat(u, near)
-    z = integrators.step(method, formulation.ode, z, inputs, p, t, h, range(k))
+    z = integrator.step(formulation.ode, z, inputs, p, t, h, range(k))
     return formulation.complete(z, near, p)

@@ -272,6 +272,8 @@ class Mechanism:
     """Baumgarte's damping ratio of (3.3); the default depends on the integrator."""
     substeps: Substeps = 1
     """Integration steps per communication step."""
+    events: Annotated[int, Quantity("1", ge=0, le=4)] = 1
+    """Begins and ends of contacts that are located within an integration step."""
 
 
 @dataclass(frozen=True, kw_only=True)
