@@ -3,8 +3,8 @@
     D qdd + C qd = Q + J_h' (F_hand - F_drift) + W' lambda,   W qdd + w_stab = 0   (B.6)
     w_stab = w + 2 alpha beta W qd + alpha^2 h                                  (B.5) as corrected
 
-Contacts add Q = sum_i J_i' F_i (contact_forces.py), and steps locate where they begin and end
-(located_events.py). The scene chooses how the closures are
+Contacts and joint limits add Q = sum_i J_i' F_i (contact_forces.py, joint_limits.py), and steps
+locate where they begin and end (located_events.py). The scene chooses how the closures are
 stabilised: not at all, by Baumgarte's method, or by projection of position and velocity after each
 step. The start pose is assembled in initialisation mode.
 """
@@ -17,10 +17,12 @@ import casadi as ca
 
 from hapticlink.components import forces, integrators, time_tables
 from hapticlink.components.component import WRENCH, Block, Component, Variable
-from hapticlink.components.contact import contact_forces, located_events
+from hapticlink.components.contact import contact_forces, joint_limits, located_events
 from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
+from hapticlink.components.contact.joint_limits import JointLimits
 from hapticlink.components.contact.located_events import LocatedEvents
+from hapticlink.components.contact.unilateral import AllOneSidedForces, OneSidedForces
 from hapticlink.components.dynamics import (
     closure_diagnostics,
     further_points,
@@ -85,23 +87,10 @@ def virtual_mechanism(
     applied += further_points.efforts(model, block.u)
     energy = model.kinetic_energy + forces.energy(model)
     output: dict[str, ca.SX] = {}
-    touching = None
-    if contacts:
-        here = contacts.detection == "haptics"
-        found = (
-            touches(model, contacts, block.p)
-            if here
-            else contact_forces.held(linkage, contacts, block.u["contacts"])
-        )
-        touching = ContactForces(model, contacts, block.p, found)
-        pushed = touching.efforts()
-        energy += touching.energy
-        felt = space.terms.J_h @ space.response(pushed)[0]
-        F_env = contact_forces.equivalent_wrench(
-            space.Lambda_inv, space.open_mobility, felt, block.p["length_scale"]
-        )
-        output |= {"F_env": F_env, "contact_gap": touching.gap}
-    qdd, multipliers = space.motion(applied + pushed if touching else applied)
+    touching = _touching(parts, block, space, output)
+    pushed = touching.efforts() if touching else ca.SX(model.q.numel(), 1)
+    energy += touching.energy if touching else 0
+    qdd, multipliers = space.motion(applied + pushed)
     output |= {
         "x": model.x_h,
         "v": model.v_h,
@@ -157,6 +146,11 @@ class _Parts:
     contacts: Contacts | None
     frame_s: float | None
 
+    @property
+    def touches(self) -> bool:
+        """Whether there are contacts or joint limits."""
+        return bool(self.contacts) or self.linkage.limited
+
 
 def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
     """The variables of the parts."""
@@ -183,12 +177,15 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
     if linkage.closed and parts.mechanism.diagnostics:
         outputs += closure_diagnostics.outputs()
     memory = states(linkage)
-    if contacts or directions:
+    if parts.touches or directions:
         length = directions.length_scale if directions else length_scale
         parameters.append(length_parameter(linkage, length))
+    if parts.touches:
+        parameters += joint_limits.parameters(linkage)
+        outputs.append(contact_forces.wrench_output())
     if contacts:
         parameters += contact_forces.contact_parameters(linkage, contacts)
-        outputs += contact_forces.contact_outputs()
+        outputs.append(contact_forces.gap_output())
         if contacts.detection == "graphics":
             inputs.append(contact_forces.contact_port(linkage, contacts))
     if directions:
@@ -198,12 +195,38 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
     return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
 
 
+def _touching(
+    parts: _Parts, block: Block, space: OperationalSpace, output: dict[str, ca.SX]
+) -> OneSidedForces | None:
+    """Contacts and joint limits, None where there are neither, and their outputs."""
+    model, contacts, found = space.model, parts.contacts, list[OneSidedForces]()
+    if contacts:
+        places = (
+            touches(model, contacts, block.p)
+            if contacts.detection == "haptics"
+            else contact_forces.held(parts.linkage, contacts, block.u["contacts"])
+        )
+        contact = ContactForces(model, contacts, block.p, places)
+        output["contact_gap"] = contact.gap
+        found.append(contact)
+    if parts.linkage.limited:
+        found.append(JointLimits(space))
+    if not found:
+        return None
+    touching = AllOneSidedForces(found)
+    felt = space.terms.J_h @ space.response(touching.efforts())[0]
+    output["F_env"] = contact_forces.equivalent_wrench(
+        space.Lambda_inv, space.open_mobility, felt, block.p["length_scale"]
+    )
+    return touching
+
+
 def _step(
     block: Block,
     model: LinkageModel,
     mechanism: Mechanism,
     applied: ca.SX,
-    touching: ContactForces | None,
+    touching: OneSidedForces | None,
     space: OperationalSpace,
     tables: list[TimeTable],
 ) -> ca.SX:

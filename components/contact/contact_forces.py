@@ -23,7 +23,7 @@ from hapticlink.components.contact.detection import (
     shape_parameters,
     touches,
 )
-from hapticlink.components.contact.unilateral import Unilateral
+from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
 from hapticlink.components.dynamics import constrained_directions
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts
@@ -66,11 +66,14 @@ def detection_parameters(
     return found + (obstacle_parameters(contacts) if obstacles else [])
 
 
-def contact_outputs() -> list[Variable]:
-    return [
-        Variable("F_env", (3,), WRENCH, description="wrench of all contacts at operational point"),
-        Variable("contact_gap", (), "m", description="smallest gap of an active contact"),
-    ]
+def wrench_output() -> Variable:
+    text = "wrench of all contacts and joint limits at operational point"
+    return Variable("F_env", (3,), WRENCH, description=text)
+
+
+def gap_output() -> Variable:
+    text = "smallest gap of an active contact"
+    return Variable("contact_gap", (), "m", description=text)
 
 
 def gap(model: LinkageModel, touch: Touch) -> ca.SX:
@@ -97,19 +100,16 @@ def held(linkage: Linkage, contacts: Contacts, rows: ca.SX) -> list[Touch]:
     ]
 
 
-class ContactForces:
+class ContactForces(OneSidedForces):
     """The forces of all contacts at the model's pose and velocity, acting on the touching points as
-    material points of the bodies.
-
-    sides: the contacts. energy (J): stored in all of them. gap (m): the smallest one.
-    """
+    material points of the bodies. gap (m): the smallest one."""
 
     def __init__(
         self, model: LinkageModel, contacts: Contacts, p: Signals, found: list[Touch]
     ) -> None:
         self._model, self._touches = model, found
         self._arms: list[ca.SX] = []
-        self.sides: list[Unilateral] = []
+        self.sides = []
         for touch in found:
             frame = model.frames[touch.body]
             arm = frame.rotation @ touch.point
@@ -117,14 +117,12 @@ class ContactForces:
             rate, damped = ca.dot(touch.normal, v), (p["k_contact"], p["b_contact"])
             self.sides.append(Unilateral(gap(model, touch), rate, *damped, touch.active))
             self._arms.append(arm)
-        self.energy = sum((side.energy for side in self.sides), start=ca.SX(0))
         least = ca.SX(FAR)
         for side in self.sides:
             least = ca.fmin(least, ca.if_else(side.active, side.gap, FAR))
         self.gap = ca.if_else(least < FAR, least, contacts.margin)
 
     def efforts(self, laws: ca.SX | None = None) -> ca.SX:
-        """Generalised forces Q (n x 1), each contact by its law (unilateral.py)."""
         wrenches: dict[str, ca.SX] = {}
         for i, (touch, arm) in enumerate(zip(self._touches, self._arms, strict=True)):
             F = touch.normal * self.sides[i].force(None if laws is None else laws[i])

@@ -8,6 +8,8 @@ step that locates these events prescribes a law for each part of it, so that F i
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -53,3 +55,34 @@ class Unilateral:
             return ca.if_else(self.touching, pushed, 0)
         begun = ca.logic_and(self.active, ca.logic_or(self.gap < 0, law == BEGUN))
         return ca.if_else(law < BY_STATE, law * self.push, ca.if_else(begun, pushed, 0))
+
+
+class OneSidedForces(ABC):
+    """Forces of several one-sided spring-dampers on a linkage: its `sides`."""
+
+    sides: Sequence[Unilateral]
+
+    @property
+    def energy(self) -> ca.SX:
+        """Energy (J) stored in all of them."""
+        return sum((side.energy for side in self.sides), start=ca.SX(0))
+
+    @abstractmethod
+    def efforts(self, laws: ca.SX | None = None) -> ca.SX:
+        """Generalised forces Q (n x 1), each side by its law, by default BY_STATE."""
+
+
+class AllOneSidedForces(OneSidedForces):
+    """The sum of several."""
+
+    def __init__(self, parts: Sequence[OneSidedForces]) -> None:
+        self._parts = parts
+        self.sides = [side for part in parts for side in part.sides]
+
+    def efforts(self, laws: ca.SX | None = None) -> ca.SX:
+        found, first = [], 0
+        for part in self._parts:
+            last = first + len(part.sides)
+            found.append(part.efforts(None if laws is None else laws[first:last]))
+            first = last
+        return sum(found[1:], start=found[0])

@@ -113,6 +113,24 @@ class Spring:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Ends of a joint's range, as contacts: a spring and damper that pushes back beyond them and
+    never pulls. Without damping and restitution the joint turns back with all its energy."""
+
+    lower: Coordinate | None = None
+    """Lower end of the range; by default there is none."""
+    upper: Coordinate | None = None
+    """Upper end of the range; by default there is none."""
+    stiffness: Annotated[float, Quantity("N.m/rad or N/m", gt=0)]
+    """Stiffness of the ends."""
+    damping: JointDamping | None = None
+    """Damping of the ends; or give `restitution`."""
+    restitution: Annotated[float, Quantity("1", ge=0.01, le=1)] | None = None
+    """Rate after an impact by rate before it: the damping is that for the joint's inertia at its
+    pose, with the loops closed."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Joint:
     """A joint of the tree.
 
@@ -145,6 +163,8 @@ class Joint:
     """Coulomb friction."""
     friction_speed: Annotated[float, Quantity("rad/s or m/s", gt=0)] = 0.01
     """Speed over which Coulomb friction saturates."""
+    limits: Limits | None = None
+    """Ends of the range of a revolute or prismatic joint."""
     drive: Drive | None = None
     """A motor."""
 
@@ -168,6 +188,10 @@ class Loop:
     """Angle of the first body from the second in a prismatic joint; by default 0."""
     name: str | None = None
     """Prefix of its FMU parameters; by default loop1, loop2, ..."""
+    limits: Limits | None = None
+    """Ends of the range of a revolute joint's angle, that of the first body from the second (0
+    where their x axes are parallel; full turns count), or of the displacement of the first point
+    from the second along `axis`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,6 +260,12 @@ class Linkage:
     def closed(self) -> bool:
         """Whether it has closures: loops or gears."""
         return bool(self.loop or self.gear)
+
+    @property
+    def limited(self) -> bool:
+        """Whether a joint or a cut joint has limits."""
+        limits = [*(j.limits for j in self.joint), *(cut.limits for cut in self.loop)]
+        return any(limit is not None for limit in limits)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -82,7 +82,7 @@ def bar(y, F):
 def end(distance):
     def gap(y):
         reach = y[1] + distance * math.sin(y[2]) - R
-        return reach, y[4] + distance * math.cos(y[2]) * y[5]
+        return reach, y[4] + distance * math.cos(y[2]) * y[5], K, LIGHT
 
     return gap
 
@@ -103,7 +103,7 @@ def landing(tilt, **settings):
 
 def landed(tilt):
     start = np.array([0.0, R + 0.02, tilt, 0.0, -1.0, 0.0])
-    return piecewise.solve(bar, ENDS, K, LIGHT, start, LANDED)
+    return piecewise.solve(bar, ENDS, start, LANDED)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.05])
@@ -163,10 +163,10 @@ def test_a_linkage_with_a_loop_that_is_thrown_on_a_disc(formulation):
         return np.concatenate([qd, np.linalg.solve(matrix, np.concatenate(right))[:4]])
 
     def gap(y):
-        return height(y[:4], center) - 0.013, gradient(y[:4], center) @ y[4:]
+        return height(y[:4], center) - 0.013, gradient(y[:4], center) @ y[4:], SOFT, LOSSY
 
     t_end = 0.2
-    exact, events = piecewise.solve(rhs, [gap], SOFT, LOSSY, np.r_[q0, np.zeros(4)], t_end)
+    exact, events = piecewise.solve(rhs, [gap], np.r_[q0, np.zeros(4)], t_end)
     assert events >= 2
     contacts = {"disc": (Disc(center=tuple(center), radius=0.01),)}
     contacts |= {"stiffness": SOFT, "damping": LOSSY}
