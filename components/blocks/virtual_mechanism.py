@@ -28,6 +28,7 @@ from hapticlink.components.dynamics import (
     further_points,
     local_model,
     stabilization,
+    starting_friction,
 )
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
@@ -44,7 +45,7 @@ from hapticlink.components.dynamics.variables import (
     motion_outputs,
     states,
 )
-from hapticlink.components.forces import drives
+from hapticlink.components.forces import drives, friction
 from hapticlink.components.formulations import independent_coordinates
 from hapticlink.components.formulations.embedding import Embedding
 from hapticlink.components.formulations.independent_coordinates import Formulation
@@ -54,6 +55,9 @@ from hapticlink.components.ports import Power
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 from hapticlink.components.time_tables import TimeTable
+
+DEFLECTIONS = ("deflection", "contact_deflection")
+"""The states of friction: of joints, and of contacts."""
 
 
 def virtual_mechanism(
@@ -81,7 +85,8 @@ def virtual_mechanism(
     block = _block(parts, step_s / mechanism.substeps, length_scale)
     tables = drives.tables(linkage)
     tabled = ca.SX.sym("tabled", 2 * len(tables))
-    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"], tabled, block.t)
+    at = block.x["q"], block.x["qd"]
+    model = LinkageModel(linkage, block.p, *at, tabled, block.t, block.x.get("deflection"))
     space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
     applied = space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
     applied += further_points.efforts(model, block.u)
@@ -107,9 +112,19 @@ def virtual_mechanism(
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
-    after = _step(block, model, mechanism, applied, touching, space, tables)
-    q1, qd1 = ca.vertsplit(after, model.q.numel())
-    stepped = ca.vertcat(carried(model, q1, qd1, block.h), qd1)
+    further = {name: ca.SX(*block.x[name].shape) for name in DEFLECTIONS if name in block.x}
+    if DEFLECTIONS[0] in further:
+        settled = starting_friction.start(space, applied + pushed, q0, qd0, block.t)
+        others = [name for name in further if name != DEFLECTIONS[0]]
+        symbols = ca.vertcat(tabled, *(block.x[name] for name in others))
+        known = [time_tables.at(tables, ca.SX(0)), *(further[name] for name in others)]
+        further[DEFLECTIONS[0]] = ca.substitute(settled, symbols, ca.densify(ca.vertcat(*known)))
+    initial |= further
+    after, n = _step(block, model, mechanism, applied, touching, space, tables), model.q.numel()
+    q1, qd1 = after[:n], after[n : 2 * n]
+    if k := model.deflection.numel():
+        after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
+    stepped = ca.vertcat(carried(model, q1, qd1, block.h), after[n:])
     if directions:
         constrained = constrained_directions(block, space, q0, q1)
         initial["n_constrained"] = constrained.first
@@ -176,7 +191,7 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
         inputs += local_model.ports(linkage)
     if linkage.closed and parts.mechanism.diagnostics:
         outputs += closure_diagnostics.outputs()
-    memory = states(linkage)
+    memory = [*states(linkage), *friction.states(linkage)]
     if parts.touches or directions:
         length = directions.length_scale if directions else length_scale
         parameters.append(length_parameter(linkage, length))
@@ -186,6 +201,7 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
     if contacts:
         parameters += contact_forces.contact_parameters(linkage, contacts)
         outputs.append(contact_forces.gap_output())
+        memory += contact_forces.states(linkage, contacts)
         if contacts.detection == "graphics":
             inputs.append(contact_forces.contact_port(linkage, contacts))
     if directions:
@@ -206,7 +222,8 @@ def _touching(
             if contacts.detection == "haptics"
             else contact_forces.held(parts.linkage, contacts, block.u["contacts"])
         )
-        contact = ContactForces(model, contacts, block.p, places)
+        deflection = block.x.get("contact_deflection")
+        contact = ContactForces(model, contacts, block.p, places, deflection)
         output["contact_gap"] = contact.gap
         found.append(contact)
     if parts.linkage.limited:
@@ -230,36 +247,40 @@ def _step(
     space: OperationalSpace,
     tables: list[TimeTable],
 ) -> ca.SX:
-    """(q, qd) after h: integration of the stabilised equations, followed by projection if chosen;
-    or integration in independent coordinates."""
+    """(q, qd, deflections) after h: integration of the stabilised equations, followed by projection
+    if chosen; or integration in independent coordinates."""
     n, linkage = model.q.numel(), model.linkage
     efforts = space.terms.efforts + applied
-    x, u, p, t = ca.vertcat(model.q, model.qd), block.u.vector, block.p.vector, block.t
+    further = [block.x[name] for name in DEFLECTIONS if name in block.x]
+    x, u, p, t = ca.vertcat(model.q, model.qd, *further), block.u.vector, block.p.vector, block.t
     given = u
     if tables:
         over = ca.SX.sym("over", time_tables.size_over(tables))
         efforts = ca.substitute(efforts, model.tabled, time_tables.within(tables, over, t))
         u, given = ca.vertcat(u, over), ca.vertcat(u, time_tables.over(tables, t, block.h))
     integrator = integrators.METHODS[mechanism.integrator]
-    if touching and mechanism.events and integrator.order > 1:
-        laws = ca.SX.sym("laws", len(touching.sides))
+    rates = friction.deflection_rates(model)
+    if touching:
+        laws = None
+        if mechanism.events and integrator.order > 1:
+            laws = ca.SX.sym("laws", len(touching.sides))
+            located = located_events.functions(touching.sides, x, u, p)
+            integrator = LocatedEvents(integrator, mechanism.events, located)
+            u = ca.vertcat(laws, u)
         efforts += touching.efforts(laws)
-        located = located_events.functions(touching.sides, x, u, p)
-        integrator, u = LocatedEvents(integrator, mechanism.events, located), ca.vertcat(laws, u)
-    elif touching:
-        efforts += touching.efforts()
+        rates = ca.vertcat(rates, touching.state_rates(laws))
     closing = -space.terms.w
     if linkage.closed and mechanism.stabilization == "baumgarte":
         alpha, beta = block.p["alpha"], block.p["beta"]
         closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
     independent: Formulation | None = None
     if linkage.closed and mechanism.formulation == "embedding":
-        pushing = ca.Function("efforts", [x, u, p, t], [efforts], {"cse": True})
+        pushing = ca.Function("efforts", [x, u, p, t], [efforts, rates], {"cse": True})
         start = independent_coordinates.start_pose(model, block.p)
         independent = Embedding(model, block.p, start, pushing)
     else:
         qdd = space.solver.follow(efforts, closing, refined=integrator.extrapolates)
-        ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
+        ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], {"cse": True})
         if linkage.closed and mechanism.formulation == "partitioning":
             start = independent_coordinates.start_pose(model, block.p)
             independent = Partitioning(model, block.p, start, ode)
@@ -271,6 +292,5 @@ def _step(
     if mechanism.stabilization == "projection":
         own = space.terms.inertia
         project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))
-        q1, qd1 = project(after[:n], after[n:], p)
-        after = ca.vertcat(q1, qd1)
+        after[: 2 * n] = ca.vertcat(*project(after[:n], after[n : 2 * n], p))
     return after

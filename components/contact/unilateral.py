@@ -9,7 +9,7 @@ step that locates these events prescribes a law for each part of it, so that F i
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -71,6 +71,10 @@ class OneSidedForces(ABC):
     def efforts(self, laws: ca.SX | None = None) -> ca.SX:
         """Generalised forces Q (n x 1), each side by its law, by default BY_STATE."""
 
+    def state_rates(self, laws: ca.SX | None = None) -> ca.SX:
+        """Derivatives of the states that the forces have, none by default."""
+        return ca.SX(0, 1)
+
 
 class AllOneSidedForces(OneSidedForces):
     """The sum of several."""
@@ -79,10 +83,21 @@ class AllOneSidedForces(OneSidedForces):
         self._parts = parts
         self.sides = [side for part in parts for side in part.sides]
 
+    @property
+    def energy(self) -> ca.SX:
+        return sum((part.energy for part in self._parts), start=ca.SX(0))
+
     def efforts(self, laws: ca.SX | None = None) -> ca.SX:
-        found, first = [], 0
+        found = [part.efforts(own) for part, own in self._shared(laws)]
+        return sum(found[1:], start=found[0])
+
+    def state_rates(self, laws: ca.SX | None = None) -> ca.SX:
+        return ca.vertcat(*(part.state_rates(own) for part, own in self._shared(laws)))
+
+    def _shared(self, laws: ca.SX | None) -> Iterator[tuple[OneSidedForces, ca.SX | None]]:
+        """Each part with the laws of its sides."""
+        first = 0
         for part in self._parts:
             last = first + len(part.sides)
-            found.append(part.efforts(None if laws is None else laws[first:last]))
+            yield part, None if laws is None else laws[first:last]
             first = last
-        return sum(found[1:], start=found[0])

@@ -135,7 +135,7 @@ class Joint:
     """A joint of the tree.
 
     Stiffness, damping, friction and a drive act on the one coordinate of a revolute or prismatic
-    joint: -stiffness (q - rest) - damping q' - friction tanh(q'/friction_speed) + drive.
+    joint: -stiffness (q - rest) - damping q' + friction + drive.
     """
 
     name: str
@@ -160,9 +160,12 @@ class Joint:
     damping: JointDamping | None = None
     """Viscous damping."""
     friction: Annotated[float, Quantity("N.m or N", ge=0)] | None = None
-    """Coulomb friction."""
+    """Coulomb friction, up to which the joint sticks."""
     friction_speed: Annotated[float, Quantity("rad/s or m/s", gt=0)] = 0.01
-    """Speed over which Coulomb friction saturates."""
+    """Sets the damping of a joint that sticks, friction / friction_speed."""
+    friction_deflection: Annotated[float, Quantity("rad or m", gt=0)] | None = None
+    """Deflection at which a joint begins to slide: sets the stiffness of one that sticks,
+    friction / friction_deflection. By default 0.01 s times `friction_speed`."""
     limits: Limits | None = None
     """Ends of the range of a revolute or prismatic joint."""
     drive: Drive | None = None

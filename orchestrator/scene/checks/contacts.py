@@ -31,6 +31,8 @@ def check(scene: Scene) -> Iterator[Problem]:
     if contacts.detection == "graphics" and not scene.graphics:
         message = "there is no graphics rate: add [graphics], or take detection = 'haptics'"
         yield (*here, "detection"), message
+    if contacts.friction is not None and not contacts.stiffness:
+        yield (*here, "friction"), "a contact without stiffness cannot stick: give one"
     yield from _obstacles(contacts)
 
 

@@ -27,6 +27,8 @@ TOUCHED = "duration=0.6"
         ("enclosure", "linkage.body.link1.capsule=[[0.0, 0.0], [0.0, 0.0]]", "two different"),
         ("enclosure", "contacts.stiffness=-1.0", r"give a number >= 0 \(N/m\)"),
         ("enclosure", "contacts.detection=hapics", "'graphics' or 'haptics'"),
+        ("enclosure", "contacts={friction=0.3, stiffness=0.0}", "cannot stick"),
+        ("enclosure", "contacts.friction=-0.3", "give a number >= 0"),
         ("obstacles", "contacts.disc.pin.name=block", "'block' is taken"),
         ("obstacles", "contacts.disc.pin.radius=0.0", r"give a number > 0 \(m\)"),
         ("closed-loop", "controller.contact=true", r"there is nothing to touch: add \[contacts\]"),
