@@ -3,7 +3,8 @@
     D qdd + C qd = Q + J_h' (F_hand - F_drift) + W' lambda,   W qdd + w_stab = 0   (B.6)
     w_stab = w + 2 alpha beta W qd + alpha^2 h                                  (B.5) as corrected
 
-Contacts add Q = sum_i J_i' F_i (contact_forces.py). The scene chooses how the closures are
+Contacts and joint limits add Q = sum_i J_i' F_i (contact_forces.py, joint_limits.py), and steps
+locate where they begin and end (located_events.py). The scene chooses how the closures are
 stabilised: not at all, by Baumgarte's method, or by projection of position and velocity after each
 step. The start pose is assembled in initialisation mode.
 """
@@ -16,13 +17,18 @@ import casadi as ca
 
 from hapticlink.components import forces, integrators, time_tables
 from hapticlink.components.component import WRENCH, Block, Component, Variable
-from hapticlink.components.contact import contact_forces
+from hapticlink.components.contact import contact_forces, joint_limits, located_events
+from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
+from hapticlink.components.contact.joint_limits import JointLimits
+from hapticlink.components.contact.located_events import LocatedEvents
+from hapticlink.components.contact.unilateral import AllOneSidedForces, OneSidedForces
 from hapticlink.components.dynamics import (
     closure_diagnostics,
     further_points,
     local_model,
     stabilization,
+    starting_friction,
 )
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
@@ -39,15 +45,19 @@ from hapticlink.components.dynamics.variables import (
     motion_outputs,
     states,
 )
-from hapticlink.components.forces import drives
+from hapticlink.components.forces import drives, friction
 from hapticlink.components.formulations import independent_coordinates
 from hapticlink.components.formulations.embedding import Embedding
+from hapticlink.components.formulations.independent_coordinates import Formulation
 from hapticlink.components.formulations.partitioning import Partitioning
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 from hapticlink.components.time_tables import TimeTable
+
+DEFLECTIONS = ("deflection", "contact_deflection")
+"""The states of friction: of joints, and of contacts."""
 
 
 def virtual_mechanism(
@@ -75,28 +85,17 @@ def virtual_mechanism(
     block = _block(parts, step_s / mechanism.substeps, length_scale)
     tables = drives.tables(linkage)
     tabled = ca.SX.sym("tabled", 2 * len(tables))
-    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"], tabled, block.t)
+    at = block.x["q"], block.x["qd"]
+    model = LinkageModel(linkage, block.p, *at, tabled, block.t, block.x.get("deflection"))
     space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
     applied = space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
     applied += further_points.efforts(model, block.u)
     energy = model.kinetic_energy + forces.energy(model)
     output: dict[str, ca.SX] = {}
-    if contacts:
-        here = contacts.detection == "haptics"
-        found = (
-            touches(model, contacts, block.p)
-            if here
-            else contact_forces.held(linkage, contacts, block.u["contacts"])
-        )
-        touching = contact_forces.contact_forces(model, contacts, block.p, found)
-        applied += touching.Q
-        energy += touching.energy
-        felt = space.terms.J_h @ space.response(touching.Q)[0]
-        F_env = contact_forces.equivalent_wrench(
-            space.Lambda_inv, space.open_mobility, felt, block.p["length_scale"]
-        )
-        output |= {"F_env": F_env, "contact_gap": touching.gap}
-    qdd, multipliers = space.motion(applied)
+    touching = _touching(parts, block, space, output)
+    pushed = touching.efforts() if touching else ca.SX(model.q.numel(), 1)
+    energy += touching.energy if touching else 0
+    qdd, multipliers = space.motion(applied + pushed)
     output |= {
         "x": model.x_h,
         "v": model.v_h,
@@ -113,8 +112,19 @@ def virtual_mechanism(
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
-    q1, qd1 = ca.vertsplit(_step(block, model, mechanism, applied, space, tables), model.q.numel())
-    stepped = ca.vertcat(carried(model, q1, qd1, block.h), qd1)
+    further = {name: ca.SX(*block.x[name].shape) for name in DEFLECTIONS if name in block.x}
+    if DEFLECTIONS[0] in further:
+        settled = starting_friction.start(space, applied + pushed, q0, qd0, block.t)
+        others = [name for name in further if name != DEFLECTIONS[0]]
+        symbols = ca.vertcat(tabled, *(block.x[name] for name in others))
+        known = [time_tables.at(tables, ca.SX(0)), *(further[name] for name in others)]
+        further[DEFLECTIONS[0]] = ca.substitute(settled, symbols, ca.densify(ca.vertcat(*known)))
+    initial |= further
+    after, n = _step(block, model, mechanism, applied, touching, space, tables), model.q.numel()
+    q1, qd1 = after[:n], after[n : 2 * n]
+    if k := model.deflection.numel():
+        after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
+    stepped = ca.vertcat(carried(model, q1, qd1, block.h), after[n:])
     if directions:
         constrained = constrained_directions(block, space, q0, q1)
         initial["n_constrained"] = constrained.first
@@ -133,7 +143,7 @@ def virtual_mechanism(
         substeps=mechanism.substeps,
         state_notes=notes(model),
         documentation=__doc__ or "",
-        shared=not frame_s,
+        shared=not frame_s and not touching,
         tables=tables,
     )
     require_assembled(component, model)
@@ -150,6 +160,11 @@ class _Parts:
     directions: Directions | None
     contacts: Contacts | None
     frame_s: float | None
+
+    @property
+    def touches(self) -> bool:
+        """Whether there are contacts or joint limits."""
+        return bool(self.contacts) or self.linkage.limited
 
 
 def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
@@ -176,13 +191,17 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
         inputs += local_model.ports(linkage)
     if linkage.closed and parts.mechanism.diagnostics:
         outputs += closure_diagnostics.outputs()
-    memory = states(linkage)
-    if contacts or directions:
+    memory = [*states(linkage), *friction.states(linkage)]
+    if parts.touches or directions:
         length = directions.length_scale if directions else length_scale
         parameters.append(length_parameter(linkage, length))
+    if parts.touches:
+        parameters += joint_limits.parameters(linkage)
+        outputs.append(contact_forces.wrench_output())
     if contacts:
         parameters += contact_forces.contact_parameters(linkage, contacts)
-        outputs += contact_forces.contact_outputs()
+        outputs.append(contact_forces.gap_output())
+        memory += contact_forces.states(linkage, contacts)
         if contacts.detection == "graphics":
             inputs.append(contact_forces.contact_port(linkage, contacts))
     if directions:
@@ -192,46 +211,86 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
     return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
 
 
+def _touching(
+    parts: _Parts, block: Block, space: OperationalSpace, output: dict[str, ca.SX]
+) -> OneSidedForces | None:
+    """Contacts and joint limits, None where there are neither, and their outputs."""
+    model, contacts, found = space.model, parts.contacts, list[OneSidedForces]()
+    if contacts:
+        places = (
+            touches(model, contacts, block.p)
+            if contacts.detection == "haptics"
+            else contact_forces.held(parts.linkage, contacts, block.u["contacts"])
+        )
+        deflection = block.x.get("contact_deflection")
+        contact = ContactForces(model, contacts, block.p, places, deflection)
+        output["contact_gap"] = contact.gap
+        found.append(contact)
+    if parts.linkage.limited:
+        found.append(JointLimits(space))
+    if not found:
+        return None
+    touching = AllOneSidedForces(found)
+    felt = space.terms.J_h @ space.response(touching.efforts())[0]
+    output["F_env"] = contact_forces.equivalent_wrench(
+        space.Lambda_inv, space.open_mobility, felt, block.p["length_scale"]
+    )
+    return touching
+
+
 def _step(
     block: Block,
     model: LinkageModel,
     mechanism: Mechanism,
     applied: ca.SX,
+    touching: OneSidedForces | None,
     space: OperationalSpace,
     tables: list[TimeTable],
 ) -> ca.SX:
-    """(q, qd) after h: integration of the stabilised equations, followed by projection if chosen;
-    or integration in independent coordinates."""
-    n = model.q.numel()
+    """(q, qd, deflections) after h: integration of the stabilised equations, followed by projection
+    if chosen; or integration in independent coordinates."""
+    n, linkage = model.q.numel(), model.linkage
     efforts = space.terms.efforts + applied
-    x, u, p, t = ca.vertcat(model.q, model.qd), block.u.vector, block.p.vector, block.t
+    further = [block.x[name] for name in DEFLECTIONS if name in block.x]
+    x, u, p, t = ca.vertcat(model.q, model.qd, *further), block.u.vector, block.p.vector, block.t
     given = u
     if tables:
         over = ca.SX.sym("over", time_tables.size_over(tables))
         efforts = ca.substitute(efforts, model.tabled, time_tables.within(tables, over, t))
         u, given = ca.vertcat(u, over), ca.vertcat(u, time_tables.over(tables, t, block.h))
+    integrator = integrators.METHODS[mechanism.integrator]
+    rates = friction.deflection_rates(model)
+    if touching:
+        laws = None
+        if mechanism.events and integrator.order > 1:
+            laws = ca.SX.sym("laws", len(touching.sides))
+            located = located_events.functions(touching.sides, x, u, p)
+            integrator = LocatedEvents(integrator, mechanism.events, located)
+            u = ca.vertcat(laws, u)
+        efforts += touching.efforts(laws)
+        rates = ca.vertcat(rates, touching.state_rates(laws))
     closing = -space.terms.w
-    if model.linkage.closed and mechanism.stabilization == "baumgarte":
+    if linkage.closed and mechanism.stabilization == "baumgarte":
         alpha, beta = block.p["alpha"], block.p["beta"]
         closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
-    if model.linkage.closed and mechanism.formulation == "embedding":
-        pushing = ca.Function("efforts", [x, u, p, t], [efforts], {"cse": True})
-        embedded = Embedding(
-            model, block.p, independent_coordinates.start_pose(model, block.p), pushing
-        )
-        return independent_coordinates.step(mechanism.integrator, embedded, x, given, p, t, block.h)
-    extrapolates = integrators.METHODS[mechanism.integrator].extrapolates
-    qdd = space.solver.follow(efforts, closing, refined=extrapolates)
-    ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd)], {"cse": True})
-    if model.linkage.closed and mechanism.formulation == "partitioning":
-        parted = Partitioning(
-            model, block.p, independent_coordinates.start_pose(model, block.p), ode
-        )
-        return independent_coordinates.step(mechanism.integrator, parted, x, given, p, t, block.h)
-    after = integrators.step(mechanism.integrator, ode, x, given, p, t, block.h, range(n))
+    independent: Formulation | None = None
+    if linkage.closed and mechanism.formulation == "embedding":
+        pushing = ca.Function("efforts", [x, u, p, t], [efforts, rates], {"cse": True})
+        start = independent_coordinates.start_pose(model, block.p)
+        independent = Embedding(model, block.p, start, pushing)
+    else:
+        qdd = space.solver.follow(efforts, closing, refined=integrator.extrapolates)
+        ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], {"cse": True})
+        if linkage.closed and mechanism.formulation == "partitioning":
+            start = independent_coordinates.start_pose(model, block.p)
+            independent = Partitioning(model, block.p, start, ode)
+    if independent:
+        if isinstance(integrator, LocatedEvents):
+            integrator = integrator.completed(independent.complete)
+        return independent_coordinates.step(integrator, independent, x, given, p, t, block.h)
+    after = integrator.step(ode, x, given, p, t, block.h, range(n))
     if mechanism.stabilization == "projection":
         own = space.terms.inertia
         project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))
-        q1, qd1 = project(after[:n], after[n:], p)
-        after = ca.vertcat(q1, qd1)
+        after[: 2 * n] = ca.vertcat(*project(after[:n], after[n : 2 * n], p))
     return after

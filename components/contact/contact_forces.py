@@ -1,8 +1,12 @@
 """Penalty contact of capsule-shaped links that never pulls (k_contact, b_contact of section B.6).
 
     g  = n . (x - x_plane) - r,   g' = n . v          gap (m) and its rate at the contact point
-    F  = n max(0, -k g - b g')  where g < 0, else 0
+    F  = n max(0, -k g - b g')  where g < 0, else 0   (unilateral.py)
     Q  = sum_i J_i' F_i
+
+With a coefficient of friction mu, F also has the tangential part -k e of dry_friction.py, with the
+rate of the link's surface along the plane, the spring of stiffness k with its deflection z as a
+state, and a limit k d = mu n . F.
 
 F_env (2.18) is the wrench at the operational point that has the same effect there as all contacts,
 and the least norm in the scaled metric S = diag(1, 1, L):
@@ -11,8 +15,6 @@ and the least norm in the scaled metric S = diag(1, 1, L):
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -25,7 +27,10 @@ from hapticlink.components.contact.detection import (
     shape_parameters,
     touches,
 )
+from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
 from hapticlink.components.dynamics import constrained_directions
+from hapticlink.components.forces import dry_friction
+from hapticlink.components.forces.friction import LAG
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
@@ -55,7 +60,21 @@ def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
         *detection_parameters(linkage, contacts, contacts.detection == "haptics"),
         Variable("k_contact", (), "N/m", contacts.stiffness, "stiffness of a contact"),
         Variable("b_contact", (), "N.s/m", contacts.damping, "damping of a contact"),
+        *_friction(contacts),
     ]
+
+
+def _friction(contacts: Contacts) -> list[Variable]:
+    if contacts.friction is None:
+        return []
+    return [Variable("mu_contact", (), "1", contacts.friction, "friction of a contact")]
+
+
+def states(linkage: Linkage, contacts: Contacts) -> list[Variable]:
+    """The tangential deflections of the places, with friction."""
+    if contacts.friction is None:
+        return []
+    return [Variable("contact_deflection", (places(linkage, contacts),), "m")]
 
 
 def detection_parameters(
@@ -67,11 +86,14 @@ def detection_parameters(
     return found + (obstacle_parameters(contacts) if obstacles else [])
 
 
-def contact_outputs() -> list[Variable]:
-    return [
-        Variable("F_env", (3,), WRENCH, description="wrench of all contacts at operational point"),
-        Variable("contact_gap", (), "m", description="smallest gap of an active contact"),
-    ]
+def wrench_output() -> Variable:
+    text = "wrench of all contacts and joint limits at operational point"
+    return Variable("F_env", (3,), WRENCH, description=text)
+
+
+def gap_output() -> Variable:
+    text = "smallest gap of an active contact"
+    return Variable("contact_gap", (), "m", description=text)
 
 
 def gap(model: LinkageModel, touch: Touch) -> ca.SX:
@@ -98,41 +120,77 @@ def held(linkage: Linkage, contacts: Contacts, rows: ca.SX) -> list[Touch]:
     ]
 
 
-@dataclass(frozen=True)
-class ContactForces:
-    """Generalised forces Q (n x 1) of all contacts, the energy (J) stored in them, and the smallest
-    gap (m)."""
+class ContactForces(OneSidedForces):
+    """The forces of all contacts at the model's pose and velocity, acting on the points of the
+    bodies' surfaces as material points. deflection: that of each place, with friction. gap (m): the
+    smallest one."""
 
-    Q: ca.SX
-    energy: ca.SX
-    gap: ca.SX
+    def __init__(
+        self,
+        model: LinkageModel,
+        contacts: Contacts,
+        p: Signals,
+        found: list[Touch],
+        deflection: ca.SX | None = None,
+    ) -> None:
+        self._model, self._p, self._touches, self._z = model, p, found, deflection
+        self._arms: list[ca.SX] = []
+        slides: list[ca.SX] = []
+        self.sides = []
+        for touch in found:
+            frame = model.frames[touch.body]
+            arm = frame.rotation @ touch.point - model.p[f"{touch.body}.radius"] * touch.normal
+            v = model.rate(frame.origin) + model.rate(frame.angle) * ca.vertcat(-arm[1], arm[0])
+            rate, damped = ca.dot(touch.normal, v), (p["k_contact"], p["b_contact"])
+            self.sides.append(Unilateral(gap(model, touch), rate, *damped, touch.active))
+            self._arms.append(arm)
+            slides.append(ca.dot(_along(touch), v))
+        self._slides = ca.vertcat(*slides)
+        least = ca.SX(FAR)
+        for side in self.sides:
+            least = ca.fmin(least, ca.if_else(side.active, side.gap, FAR))
+        self.gap = ca.if_else(least < FAR, least, contacts.margin)
+
+    @property
+    def energy(self) -> ca.SX:
+        if self._z is None:
+            return super().energy
+        return super().energy + 0.5 * self._p["k_contact"] * ca.sumsqr(self._z)
+
+    def _pushes(self, laws: ca.SX | None) -> ca.SX:
+        if laws is None:
+            return ca.vertcat(*(side.force() for side in self.sides))
+        each = zip(self.sides, ca.vertsplit(laws), strict=True)
+        return ca.vertcat(*(side.force(law) for side, law in each))
+
+    def _breaks(self, pushes: ca.SX) -> ca.SX:
+        """Deflections at which the contacts slide."""
+        return self._p["mu_contact"] * ca.fmax(pushes, 0) / self._p["k_contact"]
+
+    def efforts(self, laws: ca.SX | None = None) -> ca.SX:
+        pushes, rubs = self._pushes(laws), ca.SX(len(self.sides), 1)
+        if self._z is not None:
+            held = dry_friction.held(self._z, self._slides, self._breaks(pushes), LAG)
+            rubs = -self._p["k_contact"] * held
+        wrenches: dict[str, ca.SX] = {}
+        for i, (touch, arm) in enumerate(zip(self._touches, self._arms, strict=True)):
+            F = touch.normal * pushes[i] + _along(touch) * rubs[i]
+            wrench = ca.vertcat(F, arm[0] * F[1] - arm[1] * F[0])
+            wrenches[touch.body] = wrenches.get(touch.body, ca.SX(3, 1)) + wrench
+        frames, q = self._model.frames, self._model.q
+        poses = [ca.vertcat(frames[b].origin, frames[b].angle) for b in wrenches]
+        return ca.jtimes(ca.vertcat(*poses), q, ca.vertcat(*wrenches.values()), True)
+
+    def state_rates(self, laws: ca.SX | None = None) -> ca.SX:
+        if self._z is None:
+            return ca.SX(0, 1)
+        breaks = self._breaks(self._pushes(laws))
+        return dry_friction.deflection_rate(self._z, self._slides, breaks, LAG)
 
 
-def contact_forces(
-    model: LinkageModel, contacts: Contacts, p: Signals, found: list[Touch]
-) -> ContactForces:
-    """Contact forces at the model's pose and velocity, acting on the touching point as a material
-    point of the body."""
-    wrenches: dict[str, ca.SX] = {}
-    energy, least = ca.SX(0), ca.SX(FAR)
-    for touch in found:
-        frame = model.frames[touch.body]
-        arm = frame.rotation @ touch.point
-        turning = model.rate(frame.angle)
-        v = model.rate(frame.origin) + turning * ca.vertcat(-arm[1], arm[0])
-        g, rate = gap(model, touch), ca.dot(touch.normal, v)
-        touching = ca.logic_and(touch.active, g < 0)
-        push = ca.fmax(0, -p["k_contact"] * g - p["b_contact"] * rate)
-        F = touch.normal * ca.if_else(touching, push, 0)
-        wrench = ca.vertcat(F, arm[0] * F[1] - arm[1] * F[0])
-        wrenches[touch.body] = wrenches.get(touch.body, ca.SX(3, 1)) + wrench
-        energy += ca.if_else(touching, 0.5 * p["k_contact"] * g**2, 0)
-        least = ca.fmin(least, ca.if_else(touch.active, g, FAR))
-    poses = [ca.vertcat(model.frames[b].origin, model.frames[b].angle) for b in wrenches]
-    Q = ca.SX(model.q.numel(), 1)
-    if poses:
-        Q = ca.jtimes(ca.vertcat(*poses), model.q, ca.vertcat(*wrenches.values()), True)
-    return ContactForces(Q, energy, ca.if_else(least < FAR, least, contacts.margin))
+def _along(touch: Touch) -> ca.SX:
+    """The tangent of a contact's plane."""
+    return ca.vertcat(-touch.normal[1], touch.normal[0])
 
 
 def equivalent_wrench(

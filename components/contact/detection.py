@@ -4,7 +4,7 @@ A link is a capsule, the points within `radius` of a segment. Each place of a pa
 point on the segment, and the plane of the obstacle that faces it. The number of places is fixed,
 each with a flag whether it is active, so that there is no iteration and no branch.
 
-    enclosure   each end against its two nearest walls
+    enclosure   each end against its two nearest walls; with friction, against all walls
     disc        the segment's point nearest to the centre
     polygon     each end's nearest point of the boundary, and the corner that is nearest to
                 the inside of the segment
@@ -89,7 +89,8 @@ def touches(model: LinkageModel, contacts: Contacts, p: Signals) -> list[Touch]:
     for pair in near(model.linkage, contacts):
         ends = _ends(model, pair.body)
         if pair.kind == "enclosure":
-            found += [t for end in ends for t in _in_corner(model, pair.body, end, p)]
+            at_end = _in_corner if contacts.friction is None else _at_walls
+            found += [t for end in ends for t in at_end(model, pair.body, end, p)]
         elif pair.kind == "disc":
             found.append(_on_disc(model, pair, ends, p))
         else:
@@ -100,6 +101,11 @@ def touches(model: LinkageModel, contacts: Contacts, p: Signals) -> list[Touch]:
 def _ends(model: LinkageModel, body: str) -> list[ca.SX]:
     shape = next(b for b in model.linkage.body if b.name == body)
     return [ca.SX(list(end)) for end in shape.capsule]
+
+
+def _at_walls(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:
+    walls = edges(p["enclosure.corners"])
+    return [Touch(body, ca.SX(1), end, a, -outward) for a, _, outward in walls]
 
 
 def _in_corner(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:

@@ -4,6 +4,7 @@ Forces of the linkage's own keys are modules with
     parameters(linkage) -> list[Variable]
     efforts(model)      -> generalised forces (n x 1), or None
     energy(model)       -> potential energy (J), or None
+of which friction.py has states as well;
 and forces that [[linkage.force]] selects by its `type` are classes in `FORCES`.
 """
 
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.forces import drives, gravity, joints, springs
+from hapticlink.components.forces import drives, friction, gravity, joints, springs
 from hapticlink.components.forces.base import Force
 from hapticlink.components.registry import Registry, no_subclass
 from hapticlink.components.specs.linkage import Linkage
@@ -22,7 +23,7 @@ from hapticlink.components.specs.linkage import Linkage
 if TYPE_CHECKING:
     from hapticlink.components.linkage.model import LinkageModel
 
-KINDS = (gravity, springs, joints, drives)
+KINDS = (gravity, springs, joints, friction, drives)
 FORCES: Registry[type[Force]] = Registry("force", {}, lambda part: no_subclass(part, Force))
 
 

@@ -1,10 +1,4 @@
-"""Springs, viscous and Coulomb friction on single joint coordinates.
-
-    Q = -k (q - q_rest) - b qd - f tanh(qd / v_f)
-
-The discontinuity of Coulomb friction at zero speed is smoothed over v_f, since fixed-step methods
-locate no events.
-"""
+"""Springs and viscous friction on single joint coordinates: Q = -k (q - q_rest) - b qd."""
 
 from __future__ import annotations
 
@@ -19,8 +13,8 @@ if TYPE_CHECKING:
     from hapticlink.components.linkage.model import LinkageModel
 
 _UNITS = {
-    "revolute": ("N.m/rad", "rad", "N.m.s/rad", "N.m", "rad/s"),
-    "prismatic": ("N/m", "m", "N.s/m", "N", "m/s"),
+    "revolute": ("N.m/rad", "rad", "N.m.s/rad"),
+    "prismatic": ("N/m", "m", "N.s/m"),
 }
 
 
@@ -29,18 +23,16 @@ def parameters(linkage: Linkage) -> list[Variable]:
     coordinates."""
     found = []
     for j in linkage.joint:
-        fields = ("stiffness", "rest", "damping", "friction")
+        fields = ("stiffness", "rest", "damping")
         given = {f: getattr(j, f) for f in fields if getattr(j, f) is not None}
         if given and j.type not in _UNITS:
             raise ValueError(
                 f"joint `{j.name}`: {', '.join(given)} act on one coordinate and a {j.type} joint "
                 "has three; use a spring between points"
             )
-        if "friction" in given:
-            given["friction_speed"] = j.friction_speed
-        for unit, field in zip(_UNITS.get(j.type, ()), (*fields, "friction_speed"), strict=False):
+        for unit, field in zip(_UNITS.get(j.type, ()), fields, strict=False):
             if field in given:
-                text = f"{field.replace('_', ' ')} of {j.name}"
+                text = f"{field} of {j.name}"
                 found.append(Variable(f"{j.name}.{field}", (), unit, given[field], text))
     return found
 
@@ -68,9 +60,5 @@ def efforts(model: LinkageModel) -> ca.SX | None:
             any_term = True
         if j.damping is not None:
             Q[k] -= p[f"{j.name}.damping"] * model.qd[k]
-            any_term = True
-        if j.friction is not None:
-            speed = model.qd[k] / p[f"{j.name}.friction_speed"]
-            Q[k] -= p[f"{j.name}.friction"] * ca.tanh(speed)
             any_term = True
     return Q if any_term else None

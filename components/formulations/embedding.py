@@ -26,8 +26,8 @@ from hapticlink.components.linkage.model import LinkageModel
 class Embedding:
     """The formulation of a model, with dyads chosen at its start pose (q, p).
 
-    efforts: the function (x, u, p, t) -> Q - C qd, applied wrenches included. Raises ValueError for
-    a loop without a dyad.
+    efforts: the function (x, u, p, t) -> (Q - C qd, s'), applied wrenches included, with
+    x = (q, qd, s). Raises ValueError for a loop without a dyad.
     """
 
     def __init__(
@@ -43,12 +43,12 @@ class Embedding:
         self.independent = [i for i in range(n) if i not in set_by_loops]
         k = len(self.independent)
         z, zd, near = ca.SX.sym("z", k), ca.SX.sym("zd", k), ca.SX.sym("near", n)
-        state = ca.vertcat(z, zd)
+        further = ca.SX.sym("further", efforts.numel_out(1))
+        state = ca.vertcat(z, zd, further)
         q = self._pose(model, parameters, dyads, z, near)
         qd = ca.jtimes(q, z, zd)
-        self.complete = ca.Function(
-            "complete", [state, near, p], [ca.vertcat(q, qd)], {"cse": True}
-        )
+        x = ca.vertcat(q, qd, further)
+        self.complete = ca.Function("complete", [state, near, p], [x], {"cse": True})
         G, bias = ca.jacobian(q, z), ca.jtimes(qd, z, zd)
         columns = ca.SX.sym("columns", n, k + 1)
         inertia = ca.Function(
@@ -56,9 +56,10 @@ class Embedding:
         )
         D_columns = inertia(q, p, ca.horzcat(G, bias))
         u, t = ca.SX.sym("u", efforts.numel_in(1)), ca.SX.sym("t")
-        left = G.T @ (efforts(ca.vertcat(q, qd), u, p, t) - D_columns[:, k])
+        Q, further_rates = efforts(x, u, p, t)
+        left = G.T @ (Q - D_columns[:, k])
         factor = ca.ldl(ca.sparsify(symmetric(G.T @ D_columns[:, :k])), False)
-        rates = ca.vertcat(zd, ca.ldl_solve(left, *factor))
+        rates = ca.vertcat(zd, ca.ldl_solve(left, *factor), further_rates)
         self.ode = ca.Function("ode", [state, ca.vertcat(u, near), p, t], [rates], {"cse": True})
 
     def _pose(

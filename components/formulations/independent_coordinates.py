@@ -1,9 +1,9 @@
 """Motion in independent coordinates z, a part of q: alternatives to multipliers in section B.2.
 
 A formulation computes, from z, zd and a pose `near` on the same branch, the q and qd that close
-every loop, and zdd. Only (z, zd) is integrated, so that closures need no stabilisation. The
-independent coordinates are chosen at the start pose: where the dependent ones become singular the
-formulation fails, even if the linkage itself is not singular there.
+every loop, and zdd. Only (z, zd) and further states s are integrated, so that closures need no
+stabilisation. The independent coordinates are chosen at the start pose: where the dependent ones
+become singular the formulation fails, even if the linkage itself is not singular there.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from typing import Protocol
 import casadi as ca
 import numpy as np
 
-from hapticlink.components import integrators
 from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.assembly import assemble
+from hapticlink.components.integrators.base import Integrator
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Mechanism
 
 
 class Formulation(Protocol):
-    """independent: indices in q of z (k entries). ode: function ((z, zd), (u, near), p, t) ->
-    (zd, zdd). complete: function ((z, zd), near, p) -> (q, qd)."""
+    """independent: indices in q of z (k entries). ode: function ((z, zd, s), (u, near), p, t) ->
+    (zd, zdd, s'). complete: function ((z, zd, s), near, p) -> (q, qd, s)."""
 
     independent: list[int]
     ode: ca.Function
@@ -54,7 +54,7 @@ def start_pose(model: LinkageModel, parameters: Signals) -> tuple[np.ndarray, np
 
 
 def step(
-    method: str,
+    integrator: Integrator,
     formulation: Formulation,
     x: ca.SX,
     u: ca.SX,
@@ -62,10 +62,10 @@ def step(
     t: ca.SX,
     h: ca.SX,
 ) -> ca.SX:
-    """(q, qd) after h from x = (q, qd)."""
-    n, k = x.numel() // 2, len(formulation.independent)
-    near = x[:n]
-    z = x[[*formulation.independent, *(n + i for i in formulation.independent)]]
+    """(q, qd, s) after h from x = (q, qd, s)."""
+    n, k = formulation.complete.numel_in(1), len(formulation.independent)
+    near, free = x[:n], formulation.independent
+    z = x[[*free, *(n + i for i in free), *range(2 * n, x.numel())]]
     inputs = ca.vertcat(u, near)
-    z = integrators.step(method, formulation.ode, z, inputs, p, t, h, range(k))
+    z = integrator.step(formulation.ode, z, inputs, p, t, h, range(k))
     return formulation.complete(z, near, p)

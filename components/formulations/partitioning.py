@@ -23,7 +23,7 @@ REPEATS = 4
 
 class Partitioning:
     """The formulation of a model, partitioned at its start pose (q, p); ode is the function
-    (x, u, p, t) -> (qd, qdd) by multipliers."""
+    (x, u, p, t) -> (qd, qdd, s') by multipliers, with x = (q, qd, s)."""
 
     def __init__(
         self,
@@ -37,19 +37,19 @@ class Partitioning:
         self.independent = free = [i for i in range(n) if i not in dependent]
         p, k = parameters.vector, len(free)
         closures = ca.Function("closures", [model.q, p], [model.h[rows], model.W[rows, :]])
-        state, near = ca.SX.sym("z", 2 * k), ca.SX.sym("near", n)
+        further = ode.numel_out(0) - 2 * n
+        state, near = ca.SX.sym("z", 2 * k + further), ca.SX.sym("near", n)
         q = ca.SX(near)
         q[free] = state[:k]
         for _ in range(REPEATS):
             h, W = closures(q, p)
             q[dependent] = q[dependent] - ca.solve(W[:, dependent], h)
         W, qd = closures(q, p)[1], ca.SX(n, 1)
-        qd[free] = state[k:]
-        qd[dependent] = -ca.solve(W[:, dependent], W[:, free] @ state[k:])
-        self.complete = ca.Function(
-            "complete", [state, near, p], [ca.vertcat(q, qd)], {"cse": True}
-        )
+        qd[free] = state[k : 2 * k]
+        qd[dependent] = -ca.solve(W[:, dependent], W[:, free] @ qd[free])
+        x = ca.vertcat(q, qd, state[2 * k :])
+        self.complete = ca.Function("complete", [state, near, p], [x], {"cse": True})
         u, t = ca.SX.sym("u", ode.numel_in(1)), ca.SX.sym("t")
         after = ode(self.complete(state, near, p), u, p, t)
-        rates = after[[*free, *(n + i for i in free)]]
+        rates = after[[*free, *(n + i for i in free), *range(2 * n, 2 * n + further)]]
         self.ode = ca.Function("ode", [state, ca.vertcat(u, near), p, t], [rates], {"cse": True})

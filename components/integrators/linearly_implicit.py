@@ -5,9 +5,10 @@ x_{k+1} = x_k + h (3 k_1 + k_2)/2,   gamma = 1 - 1/sqrt 2,   J = df/dx at (t, x)
 
 Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20 (1999), 1456: order 2 with any J, so that
 kinks of a force do not reduce the order. There is no iteration: two evaluations of f, one J by
-algorithmic differentiation and one factorisation, of n x n since q' = v:
+algorithmic differentiation and one factorisation, without the positions q since q' = v. With
+y = (v, further states) and v = P y:
 
-(1 - gamma h J_vv - (gamma h)^2 J_vq) k_v = r_v + gamma h J_vq r_q,   k_q = r_q + gamma h k_v
+(1 - gamma h J_yy - (gamma h)^2 J_yq P) k_y = r_y + gamma h J_yq r_q,   k_q = r_q + gamma h P k_y
 """
 
 from __future__ import annotations
@@ -37,33 +38,35 @@ class LinearlyImplicit(Integrator):
         h: ca.SX,
         positions: Sequence[int],
     ) -> ca.SX:
-        """x(t + h). Raises ValueError unless x has as many velocities as positions."""
+        """x(t + h). The first entries of x that are no positions are velocities; raises ValueError
+        unless there are as many as positions."""
         import casadi as ca  # here, as a scene is checked against the registry without equations
 
         q = list(positions)
-        v = [i for i in range(x.numel()) if i not in set(q)]
-        if len(q) != len(v):
+        y = [i for i in range(x.numel()) if i not in set(q)]
+        if len(q) > len(y):
             raise ValueError(
-                f"linearly-implicit: {len(q)} positions but {len(v)} velocities; it takes q' = v"
+                f"linearly-implicit: {len(q)} positions but {len(y)} velocities; it takes q' = v"
             )
         symbols = [ca.SX.sym("symbol", given.numel()) for given in (x, u, p, t)]
-        rate = ode(*symbols)[v]
+        rate = ode(*symbols)[y]
         slopes = ca.Function(
             "slopes",
             symbols,
-            [ca.jacobian(rate, symbols[0][q]), ca.jacobian(rate, symbols[0][v])],
+            [ca.jacobian(rate, symbols[0][q]), ca.jacobian(rate, symbols[0][y])],
             {"cse": True},
         )
-        J_q, J_v = slopes(x, u, p, t)
+        J_q, J_y = slopes(x, u, p, t)
         g = GAMMA * h
-        A = ca.SX.eye(len(v)) - g * J_v - g**2 * J_q
+        A = ca.SX.eye(len(y)) - g * J_y
+        A[:, : len(q)] -= g**2 * J_q
         # QR needs no pivoting and hence no branch.
         factors = ca.qr(ca.densify(A))
 
         def solved(r: ca.SX) -> ca.SX:
-            k_v = _back(factors, r[v] + g * J_q @ r[q])
+            k_y = _back(factors, r[y] + g * J_q @ r[q])
             k = ca.SX(x.numel(), 1)
-            k[v], k[q] = k_v, r[q] + g * k_v
+            k[y], k[q] = k_y, r[q] + g * k_y[: len(q)]
             return k
 
         k1 = solved(ode(x, u, p, t))

@@ -49,9 +49,9 @@ def _rotation(angle: ca.SX) -> ca.SX:
 class LinkageModel:
     """The terms of (2.3) at q and qd, each built when it is first used.
 
-    q, qd: n x 1. p: the parameters by name. D is n x n, W is m x n, J_h is
-    3 x n. tabled: (y, y') of the drives' tables at the instant t (s), by default NaN. Raises
-    ValueError for bodies that no chain of joints connects to the ground.
+    q, qd: n x 1. p: the parameters by name. D is n x n, W is m x n, J_h is 3 x n. tabled: (y, y')
+    of the drives' tables at the instant t (s), deflection: those of the joints with friction, both
+    NaN by default. Raises ValueError for bodies that no chain of joints connects to the ground.
     """
 
     def __init__(
@@ -62,10 +62,13 @@ class LinkageModel:
         qd: ca.SX,
         tabled: ca.SX | None = None,
         t: ca.SX | None = None,
+        deflection: ca.SX | None = None,
     ) -> None:
         self.linkage, self.p, self.q, self.qd = linkage, p, q, qd
         self.tabled = ca.SX(0, 1) if tabled is None else tabled
         self.t = ca.SX(math.nan) if t is None else t
+        rubbing = sum(j.friction is not None for j in linkage.joint)
+        self.deflection = ca.SX.nan(rubbing, 1) if deflection is None else deflection
 
     @cached_property
     def _offsets(self) -> dict[str, int]:

@@ -51,6 +51,8 @@ class Contacts:
     """k_contact of section B.6."""
     damping: LinearDamping = 300.0
     """b_contact of section B.6."""
+    friction: Annotated[float, Quantity("1", ge=0)] | None = None
+    """Coefficient of Coulomb friction, up to which contacts stick; by default there is none."""
     detection: Literal["graphics", "haptics"] = "graphics"
     """graphics: the virtual environment detects contacts, and their geometry is held between frames
     (the report's local model); haptics: the mechanism detects them at every evaluation."""
@@ -74,16 +76,18 @@ class Pair:
 def pairs(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
     """Every pair of a body with a shape and an obstacle.
 
-    A capsule has these places: at the enclosure, either end at up to two walls (a corner); at a
-    disc, one; at a polygon, either end and one along its side.
+    A capsule has these places: at the enclosure, either end at up to two walls (a corner), or with
+    friction, whose deflections belong to walls, at all of them; at a disc, one; at a polygon,
+    either end and one along its side.
     """
+    walls = 2 if contacts.friction is None else len(contacts.enclosure or ())
     found = []
     for body in linkage.body:
         if body.radius is None:
             continue
         ends = len(body.capsule)
         if contacts.enclosure:
-            found.append(Pair(body.name, "enclosure", 0, "enclosure", 2 * ends))
+            found.append(Pair(body.name, "enclosure", 0, "enclosure", walls * ends))
         for i, disc in enumerate(contacts.disc):
             found.append(Pair(body.name, "disc", i, disc.name or f"disc{i + 1}", 1))
         for i, polygon in enumerate(contacts.polygon):

@@ -113,11 +113,29 @@ class Spring:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Ends of a joint's range, as contacts: a spring and damper that pushes back beyond them and
+    never pulls. Without damping and restitution the joint turns back with all its energy."""
+
+    lower: Coordinate | None = None
+    """Lower end of the range; by default there is none."""
+    upper: Coordinate | None = None
+    """Upper end of the range; by default there is none."""
+    stiffness: Annotated[float, Quantity("N.m/rad or N/m", gt=0)]
+    """Stiffness of the ends."""
+    damping: JointDamping | None = None
+    """Damping of the ends; or give `restitution`."""
+    restitution: Annotated[float, Quantity("1", ge=0.01, le=1)] | None = None
+    """Rate after an impact by rate before it: the damping is that for the joint's inertia at its
+    pose, with the loops closed."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Joint:
     """A joint of the tree.
 
     Stiffness, damping, friction and a drive act on the one coordinate of a revolute or prismatic
-    joint: -stiffness (q - rest) - damping q' - friction tanh(q'/friction_speed) + drive.
+    joint: -stiffness (q - rest) - damping q' + friction + drive.
     """
 
     name: str
@@ -142,9 +160,14 @@ class Joint:
     damping: JointDamping | None = None
     """Viscous damping."""
     friction: Annotated[float, Quantity("N.m or N", ge=0)] | None = None
-    """Coulomb friction."""
+    """Coulomb friction, up to which the joint sticks."""
     friction_speed: Annotated[float, Quantity("rad/s or m/s", gt=0)] = 0.01
-    """Speed over which Coulomb friction saturates."""
+    """Sets the damping of a joint that sticks, friction / friction_speed."""
+    friction_deflection: Annotated[float, Quantity("rad or m", gt=0)] | None = None
+    """Deflection at which a joint begins to slide: sets the stiffness of one that sticks,
+    friction / friction_deflection. By default 0.01 s times `friction_speed`."""
+    limits: Limits | None = None
+    """Ends of the range of a revolute or prismatic joint."""
     drive: Drive | None = None
     """A motor."""
 
@@ -172,6 +195,10 @@ class Loop:
     """Angle of the first body from the second in a prismatic joint; by default 0."""
     name: str | None = None
     """Prefix of its FMU parameters; by default loop1, loop2, ..."""
+    limits: Limits | None = None
+    """Ends of the range of a revolute joint's angle, that of the first body from the second (0
+    where their x axes are parallel; full turns count), or of the displacement of the first point
+    from the second along `axis`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,6 +268,12 @@ class Linkage:
         """Whether it has closures: loops or gears."""
         return bool(self.loop or self.gear)
 
+    @property
+    def limited(self) -> bool:
+        """Whether a joint or a cut joint has limits."""
+        limits = [*(j.limits for j in self.joint), *(cut.limits for cut in self.loop)]
+        return any(limit is not None for limit in limits)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Directions:
@@ -276,6 +309,8 @@ class Mechanism:
     """Baumgarte's damping ratio of (3.3); the default depends on the integrator."""
     substeps: Substeps = 1
     """Integration steps per communication step."""
+    events: Annotated[int, Quantity("1", ge=0, le=4)] = 1
+    """Begins and ends of contacts that are located within an integration step."""
 
 
 @dataclass(frozen=True, kw_only=True)

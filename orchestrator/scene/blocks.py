@@ -76,7 +76,9 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
         if scene.directions_from == "mechanism" or scene.mechanism.directions:
             settings["directions"] = scene.directions
         if scene.contacts:
-            settings |= {"contacts": scene.contacts, "length_scale": scene.directions.length_scale}
+            settings["contacts"] = scene.contacts
+        if scene.contacts or scene.linkage.limited:
+            settings["length_scale"] = scene.directions.length_scale
         found.append(BlockPlan("virtual_mechanism", scene.mechanism_at, settings))
     if scene.linkage and scene.graphics and (graphics_block(scene) or not skip):
         names = (f.name for f in fields(GraphicsCopy))

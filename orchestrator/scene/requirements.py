@@ -56,6 +56,7 @@ def _forces(scene: Scene) -> Iterator[Need]:
     assert scene.linkage is not None
     joints = scene.linkage.joint
     given = {
+        "joint limits": scene.linkage.limited,
         "gravity": scene.linkage.gravity is not None,
         "springs and dampers": bool(scene.linkage.spring)
         or any(j.stiffness is not None or j.damping is not None for j in joints),

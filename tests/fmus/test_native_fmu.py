@@ -24,9 +24,11 @@ from hapticlink.components import specs
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
+from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import (
     Body,
     Joint,
+    Limits,
     Linkage,
     Mechanism,
     OperationalPoint,
@@ -61,7 +63,7 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
         for b in blocks.blocks(scene)
     }
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"}, H)
-    made |= {"arm": arm(300), "driven": driven_slider()}
+    made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
     return {n: (build(c, folder / "p"), build_native(c, folder / "n")) for n, c in made.items()}
 
 
@@ -87,6 +89,32 @@ def driven_slider() -> Component:
         operational_point=OperationalPoint(body="block"),
     )
     return virtual_mechanism(linkage, Mechanism(integrator="linearly-implicit"), step_s=H)
+
+
+def rubbing_rod() -> Component:
+    """A rod that falls on a floor, with friction there and in its pivot, and that turns back at a
+    limit: states beside q and qd."""
+    limits = Limits(upper=0.05, stiffness=50.0, restitution=0.6)
+    pivot = Joint(name="pivot", child="rod", friction=0.02, friction_speed=0.05, limits=limits)
+    linkage = Linkage(
+        body=(
+            Body(
+                name="rod",
+                mass=0.2,
+                inertia=1e-3,
+                center=(0.1, 0.0),
+                radius=0.01,
+                capsule=((0.0, 0.0), (0.2, 0.0)),
+            ),
+        ),
+        joint=(pivot,),
+        operational_point=OperationalPoint(body="rod", at=(0.2, 0.0)),
+        start_velocity={"pivot": 3.0},
+        gravity=(0.0, -9.81),
+    )
+    floor = ((-1.0, -0.03), (1.0, -0.03), (1.0, 1.0), (-1.0, 1.0))
+    contacts = Contacts(enclosure=floor, friction=0.3, detection="haptics", stiffness=2000.0)
+    return virtual_mechanism(linkage, Mechanism(), None, contacts, step_s=H)
 
 
 def driven(path: Path) -> np.ndarray:
@@ -119,15 +147,43 @@ def driven(path: Path) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("name", [*NAMES, "discrete_equivalent", "arm", "driven"])
+@pytest.mark.parametrize("name", [*NAMES, "discrete_equivalent", "arm", "driven", "rubbing"])
 def test_every_block_gives_the_bits_of_its_python_fmu(both, name):
     by_python, by_c = map(driven, both[name])
     assert np.isfinite(by_c).all()
     np.testing.assert_array_equal(by_c, by_python)
 
 
-@pytest.mark.parametrize("name", ["arm", "driven"])
-def test_plain_python_looks_tables_up_to_the_same_bits(both, name, monkeypatch):
+def test_deflections_are_part_of_a_saved_state(both):
+    """After 30 steps, in which the rod turned at its limit and fell: 20 more, twice."""
+    for path in both["rubbing"]:
+        with session(path) as at:
+            slave = at.instance()
+            slave.setupExperiment(startTime=0.0)
+            slave.enterInitializationMode()
+            slave.exitInitializationMode()
+            for k in range(30):
+                slave.doStep(k * H, H)
+            state, twice = slave.getFMUState(), []
+            for _ in range(2):
+                slave.setFMUState(state)
+                rows = []
+                for k in range(30, 50):
+                    slave.doStep(k * H, H)
+                    rows.append(slave.getReal(at.reals))
+                twice.append(rows)
+            slave.freeFMUState(state)
+            np.testing.assert_array_equal(*twice)
+
+
+@pytest.mark.parametrize("name", ["driven", "rubbing"])
+def test_contract_of_forces_with_tables_and_states(both, name):
+    for path in both[name]:
+        assert check_fmu(path) == []
+
+
+@pytest.mark.parametrize("name", ["arm", "driven", "rubbing"])
+def test_plain_python_gives_the_same_bits(both, name, monkeypatch):
     by_c = driven(both[name][1])
     monkeypatch.setenv("HAPTICLINK_PURE_PYTHON", "1")
     np.testing.assert_array_equal(by_c, driven(both[name][0]))

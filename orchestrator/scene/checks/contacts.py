@@ -17,8 +17,10 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 def check(scene: Scene) -> Iterator[Problem]:
     if scene.linkage:
         yield from _shapes(scene.linkage)
-    if scene.controller and scene.controller.contact and not scene.contacts:
-        yield ("controller", "contact"), "there is nothing to touch: add [contacts]"
+    limited = scene.linkage is not None and scene.linkage.limited
+    if scene.controller and scene.controller.contact and not scene.contacts and not limited:
+        message = "there is nothing to touch: add [contacts] or limits of a joint"
+        yield ("controller", "contact"), message
     if scene.contacts is None:
         return
     contacts, here = scene.contacts, ("contacts",)
@@ -29,6 +31,8 @@ def check(scene: Scene) -> Iterator[Problem]:
     if contacts.detection == "graphics" and not scene.graphics:
         message = "there is no graphics rate: add [graphics], or take detection = 'haptics'"
         yield (*here, "detection"), message
+    if contacts.friction is not None and not contacts.stiffness:
+        yield (*here, "friction"), "a contact without stiffness cannot stick: give one"
     yield from _obstacles(contacts)
 
 

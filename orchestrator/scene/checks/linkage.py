@@ -29,6 +29,7 @@ def check(linkage: Linkage) -> Iterator[Problem]:
                 yield (*here, kind, i, "bodies"), "a loop joins two different bodies"
     yield from _cuts(linkage)
     yield from _gears(linkage)
+    yield from _limits(linkage)
     if linkage.operational_point.body not in bodies:
         message = unknown("body", linkage.operational_point.body, bodies)
         yield (*here, "operational_point", "body"), message
@@ -111,6 +112,25 @@ def _tree(linkage: Linkage, frames: Mapping[str, int]) -> Iterator[Problem]:
         elif not way and name not in held:
             yield ("linkage", "body", i), "no joint holds this body: give it one as child"
         held |= way.keys()  # told once
+
+
+def _limits(linkage: Linkage) -> Iterator[Problem]:
+    """Problems of the limits of joints and cut joints."""
+    for kind in ("joint", "loop"):
+        for i, part in enumerate(getattr(linkage, kind)):
+            path: Path = ("linkage", kind, i, "limits")
+            if (limits := part.limits) is None:
+                continue
+            lower, upper = limits.lower, limits.upper
+            if kind == "joint" and part.type == "free":
+                yield path, "a free joint has three coordinates: limit revolute or prismatic joints"
+            if lower is None and upper is None:
+                yield path, "there is no limit: give `lower`, `upper` or both"
+            elif lower is not None and upper is not None and lower >= upper:
+                yield (*path, "upper"), f"{upper!r} is not above `lower` = {lower!r}"
+            if limits.damping is not None and limits.restitution is not None:
+                message = "the damping follows from it: give `damping` or `restitution`, not both"
+                yield (*path, "restitution"), message
 
 
 def points(scene: Scene) -> Iterator[Problem]:

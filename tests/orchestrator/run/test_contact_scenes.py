@@ -27,9 +27,32 @@ TOUCHED = "duration=0.6"
         ("enclosure", "linkage.body.link1.capsule=[[0.0, 0.0], [0.0, 0.0]]", "two different"),
         ("enclosure", "contacts.stiffness=-1.0", r"give a number >= 0 \(N/m\)"),
         ("enclosure", "contacts.detection=hapics", "'graphics' or 'haptics'"),
+        ("enclosure", "contacts={friction=0.3, stiffness=0.0}", "cannot stick"),
+        ("enclosure", "contacts.friction=-0.3", "give a number >= 0"),
         ("obstacles", "contacts.disc.pin.name=block", "'block' is taken"),
         ("obstacles", "contacts.disc.pin.radius=0.0", r"give a number > 0 \(m\)"),
         ("closed-loop", "controller.contact=true", r"there is nothing to touch: add \[contacts\]"),
+        ("pendulum", "linkage.joint.pivot.limits={stiffness=9.0}", "give `lower`, `upper` or both"),
+        (
+            "pendulum",
+            "linkage.joint.pivot.limits={stiffness=9.0, lower=1.0, upper=-1.0}",
+            r"-1.0 is not above `lower` = 1.0",
+        ),
+        (
+            "pendulum",
+            "linkage.joint.pivot.limits={stiffness=9.0, lower=1.0, restitution=0.5, damping=0.1}",
+            "`damping` or `restitution`, not both",
+        ),
+        (
+            "pendulum",
+            "linkage.joint.pivot.limits={stiffness=9.0, lower=1.0, restitution=0.0}",
+            "give a number >= 0.01",
+        ),
+        (
+            "single-body",
+            "linkage.joint.float.limits={stiffness=9.0, lower=1.0}",
+            "a free joint has three coordinates",
+        ),
         ("two-hands", "hands.right={wrench=[0.0, 0.0, 0.0]}", "no point 'right'; there are left"),
         ("two-hands", "linkage.point.left.body=link9", "no body 'link9'"),
         ("local-model", "mechanism.stabilization=projection", "take 'baumgarte'"),
@@ -67,6 +90,19 @@ def test_detection_at_the_graphics_rate_is_near_that_at_the_haptic_rate(
     near = simulate("enclosure", tmp_path, options).results.haptics
     x, there = (run["virtual_mechanism.x"][:, :2] for run in (walls, near))
     assert np.abs(x - there).max() < 1e-4
+
+
+def test_a_pendulum_keeps_e_squared_of_its_energy_at_each_limit(tmp_path: Path) -> None:
+    """Released at 1 rad from the vertical, at which it is stopped: V = m g l (1 - cos 1)."""
+    limits = "{upper=-1.5707963267948966, stiffness=2000.0, restitution=0.7}"
+    options = ["duration=2.0", "linkage.start={pivot=-2.5707963267948966}"]
+    options.append(f"linkage.joint=[{{name='pivot', child='rod', limits={limits}}}]")
+    rows = simulate("pendulum", tmp_path, options).results.haptics
+    bottom = -9.81 * 0.5
+    energy = rows["virtual_mechanism.energy"] - bottom
+    kept = 9.81 * 0.5 * (1 - np.cos(1.0)) * 0.7 ** np.array([0, 2, 4])
+    np.testing.assert_allclose(energy[[0, 512, 1020]], kept, rtol=3e-3)
+    assert rows["virtual_mechanism.F_env"][:, 0].min() < -10  # the hand is pushed back
 
 
 def test_a_second_hand_holds_its_point(tmp_path: Path) -> None:

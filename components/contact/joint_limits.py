@@ -1,0 +1,153 @@
+"""Joint limits: one-sided spring-dampers (unilateral.py) at the ends of a coordinate's range.
+
+    g = c - c_lower,  g' = c'    and    g = c_upper - c,  g' = -c'
+    Q = (dc/dq)' (F_lower - F_upper)
+
+c is the coordinate of a joint, or that of a cut joint which closes a loop: the angle of the first
+body from the second, or the displacement of the first point from the second along the axis. A
+restitution e, the rate after an impact by that before it, gives the damping
+
+    b = 2 z sqrt(k m),   1/m = (dc/dq) D^-1 (1 - W' (W D^-1 W')^-1 W D^-1) (dc/dq)'
+    e = exp(-2 z acos(z)/sqrt(1 - z^2))
+
+since a mass m on a spring-damper that lets go when its force is 0 has that restitution (Schwager
+and Poeschel, Granular Matter 9, 2007, 465). m is the inertia of the coordinate, with the loops
+closed, at the pose at hand. Other forces and the change of m during an impact add to it: by little
+where the limit is stiff.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+from scipy.optimize import brentq
+
+from hapticlink.components.component import Variable
+from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
+from hapticlink.components.dynamics.constrained_directions import LOCKED
+from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import UNITS, loop_name
+from hapticlink.components.specs.linkage import Limits, Linkage
+
+
+@dataclass(frozen=True)
+class Limited:
+    """A joint, or a cut joint by its index, with limits; unit of its coordinate."""
+
+    name: str
+    limits: Limits
+    unit: str
+    loop: int | None = None
+
+
+def limited(linkage: Linkage) -> list[Limited]:
+    """The joints with limits. Raises ValueError for limits on a free joint, which has three
+    coordinates."""
+    found = []
+    for j in linkage.joint:
+        if j.limits is not None:
+            if len(UNITS[j.type]) != 1:
+                raise ValueError(f"joint `{j.name}`: limits act on one coordinate, and it has 3")
+            found.append(Limited(j.name, j.limits, UNITS[j.type][0]))
+    for i, loop in enumerate(linkage.loop):
+        if loop.limits is not None:
+            unit = "rad" if loop.type == "revolute" else "m"
+            found.append(Limited(loop_name(linkage, i), loop.limits, unit, i))
+    return found
+
+
+def damping_ratio(restitution: float) -> float:
+    """z with e(z) = restitution, from 0.01 to 1."""
+
+    def excess(z: float) -> float:
+        if z == 1:
+            return -2 - math.log(restitution)
+        ratio = math.acos(z) if z < 1 else math.acosh(z)
+        return -2 * z * ratio / math.sqrt(abs(1 - z**2)) - math.log(restitution)
+
+    return 0.0 if restitution == 1 else float(brentq(excess, 0, 10, xtol=1e-15, rtol=1e-15))
+
+
+def parameters(linkage: Linkage) -> list[Variable]:
+    found = []
+    for joint in limited(linkage):
+        limits, effort = joint.limits, "N.m" if joint.unit == "rad" else "N"
+        stiffness, damping = f"{effort}/{joint.unit}", f"{effort}.s/{joint.unit}"
+        given = {
+            "lower": (joint.unit, limits.lower, "lower end of the range"),
+            "upper": (joint.unit, limits.upper, "upper end of the range"),
+            "limit_stiffness": (stiffness, limits.stiffness, "stiffness of the ends"),
+            "limit_damping": (damping, limits.damping, "damping of the ends"),
+        }
+        if limits.restitution is not None:
+            ratio, text = damping_ratio(limits.restitution), f"for e = {limits.restitution!r}"
+            given["limit_damping_ratio"] = ("1", ratio, f"damping ratio {text} at the ends")
+        for name, (unit, value, text) in given.items():
+            if value is not None:
+                text = f"{text} of {joint.name}"
+                found.append(Variable(f"{joint.name}.{name}", (), unit, value, text))
+    return found
+
+
+class JointLimits(OneSidedForces):
+    """The forces of all joint limits of a linkage."""
+
+    def __init__(self, space: OperationalSpace) -> None:
+        model = space.model
+        self._n, p = model.q.numel(), model.p
+        joints = limited(model.linkage)
+        coordinates = [_coordinate(model, joint) for joint in joints]
+        inertias = _inertias(space, joints, coordinates)
+        self.sides, self._ways = [], []
+        for joint, c in zip(joints, coordinates, strict=True):
+            k, rate = p[f"{joint.name}.limit_stiffness"], model.rate(c)
+            b = ca.SX(0)
+            if joint.limits.restitution is not None:
+                ratio = p[f"{joint.name}.limit_damping_ratio"]
+                b = 2 * ratio * ca.sqrt(k * next(inertias))
+            elif joint.limits.damping is not None:
+                b = p[f"{joint.name}.limit_damping"]
+            for end, sign in (("lower", 1), ("upper", -1)):
+                if (limit := p.get(f"{joint.name}.{end}")) is not None:
+                    self.sides.append(Unilateral(sign * (c - limit), sign * rate, k, b))
+                    self._ways.append(sign * ca.jacobian(c, model.q).T)
+
+    def efforts(self, laws: ca.SX | None = None) -> ca.SX:
+        Q = ca.SX(self._n, 1)
+        for i, (side, way) in enumerate(zip(self.sides, self._ways, strict=True)):
+            Q += way * side.force(None if laws is None else laws[i])
+        return Q
+
+
+def _coordinate(model: LinkageModel, joint: Limited) -> ca.SX:
+    if joint.loop is None:
+        return model.q[model.coordinate(joint.name)]
+    loop = model.linkage.loop[joint.loop]
+    first, second = (model.frames[body] for body in loop.bodies)
+    if loop.type == "revolute":
+        return first.angle - second.angle
+    axis, ends = model.p[f"{joint.name}.axis"], [model.p[f"{joint.name}.at{k}"] for k in (1, 2)]
+    along = second.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis))
+    return ca.dot(along, first.point(ends[0]) - second.point(ends[1]))
+
+
+def _inertias(
+    space: OperationalSpace, joints: list[Limited], coordinates: list[ca.SX]
+) -> Iterator[ca.SX]:
+    """The inertia m of each coordinate whose limits have a restitution, with the loops closed; that
+    of one which the loops lock is bounded by its inertia with open loops."""
+    given = [
+        c for j, c in zip(joints, coordinates, strict=True) if j.limits.restitution is not None
+    ]
+    if not given:
+        return
+    J, D = ca.jacobian(ca.vertcat(*given), space.model.q), space.terms.inertia
+    passed = D.inward(J.T)
+    with_open_loops = passed.T @ ca.diag(1 / (D.d + D.k)) @ passed
+    mobility = space.mobility(J)
+    for i in range(len(given)):
+        yield 1 / ca.fmax(mobility[i, i], LOCKED * with_open_loops[i, i])

@@ -1,0 +1,157 @@
+"""Friction of contacts against closed forms: sticking, sliding, rolling; what the hand feels."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hapticlink.components.blocks.virtual_environment import virtual_environment
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.linkage import (
+    Body,
+    Directions,
+    GraphicsCopy,
+    Joint,
+    Linkage,
+    Mechanism,
+    OperationalPoint,
+)
+from tests.blocks import Running
+from tests.components.contact import piecewise
+
+MASS, INERTIA, G, R, LENGTH, K = 2.0, 0.03, 9.81, 0.05, 0.4, 15000.0
+FLOOR = ((-50.0, 0.0), (50.0, 0.0), (50.0, 5.0), (-50.0, 5.0))
+
+
+def body(capsule, slope, inertia=INERTIA, speed=0.0):
+    """A capsule in touch with a floor on which gravity acts at an angle."""
+    center = tuple(np.mean(capsule, axis=0))
+    return Linkage(
+        body=(
+            Body(name="bar", mass=MASS, inertia=inertia, center=center, radius=R, capsule=capsule),
+        ),
+        joint=(Joint(name="float", type="free", child="bar"),),
+        operational_point=OperationalPoint(body="bar", at=center),
+        gravity=(G * math.sin(slope), -G * math.cos(slope)),
+        start={"float": (0.0, R, 0.0)},
+        start_velocity={"float": (speed, 0.0, 0.0)},
+    )
+
+
+BAR, DISC = ((0.0, 0.0), (LENGTH, 0.0)), ((0.0, 0.0),)
+
+
+def running(linkage, friction, events=1, **contacts):
+    contacts = {"detection": "haptics"} | contacts
+    contacts = Contacts(enclosure=FLOOR, friction=friction, **contacts)
+    return Running(
+        virtual_mechanism(linkage, Mechanism(events=events), None, contacts, step_s=2e-3)
+    )
+
+
+def steps(block, t_end, rate=500):
+    for _ in range(round(t_end * rate)):
+        block.step(1 / rate)
+    return block
+
+
+def test_a_bar_below_the_friction_angle_stays_for_a_minute():
+    """tan(slope) = .42 against .5; once it has settled on its springs it does not creep."""
+    bar = steps(running(body(BAR, 0.4), 0.5), 5.0)
+    before = bar.state["q"]
+    assert bar.y["x"][1] == pytest.approx(R - MASS * G * math.cos(0.4) / (2 * K), abs=1e-9)
+    for _ in range(60):
+        assert np.abs(steps(bar, 1.0).state["q"] - before).max() < 1e-9
+
+
+def test_the_hand_feels_friction():
+    """Contacts at rest bear the whole weight, along the floor too."""
+    bar = steps(running(body(BAR, 0.4), 0.5), 5.0)
+    weight = MASS * G * np.array([math.sin(0.4), -math.cos(0.4), 0.0])
+    np.testing.assert_allclose(bar.y["F_env"], -weight, atol=1e-6)
+
+
+def test_a_bar_above_the_friction_angle_slides():
+    """a = g (sin - mu cos)."""
+    bar = steps(running(body(BAR, 0.6), 0.4), 2.0)
+    before = bar.state["qd"][0]
+    a = G * (math.sin(0.6) - 0.4 * math.cos(0.6))
+    assert steps(bar, 1.0).state["qd"][0] - before == pytest.approx(a, rel=1e-6)
+
+
+@pytest.mark.parametrize(("friction", "slips"), [(0.5, False), (0.1, True)])
+def test_a_disc_rolls_or_slips_down_a_slope(friction, slips):
+    """a = g sin/(1 + I/(m r^2)) where friction can hold the rim, g (sin - mu cos) where not."""
+    inertia = 0.5 * MASS * R**2
+    disc = steps(running(body(DISC, 0.5, inertia), friction), 2.0)
+    before = disc.state["qd"]
+    change = steps(disc, 1.0).state["qd"] - before
+    a = G * math.sin(0.5) / 1.5
+    turned = -a / R
+    if slips:
+        a = G * (math.sin(0.5) - friction * math.cos(0.5))
+        turned = -friction * MASS * G * math.cos(0.5) * R / inertia
+    assert change[0] == pytest.approx(a, rel=1e-5)
+    assert change[2] == pytest.approx(turned, rel=1e-5)
+
+
+def test_a_thrown_bar_stops_where_its_energy_is_spent():
+    """x = v^2/(2 mu g)."""
+    bar = steps(running(body(BAR, 0.0, speed=1.0), 0.3), 2.0)
+    assert bar.state["q"][0] == pytest.approx(1 / (2 * 0.3 * G), abs=1e-3)
+    assert np.abs(bar.state["qd"]).max() < 1e-6
+
+
+def test_geometry_of_the_graphics_block_gives_the_same_friction():
+    linkage = body(BAR, 0.4)
+    here, held = running(linkage, 0.5), running(linkage, 0.5, detection="graphics")
+    contacts = Contacts(enclosure=FLOOR, friction=0.5, margin=10.0)
+    copy = Running(virtual_environment(linkage, GraphicsCopy(), Directions(), contacts))
+    pose = {"q": (0.1, R - 1e-3, 1e-4), "qd": (0.2, 0.1, -0.3)}
+    deflection = np.linspace(-1e-4, 1e-4, here.state["contact_deflection"].size)
+    for block in (here, held):
+        block.put(**pose, contact_deflection=deflection)
+    copy.put(**pose)
+    held.set(contacts=copy.y["contacts"])
+    assert abs(here.y["F_env"][0]) > 1.0
+    np.testing.assert_allclose(held.y["F_env"], here.y["F_env"], rtol=1e-12)
+    steps(here, 0.01)
+    steps(held, 0.01)
+    np.testing.assert_allclose(held.x, here.x, atol=1e-12)
+
+
+def test_an_impact_with_friction_has_the_order_of_the_method():
+    """A bar that bounces on its ends while it slides, against SciPy from event to event. Its ends
+    let go .2 ms one after the other."""
+    mu, b, t_end, rates = 0.2, 60.0, 0.06, (500, 1000, 2000, 4000)
+
+    def arm(theta, side):
+        return side * LENGTH / 2 * np.array([math.cos(theta), math.sin(theta)])
+
+    def rhs(y, push):
+        alpha = 0.0
+        for side, N in zip((-1, 1), push, strict=True):
+            x, height = arm(y[2], side)
+            alpha += (x * N + mu * N * (height - R)) / INERTIA
+        total = push.sum() / MASS
+        return np.array([*y[3:], -mu * total, total - G, alpha])
+
+    def end(side):
+        def gap(y):
+            x, height = arm(y[2], side)
+            return y[1] + height - R, y[4] + x * y[5], K, b
+
+        return gap
+
+    start = np.array([0.2, R + 0.0123, 0.0, 3.0, -1.0, 0.0])
+    exact, events = piecewise.solve(rhs, [end(-1), end(1)], start, t_end)
+    assert events == 4
+    errors = []
+    for rate in rates:
+        bar = running(body(BAR, 0.0), mu, events=2, damping=b)
+        bar.put(q=(0.0, R + 0.0123, 0.0), qd=start[3:])
+        y = steps(bar, t_end, rate).y
+        errors.append(np.abs(np.r_[y["x"], y["v"]] - exact).max())
+    assert -np.polyfit(np.log(rates), np.log(errors), 1)[0] > 3.5
+    assert errors[1] < 1e-4

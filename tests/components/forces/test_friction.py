@@ -1,0 +1,201 @@
+"""Coulomb friction of joints: it sticks, slides by its own rate, and dissipates."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.linkage import (
+    Body,
+    Joint,
+    Linkage,
+    Mechanism,
+    OperationalPoint,
+)
+from hapticlink.orchestrator import open_scene
+from tests.blocks import Running
+from tests.mechanisms import five_bar
+
+MASS, G, SLOPE = 2.0, 9.81, 0.4
+WEIGHT = MASS * G * math.sin(SLOPE)  # along the slope
+
+
+def block(speed=0.0, start=0.0, gravity=(0.0, -G), **joint):
+    """A block on a slope."""
+    return Linkage(
+        body=(Body(name="block", mass=MASS, inertia=0.1),),
+        joint=(Joint(name="slope", type="prismatic", child="block", axis=-SLOPE, **joint),),
+        operational_point=OperationalPoint(body="block"),
+        gravity=gravity,
+        start={"slope": start},
+        start_velocity={"slope": speed},
+    )
+
+
+def running(linkage, **mechanism):
+    return Running(virtual_mechanism(linkage, Mechanism(**mechanism), step_s=2e-3))
+
+
+def steps(block, t_end, rate=500):
+    for _ in range(round(t_end * rate)):
+        block.step(1 / rate)
+    return block
+
+
+@pytest.mark.parametrize("integrator", ["semi-implicit-euler", "rk4", "linearly-implicit"])
+def test_a_block_below_the_friction_angle_stays_for_a_minute(integrator):
+    resting = running(block(friction=1.05 * WEIGHT), integrator=integrator)
+    far = 0.0
+    for _ in range(60):
+        steps(resting, 1.0)
+        far = max(far, abs(resting.state["q"][0]))
+    assert far < 1e-9
+    assert abs(resting.y["qdd"][0]) < 1e-9
+
+
+def test_a_push_below_the_friction_leaves_no_trace():
+    """Pushed back and forth for a minute, by up to what friction holds beyond the weight."""
+    pushed = running(block(friction=1.5 * WEIGHT))
+    rng, along = np.random.default_rng(0), np.array([math.cos(SLOPE), -math.sin(SLOPE), 0.0])
+    for _ in range(600):
+        pushed.set(F_hand=rng.uniform(-0.3, 0.2) * WEIGHT * along)
+        steps(pushed, 0.1)
+    pushed.set(F_hand=np.zeros(3))
+    steps(pushed, 2.0)
+    assert abs(pushed.state["q"][0]) < 1e-9
+
+
+def test_a_block_above_the_friction_angle_slides_by_what_is_left():
+    sliding = steps(running(block(friction=0.6 * WEIGHT)), 1.0)
+    a = 0.4 * WEIGHT / MASS
+    assert sliding.state["qd"][0] == pytest.approx(a, abs=2e-3)  # from the deflection to sliding
+    before = sliding.state["qd"][0]
+    assert steps(sliding, 1.0).state["qd"][0] - before == pytest.approx(a, rel=1e-12)
+
+
+@pytest.mark.parametrize("speed", [0.5, 50.0])
+def test_a_block_that_is_thrown_stops_where_its_energy_is_spent(speed):
+    """f x = m v^2/2, at any speed."""
+    f = 4.0
+    thrown = running(block(speed=speed, friction=f, gravity=None))
+    steps(thrown, MASS * speed / f + 1.0)
+    exact = MASS * speed**2 / (2 * f)
+    assert thrown.state["q"][0] == pytest.approx(exact, abs=2e-4)  # deflection 1e-4
+    assert abs(thrown.state["qd"][0]) < 1e-9
+
+
+def test_a_spring_with_friction_rests_where_coulomb_says():
+    """x_n = (-1)^n (x_0 - 2 n f/k) at the n-th turn; it stays where k |x_n| < f."""
+    k, f, start = 200.0, 3.0, 0.1
+    sprung = running(
+        block(
+            start=start,
+            stiffness=k,
+            gravity=None,
+            friction=f,
+            friction_deflection=1e-5,
+            friction_speed=5e-3,
+        )
+    )
+    turns = math.ceil((k * start / f - 1) / 2)
+    rest = (-1) ** turns * (start - 2 * turns * f / k)
+    assert steps(sprung, 5.0, 2000).state["q"][0] == pytest.approx(rest, abs=3e-5)
+    assert steps(sprung, 60.0).state["q"][0] == pytest.approx(rest, abs=3e-5)
+
+
+def test_stick_slip_against_scipy():
+    """A servo pulls a block over sticking and sliding; order 2 at least, where it changes over."""
+    f, d, v_f, k, b = 5.0, 2e-4, 0.02, 300.0, 2.0
+
+    def rhs(t, y):
+        e = min(max(y[2] + d / v_f * y[1], -d), d)
+        pull = k * (0.02 * math.sin(3 * t) - y[0]) - b * y[1]
+        return [y[1], (pull - f * e / d) / MASS, (e - y[2]) * v_f / d]
+
+    exact = solve_ivp(rhs, (0, 4), np.zeros(3), "DOP853", rtol=1e-12, atol=1e-15, max_step=1e-3)
+    errors = []
+    for rate in (500, 1000, 2000, 4000):
+        pulled = running(
+            block(
+                gravity=None,
+                stiffness=k,
+                damping=b,
+                friction=f,
+                friction_deflection=d,
+                friction_speed=v_f,
+            )
+        )
+        along = np.array([math.cos(SLOPE), -math.sin(SLOPE), 0.0])
+        for i in range(4 * rate):
+            # the mean of the pull over a step, to O(h^4) of the motion's error O(h^2)
+            a, c = 3 * i / rate, 3 * (i + 1) / rate
+            mean = (math.cos(a) - math.cos(c)) / (c - a)
+            pulled.set(F_hand=k * 0.02 * mean * along)
+            pulled.step(1 / rate)
+        errors.append(abs(pulled.state["q"][0] - exact.y[0, -1]))
+    order = -np.polyfit(np.log([500, 1000, 2000, 4000]), np.log(errors), 1)[0]
+    assert order > 1.7
+    assert errors[1] < 1e-6
+
+
+def test_friction_at_a_rate_too_low_for_it_stays_bounded():
+    """Steps of .1 s on a lag of .01 s: as large as the friction, no larger."""
+    thrown = running(block(speed=1.0, friction=0.5, gravity=None))
+    for _ in range(200):
+        thrown.step(0.1)
+        assert abs(thrown.y["qdd"][0]) <= 0.25 + 1e-12
+    assert abs(thrown.state["q"][0]) < 4.0
+
+
+@given(st.floats(0, 50), st.floats(1e-5, 1e-2), st.integers(0, 2**32 - 1))
+@settings(max_examples=20)
+def test_friction_dissipates(friction, deflection, seed):
+    """E never grows by more than the hand puts in."""
+    rubbed = running(
+        block(friction=friction, friction_deflection=deflection, friction_speed=100 * deflection)
+    )
+    rng, along = np.random.default_rng(seed), np.array([math.cos(SLOPE), -math.sin(SLOPE), 0.0])
+    spare = rubbed.y["energy"]
+    for _ in range(30):
+        push = rng.uniform(-40, 40)
+        rubbed.set(F_hand=push * along)
+        for _ in range(10):
+            q = rubbed.state["q"][0]
+            rubbed.step(5e-4)
+            spare += push * (rubbed.state["q"][0] - q)
+            assert rubbed.y["energy"] <= spare + 1e-6 * (1 + abs(spare))
+
+
+def test_a_linkage_with_a_redundant_loop_sticks_in_all_its_joints():
+    """`parallelogram` without its spring: friction in its joints holds its weight from the start,
+    and its closure is redundant."""
+    linkage = open_scene.load("parallelogram").linkage
+    joints = tuple(replace(j, friction=2.0, friction_speed=0.5) for j in linkage.joint)
+    held = running(replace(linkage, joint=joints, spring=(), gravity=(0.0, -G)))
+    start, deflection = held.state["q"], held.state["deflection"]
+    assert np.abs(deflection).min() > 1e-4
+    assert np.abs(steps(held, 60.0).state["q"] - start).max() < 1e-9
+    np.testing.assert_allclose(held.state["deflection"], deflection, atol=1e-9)
+
+
+@pytest.mark.parametrize("formulation", ["partitioning", "embedding"])
+def test_formulations_agree_on_friction(formulation):
+    """The five-bar slides under a wrench, and sticks once it is gone."""
+    linkage = five_bar()
+    linkage = replace(linkage, joint=tuple(replace(j, friction=5e-3) for j in linkage.joint))
+    poses = []
+    for kind in ("multipliers", formulation):
+        five = running(linkage, formulation=kind)
+        five.set(F_hand=(-0.5, 0.3, 0.0))
+        steps(five, 0.2, 2000)
+        assert np.abs(five.state["qd"]).max() > 0.5
+        five.set(F_hand=(0.0, 0.0, 0.0))
+        steps(five, 2.0, 2000)
+        assert np.abs(five.state["qd"]).max() < 1e-3
+        poses.append(five.state["q"])
+    np.testing.assert_allclose(*poses, atol=1e-5)
