@@ -30,8 +30,7 @@ from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
 from hapticlink.components.dynamics.constrained_directions import LOCKED
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import UNITS, loop_name
-from hapticlink.components.specs.linkage import Limits, Linkage
+from hapticlink.components.specs.linkage import COORDINATE_UNITS, Limits, Linkage, loop_name
 
 
 @dataclass(frozen=True)
@@ -50,9 +49,9 @@ def limited(linkage: Linkage) -> list[Limited]:
     found = []
     for j in linkage.joint:
         if j.limits is not None:
-            if len(UNITS[j.type]) != 1:
+            if len(COORDINATE_UNITS[j.type]) != 1:
                 raise ValueError(f"joint `{j.name}`: limits act on one coordinate, and it has 3")
-            found.append(Limited(j.name, j.limits, UNITS[j.type][0]))
+            found.append(Limited(j.name, j.limits, COORDINATE_UNITS[j.type][0]))
     for i, loop in enumerate(linkage.loop):
         if loop.limits is not None:
             unit = "rad" if loop.type == "revolute" else "m"
