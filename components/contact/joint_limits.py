@@ -30,7 +30,8 @@ from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
 from hapticlink.components.dynamics.constrained_directions import LOCKED
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.specs.linkage import COORDINATE_UNITS, Limits, Linkage, loop_name
+from hapticlink.components.linkage.parameters import loop_name
+from hapticlink.components.specs.linkage import COORDINATE_UNITS, Limits, Linkage
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def _draw(scene: Any, start: dict[str, float], out: Path) -> None:
 
     figures = {}
     if q := coordinates(start):
-        figures["mechanism"] = mechanism_drawing.figure(scene, q)
+        figures["start"] = mechanism_drawing.figure(scene, q)
     if scene.device:
         title = f"Device and its workspace: {scene.title}"
         figures["workspace"] = workspace.draw(scene.device, _pose(start), title)

@@ -60,6 +60,8 @@ class Attack:
     """Cases in a folder of their own."""
 
     def __init__(self, folder: Path, duration: float) -> None:
+        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell has it in the background
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         self._folder, self._out = folder, folder / "out"
         self._temporary, self._cache = folder / "temporary", folder / "cache"
         self._temporary.mkdir()

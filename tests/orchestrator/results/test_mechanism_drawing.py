@@ -44,7 +44,7 @@ def test_a_body_of_three_joints_is_a_triangle_of_them() -> None:
 
 @pytest.mark.parametrize(
     ("scene", "files"),
-    [("closed-loop", {"mechanism.png", "workspace.png"}), ("trammel", {"mechanism.png"})],
+    [("closed-loop", {"start.png", "workspace.png"}), ("trammel", {"start.png"})],
 )
 def test_info_draws_and_names_what_it_drew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: str, files: set[str]
