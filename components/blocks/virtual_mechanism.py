@@ -26,6 +26,7 @@ from hapticlink.components.contact.unilateral import AllOneSidedForces, OneSided
 from hapticlink.components.dynamics import (
     closure_diagnostics,
     further_points,
+    joint_ports,
     local_model,
     stabilization,
     starting_friction,
@@ -89,7 +90,7 @@ def virtual_mechanism(
     model = LinkageModel(linkage, block.p, *at, tabled, block.t, block.x.get("deflection"))
     space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
     applied = space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
-    applied += further_points.efforts(model, block.u)
+    applied += further_points.efforts(model, block.u) + joint_ports.efforts(model, block.u)
     energy = model.kinetic_energy + forces.energy(model)
     output: dict[str, ca.SX] = {}
     touching = _touching(parts, block, space, output)
@@ -108,7 +109,7 @@ def virtual_mechanism(
     if linkage.closed:
         output |= {"lambda": multipliers, "closure_error": model.closure_error}
         output |= closure_diagnostics.values(space.solver) if mechanism.diagnostics else {}
-    output |= further_points.values(space, directions is not None)
+    output |= further_points.values(space, directions is not None) | joint_ports.values(model)
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
@@ -131,7 +132,7 @@ def virtual_mechanism(
         stepped = ca.vertcat(stepped, constrained.after)
         output |= {"Lambda_inv": space.Lambda_inv, **constrained.output}
     if tables:
-        now = time_tables.at(tables, block.t)
+        now = ca.densify(time_tables.at(tables, block.t))
         output = {name: ca.substitute(value, tabled, now) for name, value in output.items()}
     component = block.component(
         "virtual_mechanism",
@@ -185,8 +186,9 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
         baumgarte, period = stabilization.HELD, parts.frame_s
     parameters = mechanism_parameters(linkage, parts.mechanism, baumgarte, period)
     outputs = motion_outputs(linkage)
-    inputs += further_points.inputs(linkage)
+    inputs += further_points.inputs(linkage) + joint_ports.inputs(linkage)
     outputs += further_points.outputs(linkage, directions is not None)
+    outputs += joint_ports.outputs(linkage)
     if parts.frame_s:
         inputs += local_model.ports(linkage)
     if linkage.closed and parts.mechanism.diagnostics:

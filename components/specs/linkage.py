@@ -170,6 +170,9 @@ class Joint:
     """Ends of the range of a revolute or prismatic joint."""
     drive: Drive | None = None
     """A motor."""
+    ports: tuple[Literal["effort", "position", "velocity"], ...] = ()
+    """Ports of the mechanism's FMU for a motor or controller outside: NAME.effort is an input,
+    NAME.position and NAME.velocity are outputs."""
 
 
 COORDINATE_UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}

@@ -21,6 +21,7 @@ SCENES: list[tuple[str, Mapping[str, Any]]] = [
     ("enclosure", {"controller.contact": True}),
     ("local-model", {}),
     ("two-hands", {"mechanism.directions": True}),
+    ("two-hands", {"linkage.joint.0.ports": ("effort", "position", "velocity")}),
 ]
 """Scenes that have every port among them; n = 4 joint coordinates and one loop, m = 2, in each."""
 SIZES = {4: "n", 2: "m", 12: "k"}
@@ -41,7 +42,8 @@ def declared() -> Iterator[Row]:
 
 def port(variable: Variable) -> str:
     sizes = ",".join(SIZES.get(size, str(size)) for size in variable.shape)
-    return re.sub(r"^left\.", "POINT.", variable.name) + f"[{sizes}]" * bool(sizes)
+    name = re.sub(r"^shoulder1\.(?!at)", "JOINT.", re.sub(r"^left\.", "POINT.", variable.name))
+    return name + f"[{sizes}]" * bool(sizes)
 
 
 def units(variable: Variable) -> str:

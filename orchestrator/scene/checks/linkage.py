@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import ConstantDrive, Linkage
 from hapticlink.orchestrator.base.faults import unknown
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
@@ -99,6 +99,11 @@ def _tree(linkage: Linkage, frames: Mapping[str, int]) -> Iterator[Problem]:
             )
         else:
             parents[joint.child] = joint.parent
+        if joint.ports and joint.type == "free":
+            yield (*path, "ports"), "ports are of one coordinate, and a free joint has three"
+        if "effort" in joint.ports and isinstance(joint.drive, ConstantDrive):
+            message = f"{joint.name}.effort is the drive's constant already: leave out one of them"
+            yield (*path, "ports"), message
         if joint.type == "prismatic" and joint.axis is None:
             yield (*path, "axis"), "a prismatic joint needs its direction (rad)"
     held = {"ground"}

@@ -1,0 +1,75 @@
+"""Joints as ports: a motor or controller outside of the mechanism drives a joint, and measures it.
+
+    Q_k += effort_k,   position_k = q_k,   velocity_k = qd_k
+
+for the coordinates k of joints with `ports`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import casadi as ca
+
+from hapticlink.components.component import Signals, Variable
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.ports import Power
+from hapticlink.components.specs.linkage import Joint, Linkage
+
+_UNITS = {"revolute": ("N.m", "rad", "rad/s"), "prismatic": ("N", "m", "m/s")}
+
+
+def _of(linkage: Linkage, port: str) -> Iterator[tuple[Joint, str]]:
+    """The joints with a port, and the name of its variable. Raises ValueError for a free joint,
+    which has three coordinates."""
+    for joint in linkage.joint:
+        if port not in joint.ports:
+            continue
+        if joint.type not in _UNITS:
+            raise ValueError(
+                f"joint `{joint.name}`: ports are of one coordinate, a free joint has 3"
+            )
+        yield joint, f"{joint.name}.{port}"
+
+
+def inputs(linkage: Linkage) -> list[Variable]:
+    """An effort (N.m or N) for each joint with this port; it carries power where the joint's
+    position is an output, too."""
+    return [
+        Variable(
+            name,
+            (),
+            _UNITS[joint.type][0],
+            description=f"effort on {joint.name} from outside",
+            power=Power(f"{joint.name}.position") if "position" in joint.ports else None,
+        )
+        for joint, name in _of(linkage, "effort")
+    ]
+
+
+def outputs(linkage: Linkage) -> list[Variable]:
+    """Position (rad or m) and velocity (rad/s or m/s) of the joints with these ports."""
+    found = [
+        Variable(name, (), _UNITS[j.type][1], description=f"coordinate of {j.name}")
+        for j, name in _of(linkage, "position")
+    ]
+    for joint, name in _of(linkage, "velocity"):
+        of = f"{joint.name}.position" if "position" in joint.ports else None
+        text = f"rate of {joint.name}"
+        found.append(Variable(name, (), _UNITS[joint.type][2], description=text, derivative_of=of))
+    return found
+
+
+def efforts(model: LinkageModel, u: Signals) -> ca.SX:
+    """The efforts from outside, n x 1."""
+    Q = ca.SX(model.q.numel(), 1)
+    for joint, name in _of(model.linkage, "effort"):
+        Q[model.coordinate(joint.name)] += u[name]
+    return Q
+
+
+def values(model: LinkageModel) -> dict[str, ca.SX]:
+    """The values of the outputs."""
+    found = {n: model.q[model.coordinate(j.name)] for j, n in _of(model.linkage, "position")}
+    rates = {n: model.qd[model.coordinate(j.name)] for j, n in _of(model.linkage, "velocity")}
+    return found | rates

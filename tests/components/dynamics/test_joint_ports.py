@@ -1,0 +1,103 @@
+"""Joints as ports, against a drive of the scene and a controller outside."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.orchestrator import open_scene
+from tests.blocks import Running
+from tests.orchestrator.foreign_fmus import python_fmu_of
+
+SERVO = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.angle = self.rate = self.torque = 0.0
+        for name in ("angle", "rate"):
+            self.register_variable(Real(name, causality=Fmi2Causality.input))
+        self.register_variable(Real("torque", causality=Fmi2Causality.output))
+
+    def do_step(self, time, size):
+        self.torque = {law}
+        return True
+"""
+ACTIVE = """
+extends = "slider-crank"
+title = "A motor outside"
+duration = {duration}
+haptics.rate = {rate}
+
+[[fmu]]
+name = "motor"
+path = "{path}"
+timing = "sampled"
+
+[[connection]]
+from = "virtual_mechanism.crank.position"
+to = "motor.angle"
+
+[[connection]]
+from = "virtual_mechanism.crank.velocity"
+to = "motor.rate"
+
+[[connection]]
+from = "motor.torque"
+to = "virtual_mechanism.crank.effort"
+"""
+PORTS = {
+    "linkage.joint.0.ports": ["effort", "position", "velocity"],
+    "linkage.joint.0.drive": {"type": "profile", "table": [[0.0, 0.0]]},
+}
+
+
+def active(folder: Path, law: str, duration: float = 0.5) -> hl.Run:
+    """The slider-crank with a motor in an FMU of its own."""
+    fmu = python_fmu_of(folder, SERVO.format(name="Servo", law=law), f"servo_{folder.name}")
+    path = folder / "active.toml"
+    path.write_text(ACTIVE.format(path=fmu.as_posix(), rate=512, duration=duration))
+    return hl.run(path, PORTS)
+
+
+def test_a_constant_effort_from_outside_is_that_of_a_drive() -> None:
+    """To the bit, friction at the start included."""
+    scene = open_scene.load("slider-crank")
+    assert scene.linkage
+    driven, *others = scene.linkage.joint
+    open_joint = replace(driven, drive=None, ports=("effort", "position", "velocity"))
+    ported = replace(scene.linkage, joint=(open_joint, *others))
+    inside = Running(virtual_mechanism(scene.linkage, scene.mechanism, step_s=1 / 512))
+    outside = Running(
+        virtual_mechanism(ported, scene.mechanism, step_s=1 / 512), {"crank.effort": 0.08}
+    )
+    for _ in range(256):
+        inside.step(1 / 512)
+        outside.step(1 / 512)
+    y = outside.y
+    assert y["q"][0] > 2
+    assert np.array_equal(y["q"], inside.y["q"])
+    assert (y["crank.position"], y["crank.velocity"]) == (y["q"][0], y["qd"][0])
+
+
+def test_a_controller_outside_turns_a_joint_and_its_work_is_booked(tmp_path: Path) -> None:
+    """The work of the held torque, by its own sum over the recorded steps."""
+    law = "20.0 * (1.3 - self.angle) - 0.4 * self.rate"
+    run = active(tmp_path, law, duration=1.0)
+    angle, torque = run["virtual_mechanism.crank.position"], run["motor.torque"]
+    assert angle[-1] == pytest.approx(1.3, abs=0.02)
+    booked = run.run["energies_within_a_rate"]["motor.torque -> virtual_mechanism.crank.effort"]
+    steps = np.diff(angle)
+    assert booked["held"] == pytest.approx(torque[: len(steps)] @ steps, rel=0.02)
+
+
+def test_ports_that_cannot_be_are_refused() -> None:
+    ports = {"linkage.joint.0.ports": ["effort"]}
+    with pytest.raises(hl.InputFault, match="effort is the drive's constant already"):
+        hl.scene("slider-crank", ports)
+    with pytest.raises(hl.InputFault, match="a free joint has three"):
+        hl.scene("single-body", {"linkage.joint.0.ports": ["position"]})
