@@ -67,8 +67,8 @@ class Run(Results):
         return pose_error(self)
 
     def figures(self) -> dict[str, Figure]:
-        """Matplotlib figures by name, as far as the scene has the signals: `trajectories`,
-        `distance`, `contact`, `constraints`, `energies`."""
+        """Matplotlib figures by name, as far as the scene has the signals: `mechanism`,
+        `trajectories`, `distance`, `forces`, `contact`, `constraints`, `energies`."""
         return figures.figures(self)
 
     def _table(self, name: str) -> Table:

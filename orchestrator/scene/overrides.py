@@ -18,11 +18,14 @@ Options = Mapping[str, Any] | Sequence[str]
 
 
 def written(options: Options) -> tuple[str, ...]:
-    """The options as `key=value` texts. Raises InputFault for a single text in place of a list, and
-    for a value that TOML cannot write."""
+    """The options as `key=value` texts. Raises InputFault for a single text in place of a list, for
+    what is no text in a list, and for a value that TOML cannot write."""
     if isinstance(options, str):
         raise InputFault(f"options {options!r}: give a mapping, or a list of key=value")
     if not isinstance(options, Mapping):
+        for option in options:
+            if not isinstance(option, str):
+                raise InputFault(f"option {option!r}: write key=value, or give a mapping")
         return tuple(options)
     return tuple(f"{key}={text(value, key)}" for key, value in options.items())
 

@@ -146,7 +146,7 @@ class PowerPort:
     displacement: str
     """The conjugate displacement, an output of the same FMU (m and rad)."""
     sign: Annotated[float, Quantity("1", ge=-1, le=1)] = 1.0
-    """-1 where the effort acts against the displacement."""
+    """1, or -1 where the effort acts against the displacement."""
 
     @property
     def fmu(self) -> str:

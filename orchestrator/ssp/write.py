@@ -19,6 +19,7 @@ import pydantic
 
 from hapticlink.components.base_units import BASES
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import fmu_rates
@@ -53,8 +54,10 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 def write(scene: Scene, system: System, target: Path) -> Path:
     """Write the SSP `target` atomically; the same scene gives the same bytes. Raises InputFault if
-    its folder cannot be written to."""
+    it is a folder, or its own cannot be written to."""
     folders.ensure(target.parent)
+    if target.is_dir():
+        raise InputFault(f"{target}: is a folder; name a file in it, {target / 'scene.ssp'}")
     with atomic_file(target) as unfinished, zipfile.ZipFile(unfinished, "w") as archive:
         _add(archive, STRUCTURE, structure(scene, system, re.sub(r"\W|^(?=\d)", "_", target.stem)))
         for unit in system.fmus:

@@ -21,6 +21,8 @@ def points(vary: Vary, runs: Runs) -> list[Point]:
     of them is given, and for values that cannot be read."""
     if bool(vary) == bool(runs):
         raise InputFault("sweep: give either --vary key=values (repeatable) or --runs FILE")
+    if isinstance(vary, str):
+        raise InputFault(f"vary {vary!r}: give a mapping, or a list of key=values")
     if isinstance(vary, Mapping):
         axes = [_axis(key, values) for key, values in vary.items()]
     else:

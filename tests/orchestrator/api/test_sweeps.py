@@ -26,6 +26,7 @@ def test_values_and_texts_give_the_same_runs(tmp_path: Path) -> None:
     assert points({"a.b": range(10, 40, 10)}, ()) == [{"a.b": v} for v in ("10", "20", "30")]
     for wrong, message in (
         ({"a.b": 3}, "a.b: 3 is one value; give a list"),
+        ("a.b=1,2", "vary 'a.b=1,2': give a mapping, or a list of key=values"),
         ({"a.b": []}, "a.b: no value"),
         ({}, "give either --vary"),
     ):

@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.plan.operations import Get, Record, Set, Step
+from hapticlink.orchestrator.plan.operations import Get, Push, Record, Set, Step
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import Delay, delays, pattern_end
 from hapticlink.orchestrator.plan.schemes import SCHEMES
@@ -59,6 +60,19 @@ def test_no_get_after_set_without_a_step_between(
                     dirty.discard(fmu)
                 case Get(fmu):
                     assert fmu not in dirty
+
+
+def test_get_after_set_reads_and_pushes_what_the_new_inputs_give(stamped: Make) -> None:
+    """Once the step has ended, its feed-through outputs are those of the inputs of that instant."""
+    plan = Plan(stamped(fixed(Fraction(100), Fraction(50), 10, "tick"), "jacobi"))
+    plant = next(u.name for u in plan.system.fmus if not u.sampled and plan.system.into(u.name))
+    plan = Plan(replace(plan.system, get_after_set=(plant,)))
+    event = next(e for _, e in plan if not e.first and any(
+        f.clock == plan.system.fmu[plant].clock for f in e.firings))  # fmt: skip
+    operations = plan.block(event)
+    at = operations.index(Set(plant, now=True))
+    pushed = [Push(c.name) for c in plan.system.out_of(plant) if c.hold]
+    assert list(operations[at + 1 : at + 2 + len(pushed)]) == [Get(plant), *pushed]
 
 
 @shared

@@ -83,6 +83,29 @@ def test_a_fast_spring_held_by_a_slow_target(every: int, seed: int) -> None:
     assert meter.energy(1.0).generated == pytest.approx(made, rel=1e-10)
 
 
+@pytest.mark.parametrize("between", [1, 2])
+def test_a_constant_force_generates_nothing(between: int) -> None:
+    """It does F dx, held or not, from the first sample to the last, between two of the target's
+    steps, and over folded rows."""
+    path = np.cumsum(np.random.default_rng(5).normal(size=3 * ROWS))
+    force, x = np.array([3.0]), np.zeros(1)
+    meter = Meter(force.copy, force.copy, x.copy)
+    for n, place in enumerate(path):
+        x[:] = place
+        meter.move(3 * n)
+        if not n:
+            meter.sample(0)
+        meter.hold(1.0)
+        if n % 7 == 0:
+            meter.sample(3 * n + between)
+            last = n
+    moved = path[last] + (path[last + 1] - path[last]) * between / 3 - path[0]
+    energy = meter.energy(1.0)
+    assert energy.ideal == pytest.approx(3.0 * moved, rel=1e-10)
+    assert energy.held == pytest.approx(3.0 * moved, rel=1e-10)
+    assert abs(energy.generated) < 1e-9
+
+
 def test_a_passive_hold_takes_back_what_sampling_makes(tmp_path: Path) -> None:
     made = {}
     for hold in ("zoh", "passive", "nepce"):

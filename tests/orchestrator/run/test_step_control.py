@@ -64,6 +64,17 @@ def solved(made: System, folder: Path) -> tuple[Outcome, float]:
     return outcome, error(table)
 
 
+def test_steps_that_are_taken_back_do_no_work(fmus: Fmus, tmp_path: Path) -> None:
+    """The spring's work is that of steps of 0.1 ms; each was tried as a whole one first."""
+    fixed, _ = solved(controlled(fmus, None, Fraction(1, 10000)), tmp_path)
+    tried, _ = solved(controlled(fmus, doubling(0.01)), tmp_path)
+    assert len(fixed.energies) > 0
+    for name, energy in fixed.energies.items():
+        scale = max(abs(e.ideal) for e in fixed.energies.values())
+        assert tried.energies[name].ideal == pytest.approx(energy.ideal, abs=0.01 * scale)
+        assert tried.energies[name].held == pytest.approx(energy.held, abs=0.01 * scale)
+
+
 @pytest.mark.parametrize(
     ("control", "tolerances", "power"),
     [(doubling, [0.1, 0.01, 0.001], 1.0), (ecco, [1e-4, 1e-5, 1e-6], 2 / 3)],

@@ -52,6 +52,11 @@ def test_what_no_scene_can_hold_is_refused(value: object) -> None:
         overrides.written({"graphics.rate": value})
 
 
+def test_pairs_are_no_options() -> None:
+    with pytest.raises(InputFault, match=r"option \('graphics.rate', 10\): write key=value, or"):
+        open_scene.load("closed-loop", [("graphics.rate", 10)])  # type: ignore[list-item]
+
+
 def test_one_text_is_no_list_of_options() -> None:
     with pytest.raises(InputFault, match="give a mapping, or a list"):
         overrides.written("graphics.rate=10")

@@ -97,6 +97,7 @@ def test_a_whole_number_of_thousands_of_digits_is_refused() -> None:
     ("options", "message"),
     [
         (["duration=0.001"], "0.001 s is less than a haptic period, 1/(512 Hz)"),
+        (['power=[{effort="a.F", displacement="a.x", sign=0.5}]'], "0.5 is no sign: write 1 or -1"),
         (["directions.hysteresis=10"], "10.0 times rank_tolerance = 0.1 is 1"),
         (["device.base_y_a=0.3"], "0.3 m is not below base_y_b = 0.2 m"),
         (["device.distal_length=0.005"], "leaves an arm nothing between its two stops"),
