@@ -19,6 +19,7 @@ import pydantic
 
 from hapticlink.components.base_units import BASES
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import fmu_rates
@@ -29,6 +30,7 @@ from hapticlink.orchestrator.ssp import step_sizes
 from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,
     FMU,
+    LARGEST,
     NOT_IN_ANNOTATION,
     RUN,
     SSC,
@@ -132,6 +134,8 @@ def _component(elements: Element, unit: Fmu) -> Element:
 def _text(scalar: Scalar, value: bool | int | float | str) -> str:
     if isinstance(value, bool):
         return str(value).lower()
+    if type_of(scalar.type) == "Integer" and not -LARGEST <= int(value) < LARGEST:
+        raise InputFault(f"start.{scalar.name}: {value}: integers of an SSP have 32 bits")
     return repr(float(value)) if type_of(scalar.type) == "Real" else str(value)
 
 
