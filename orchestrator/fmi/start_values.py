@@ -27,6 +27,8 @@ def fitting(scalar: Scalar, given: Given) -> Given:
     kind = _takes(scalar)
     if not isinstance(given, kind) or (isinstance(given, bool) and scalar.type != "Boolean"):
         raise ValueError(f"{given!r}: {scalar.name} takes {_WORDS[kind]}")
+    if isinstance(given, str) and "\0" in given:
+        raise ValueError(f"{given!r}: {scalar.name} would end at the \\0: texts of FMI do")
     if scalar.type == "Binary":
         try:
             bytes.fromhex(str(given))

@@ -56,10 +56,11 @@ def _carried(system: System) -> dict[str, Starts]:
 
 
 def _start(scalar: Scalar, value: float) -> Given:
+    """What a connection sets, as `fmi.transfer` does."""
     value = scalar.conversion.factor * value + scalar.conversion.offset
     if scalar.type in ("Real", "Float64", "Float32"):
         return value
-    return bool(value) if scalar.type == "Boolean" else int(value)
+    return value >= 0.5 if scalar.type == "Boolean" else round(value)
 
 
 def _initialized(system: System) -> SignalVector:

@@ -24,7 +24,9 @@ NOT_IN_ANNOTATION = frozenset(
 annotation."""
 
 
-SCALAR = {"Boolean": "Boolean", "String": "String", "Real": "Real"}
+SCALAR = {"Boolean": "Boolean", "String": "String", "Binary": "Binary", "Real": "Real"}
+LARGEST = 2**31
+"""Beyond integers of SSP 1.0, which are those of xs:int."""
 
 
 def is_fixed(names: tuple[str, ...]) -> bool:

@@ -39,6 +39,7 @@ READ: dict[str, Callable[[str], Value]] = {
     "Integer": int,
     "Boolean": lambda text: text in ("true", "1"),
     "String": str,
+    "Binary": str,
     "Enumeration": str,
 }
 SETS = ("application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping")
@@ -68,6 +69,16 @@ class Parameters:
     def starts(self) -> dict[Place, dict[str, Value]]:
         """Start values by component and variable. Values whose names match nothing are ignored, as
         SSP 1.0 requires, and logged. Raises InputFault for what cannot be read."""
+        found = self.values()
+        if self.unused:
+            names = printable(", ".join(self.unused[:SHOWN]))
+            more = f" and {n} more" if (n := len(self.unused) - SHOWN) > 0 else ""
+            message = "%s: parameters that match nothing are ignored: %s%s"
+            logging.getLogger(__name__).warning(message, self.path, names, more)
+        return found
+
+    def values(self) -> dict[Place, dict[str, Value]]:
+        """As `starts`; names that match nothing are in `unused`."""
         found: dict[Place, dict[str, Value]] = {place: {} for place in self.wires.described}
         for part in self.wires.root:
             for given in self._given(part):
@@ -77,11 +88,6 @@ class Parameters:
                     found[target.component][target.variable] = value
                 if not targets:
                     self.unused.append(dotted(part.place, given.name))
-        if self.unused:
-            names = printable(", ".join(self.unused[:SHOWN]))
-            more = f" and {n} more" if (n := len(self.unused) - SHOWN) > 0 else ""
-            message = "%s: parameters that match nothing are ignored: %s%s"
-            logging.getLogger(__name__).warning(message, self.path, names, more)
         return found
 
     def _given(self, part: Part) -> Iterator[Given]:

@@ -16,6 +16,7 @@ import shutil
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.ssp import annotation
 from hapticlink.orchestrator.ssp.connections import Row, Wires
 from hapticlink.orchestrator.ssp.names import SSD, STRUCTURE
-from hapticlink.orchestrator.ssp.parameters import Parameters
+from hapticlink.orchestrator.ssp.parameters import Parameters, Value
 from hapticlink.orchestrator.ssp.tree import Part, Place, checked, dotted, tree, units
 
 _ENTRY = re.compile(r"\[[\d, ]+\]$")
@@ -48,6 +49,8 @@ def tables(path: Path) -> dict[str, Any]:
         names = _names(part.place for part in system if part.source is not None)
         with _room() as room:
             described = _described(path, archive, system, room)
+        apart = Wires(path, _unconnected(system), described, defined)
+        described = _resized(described, Parameters(path, archive, apart).values())
         wires = Wires(path, system, described, defined)
         starts = Parameters(path, archive, wires).starts()
     rest = annotation.read(path, root)
@@ -130,6 +133,23 @@ def _described(
         if part.source not in known:
             known[part.source] = describe(_unpacked(path, archive, part, part.source, room))
         found[part.place] = known[part.source]
+    return found
+
+
+def _unconnected(part: Part) -> Part:
+    """The part without connections, whose ends exist once arrays have their sizes."""
+    return replace(part, lines=(), parts=tuple(map(_unconnected, part.parts)))
+
+
+def _resized(
+    described: Mapping[Place, Description], starts: Mapping[Place, Mapping[str, Value]]
+) -> dict[Place, Description]:
+    """The FMUs with arrays of the sizes that their structural parameters get."""
+    found = {}
+    for place, description in described.items():
+        structural = {s.name for s in description.scalars if s.structural}
+        sizes = {n: int(v) for n, v in starts[place].items() if n in structural}
+        found[place] = describe(description.path, sizes) if sizes else description
     return found
 
 

@@ -30,6 +30,7 @@ from hapticlink.orchestrator.ssp import step_sizes
 from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,
     FMU,
+    LARGEST,
     NOT_IN_ANNOTATION,
     RUN,
     SSC,
@@ -135,6 +136,8 @@ def _component(elements: Element, unit: Fmu) -> Element:
 def _text(scalar: Scalar, value: bool | int | float | str) -> str:
     if isinstance(value, bool):
         return str(value).lower()
+    if type_of(scalar.type) == "Integer" and not -LARGEST <= int(value) < LARGEST:
+        raise InputFault(f"start.{scalar.name}: {value}: integers of an SSP have 32 bits")
     return repr(float(value)) if type_of(scalar.type) == "Real" else str(value)
 
 

@@ -57,7 +57,7 @@ def _described(path: FilePath, fmu: ForeignFmu) -> Description:
     """The FMU with the sizes that `start` gives it by structural parameters. Raises InputFault."""
     found = describe(path)
     structural = {s.name for s in found.scalars if s.structural}
-    sizes = {n: v for n, v in fmu.start.items() if n in structural and isinstance(v, int)}
+    sizes = {n: v for n, v in fmu.start.items() if n in structural and type(v) is int}
     return describe(path, sizes) if sizes else found
 
 

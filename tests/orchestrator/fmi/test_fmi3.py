@@ -176,6 +176,8 @@ def test_a_structural_parameter_sizes_a_matrix_given_by_rows(tmp_path: Path, iso
         ("start.array = [[1, 2, 3], [4, 5, 6]]\n", "rows of \\[3, 3\\] values"),
         ("start.size = 3\nstart.array = [[1, 2], [3, 4]]\n", "for the 3 rows of 3 of array"),
         ('start.blob = "0g"\n', "blob takes pairs of hexadecimal digits"),
+        ('start.text = "a\\u0000b"\n', "text would end at the"),
+        ("start.size = true\n", "size takes a whole number"),
     ],
 )
 def test_what_fits_no_array_or_binary_is_refused(tmp_path: Path, starts: str, message: str) -> None:

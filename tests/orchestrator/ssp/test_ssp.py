@@ -7,12 +7,19 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd
 
-from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator import api, open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.fmi.test_archives import SSD
-from tests.orchestrator.foreign_fmus import PAIR, python_fmu, scene, with_units
+from tests.orchestrator.foreign_fmus import (
+    PAIR,
+    c_fmu3,
+    python_fmu,
+    python_fmu_of,
+    scene,
+    with_units,
+)
 
 
 def export(source: str, folder: Path, *options: str) -> Path:
@@ -166,3 +173,63 @@ def test_with_the_cache_off_no_folder_stays(tmp_path: Path) -> None:
     environment = {"HAPTICLINK_CACHE": "off", "TMPDIR": str(tmp_path / "temporary")}
     subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True)
     assert not list((tmp_path / "temporary").glob("hapticlink*"))
+
+
+FIXED = """
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+
+class Takes(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.count, self.on, self.y = 0, False, 0.0
+        for variable in (Integer("count", causality=Fmi2Causality.parameter,
+                                 variability=Fmi2Variability.fixed),
+                         Boolean("on", causality=Fmi2Causality.parameter,
+                                 variability=Fmi2Variability.fixed),
+                         Real("y", causality=Fmi2Causality.output)):
+            self.register_variable(variable)
+
+    def do_step(self, time, size):
+        self.y = self.count + 100.0 * self.on
+        return True
+"""
+
+
+def test_whole_and_boolean_parameters_start_as_in_the_scene(tmp_path: Path) -> None:
+    """Rounded, and true from 0.5 on: -1.8 is -2, and 0.3 is false."""
+    python_fmu(tmp_path, "Gives", "pass")
+    python_fmu_of(tmp_path, FIXED, tmp_path.name)
+    text = PAIR.replace("takes.u", "takes.count") + "offset = -1.8\n"
+    text += '[[connection]]\nfrom = "gives.y"\nto = "takes.on"\noffset = 0.3\n'
+    source = str(scene(tmp_path, text))
+    path = export(source, tmp_path)
+    for each in (source, str(path)):
+        made = simulate(each, tmp_path / "out")
+        assert made.results.haptics["takes.y"][-1] == -2.0
+
+
+SIZES = """
+[[fmu]]
+name = "a"
+path = "types.fmu"
+start = { size = 3, array = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], blob = "00ff" }
+"""
+
+
+def test_sizes_of_arrays_and_binary_starts_come_back(tmp_path: Path) -> None:
+    c_fmu3(tmp_path)
+    source = str(scene(tmp_path, SIZES))
+    path = export(source, tmp_path)
+    for each in (source, str(path)):
+        made = simulate(each, tmp_path / "out")
+        assert made.results.haptics["a.sum"][-1] == sum(i * i for i in range(1, 10))
+    starts = {scalar.name: value for scalar, value in made.system.fmu["a"].starts}
+    assert starts["blob"] == "00ff"
+
+
+def test_a_start_that_no_ssp_can_hold_is_refused(tmp_path: Path) -> None:
+    c_fmu3(tmp_path)
+    source = scene(tmp_path, SIZES.replace("size = 3", "in_Int64 = 2147483648, size = 3"))
+    with pytest.raises(InputFault, match=r"start\.in_Int64: 2147483648: integers of an SSP"):
+        api.export(source, out=tmp_path / "made.ssp")
+    assert not (tmp_path / "made.ssp").exists()
