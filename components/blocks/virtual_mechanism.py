@@ -290,7 +290,7 @@ def _step(
         if isinstance(integrator, LocatedEvents):
             integrator = integrator.completed(independent.complete)
         return independent_coordinates.step(integrator, independent, x, given, p, t, block.h)
-    after = integrator.step(ode, x, given, p, t, block.h, range(n))
+    after = integrators.step(integrator, ode, x, given, p, t, block.h, range(n))
     if mechanism.stabilization == "projection":
         own = space.terms.inertia
         project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))

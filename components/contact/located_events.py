@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from hapticlink.components import integrators
 from hapticlink.components.contact.unilateral import BEGUN, BY_STATE, Unilateral
 from hapticlink.components.integrators.base import Integrator
 
@@ -68,7 +69,7 @@ class LocatedEvents(Integrator):
 
         def stepped(x: ca.SX, laws: ca.SX, t: ca.SX, h: ca.SX) -> ca.SX:
             given = ca.vertcat(laws, u)
-            return self.method.step(ode, x, given, p, t, h, positions)
+            return integrators.step(self.method, ode, x, given, p, t, h, positions)
 
         def at(x: ca.SX, pushing: ca.SX, t: ca.SX) -> tuple[ca.SX, _Contacts]:
             rate = ode(x, ca.vertcat(pushing, u), p, t)

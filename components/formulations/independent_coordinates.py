@@ -13,6 +13,7 @@ from typing import Protocol
 import casadi as ca
 import numpy as np
 
+from hapticlink.components import integrators
 from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.assembly import assemble
 from hapticlink.components.integrators.base import Integrator
@@ -67,5 +68,5 @@ def step(
     near, free = x[:n], formulation.independent
     z = x[[*free, *(n + i for i in free), *range(2 * n, x.numel())]]
     inputs = ca.vertcat(u, near)
-    z = integrator.step(formulation.ode, z, inputs, p, t, h, range(k))
+    z = integrators.step(integrator, formulation.ode, z, inputs, p, t, h, range(k))
     return formulation.complete(z, near, p)

@@ -33,7 +33,7 @@ METHODS: Registry[Integrator] = Registry(
 
 
 def step(
-    method: str,
+    method: str | Integrator,
     ode: ca.Function,
     x: ca.SX,
     u: ca.SX,
@@ -42,10 +42,12 @@ def step(
     h: ca.SX,
     positions: Sequence[int],
 ) -> ca.SX:
-    """x(t + h) by the named method. Raises ValueError for an unknown name, and for a method that
-    gives no expression of x's size."""
-    after = METHODS[method].step(ode, x, u, p, t, h, positions)
+    """x(t + h) by a method, or by the one of that name. Raises ValueError for an unknown name, and
+    for a method that gives no expression of x's size."""
+    integrator = METHODS[method] if isinstance(method, str) else method
+    after = integrator.step(ode, x, u, p, t, h, positions)
     shape = getattr(after, "shape", type(after).__name__)
     if shape != x.shape:
-        raise ValueError(f"integrator {method!r}: its step gives {shape}, not {x.shape}")
+        name = type(integrator).__name__
+        raise ValueError(f"integrator {name}: its step gives {shape}, not {x.shape}")
     return after

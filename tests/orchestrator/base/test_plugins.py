@@ -174,7 +174,7 @@ def test_parts_that_fail_or_give_something_else(tmp_path: Path) -> None:
     coupled = "sampled-spring --set coupling=mine"
     cases = [
         (METHODS, integrator.format("x[:1]"), "Mine()", f"{run} {mine}",
-         "integrator 'mine': its step gives (1, 1), not (2, 1)"),
+         "virtual_mechanism: integrator Mine: its step gives (1, 1), not (3, 1)"),
         (METHODS, integrator.format("[][1]"), "Mine()", f"{run} {mine}",
          "plugin part1: {}/part1.py, line 5: IndexError"),
         (SCHEMES, scheme, "Scheme(lambda *_: None)", f"{run} {coupled}",
