@@ -145,9 +145,9 @@ _PER_TICK = ("operations", "signals")
 
 def at_start(system: System) -> dict[str, float]:
     """Start values of the mechanism's outputs, as its FMU assembles it in initialisation mode; {}
-    without a mechanism."""
+    without a mechanism, and with another FMU in its place, which `info` does not run."""
     fmu = system.fmu.get(MECHANISM)
-    if fmu is None:
+    if fmu is None or fmu.description.block != MECHANISM:
         return {}
     outputs = np.zeros(len(fmu.description.outputs))
     made = IN_PROCESS[fmu.description.fmi](MECHANISM, fmu.description, outputs, fmu.starts)

@@ -107,3 +107,12 @@ def test_two_in_one_place_are_refused(tmp_path: Path) -> None:
     one = f'fmu.+={{ replaces = "controller", path = "{file}" }}'
     with pytest.raises(SceneFault, match="'controller' is taken"):
         hl.scene("closed-loop", [one, one])
+
+
+def test_info_does_not_run_another_s_mechanism(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its coordinates are its own, and it may hang."""
+    swap = f"virtual_mechanism={spring(tmp_path)}"
+    assert status("info", "closed-loop", "--swap", swap) == 0
+    assert "virtual_mechanism has no ports for" in capsys.readouterr().out
