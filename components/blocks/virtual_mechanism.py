@@ -25,6 +25,7 @@ from hapticlink.components.contact.located_events import LocatedEvents
 from hapticlink.components.contact.unilateral import AllOneSidedForces, OneSidedForces
 from hapticlink.components.dynamics import (
     closure_diagnostics,
+    friction_scale,
     further_points,
     joint_ports,
     local_model,
@@ -80,6 +81,7 @@ def virtual_mechanism(
     formulation that does not fit the other settings.
     """
     independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
+    linkage = friction_scale.resolved(linkage, mechanism, step_s / mechanism.substeps)
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     parts = _Parts(linkage, mechanism, directions, contacts, frame_s)
@@ -201,7 +203,7 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
         parameters += joint_limits.parameters(linkage)
         outputs.append(contact_forces.wrench_output())
     if contacts:
-        parameters += contact_forces.contact_parameters(linkage, contacts)
+        parameters += contact_forces.contact_parameters(linkage, contacts, step_s)
         outputs.append(contact_forces.gap_output())
         memory += contact_forces.states(linkage, contacts)
         if contacts.detection == "graphics":

@@ -30,7 +30,6 @@ from hapticlink.components.contact.detection import (
 from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
 from hapticlink.components.dynamics import constrained_directions
 from hapticlink.components.forces import dry_friction
-from hapticlink.components.forces.friction import LAG
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
@@ -54,20 +53,25 @@ def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
     return Variable("contacts", (rows, len(COLUMNS)), COLUMNS, description=text, kind="table")
 
 
-def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
-    """Parameters of the block that evaluates the contact forces."""
+def contact_parameters(linkage: Linkage, contacts: Contacts, step_s: float) -> list[Variable]:
+    """Parameters of the block that evaluates the contact forces in integration steps of step_s
+    (s)."""
     return [
         *detection_parameters(linkage, contacts, contacts.detection == "haptics"),
         Variable("k_contact", (), "N/m", contacts.stiffness, "stiffness of a contact"),
         Variable("b_contact", (), "N.s/m", contacts.damping, "damping of a contact"),
-        *_friction(contacts),
+        *_friction(contacts, step_s),
     ]
 
 
-def _friction(contacts: Contacts) -> list[Variable]:
+def _friction(contacts: Contacts, step_s: float) -> list[Variable]:
     if contacts.friction is None:
         return []
-    return [Variable("mu_contact", (), "1", contacts.friction, "friction of a contact")]
+    text = "damping over stiffness of a contact that sticks"
+    return [
+        Variable("mu_contact", (), "1", contacts.friction, "friction of a contact"),
+        Variable("tau_contact", (), "s", dry_friction.LAG * step_s, text),
+    ]
 
 
 def states(linkage: Linkage, contacts: Contacts) -> list[Variable]:
@@ -170,7 +174,8 @@ class ContactForces(OneSidedForces):
     def efforts(self, laws: ca.SX | None = None) -> ca.SX:
         pushes, rubs = self._pushes(laws), ca.SX(len(self.sides), 1)
         if self._z is not None:
-            held = dry_friction.held(self._z, self._slides, self._breaks(pushes), LAG)
+            breaks, tau = self._breaks(pushes), self._p["tau_contact"]
+            held = dry_friction.held(self._z, self._slides, breaks, tau)
             rubs = -self._p["k_contact"] * held
         wrenches: dict[str, ca.SX] = {}
         for i, (touch, arm) in enumerate(zip(self._touches, self._arms, strict=True)):
@@ -184,8 +189,8 @@ class ContactForces(OneSidedForces):
     def state_rates(self, laws: ca.SX | None = None) -> ca.SX:
         if self._z is None:
             return ca.SX(0, 1)
-        breaks = self._breaks(self._pushes(laws))
-        return dry_friction.deflection_rate(self._z, self._slides, breaks, LAG)
+        breaks, tau = self._breaks(self._pushes(laws)), self._p["tau_contact"]
+        return dry_friction.deflection_rate(self._z, self._slides, breaks, tau)
 
 
 def _along(touch: Touch) -> ca.SX:

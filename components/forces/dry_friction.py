@@ -17,6 +17,8 @@ from __future__ import annotations
 
 import casadi as ca
 
+LAG = 4  # default of tau, in integration steps: of its modes in a step, none is faster than 1/4
+
 
 def held(z: ca.SX, v: ca.SX, d: ca.SX, tau: ca.SX | float) -> ca.SX:
     """e, in the unit of the deflection z."""

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from hapticlink.components.linkage.model import LinkageModel
 
 _UNITS = {"revolute": ("N.m", "rad", "rad/s"), "prismatic": ("N", "m", "m/s")}
-LAG = 0.01  # s: the default of d/v_f
 
 
 def rubbing(linkage: Linkage) -> list[Joint]:
@@ -34,16 +33,17 @@ def rubbing(linkage: Linkage) -> list[Joint]:
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
+    """The parameters of joints with friction, those that are given (friction_scale.py)."""
     found = []
     for j in rubbing(linkage):
-        d = LAG * j.friction_speed if j.friction_deflection is None else j.friction_deflection
         given = {
-            "friction": (j.friction or 0.0, "friction"),
-            "friction_deflection": (d, "deflection at which it slides"),
+            "friction": (j.friction, "friction"),
+            "friction_deflection": (j.friction_deflection, "deflection at which it slides"),
             "friction_speed": (j.friction_speed, "speed at which it slides"),
         }
         for (name, (value, text)), unit in zip(given.items(), _UNITS[j.type], strict=True):
-            found.append(Variable(f"{j.name}.{name}", (), unit, value, f"{text} of {j.name}"))
+            if value is not None:
+                found.append(Variable(f"{j.name}.{name}", (), unit, value, f"{text} of {j.name}"))
     return found
 
 
@@ -54,14 +54,15 @@ def states(linkage: Linkage) -> list[Variable]:
 
 
 class Joints:
-    """Rates v, deflections z and d, friction f and tau of the joints with friction, each k x 1."""
+    """Rates v, deflections z and d, friction f and tau of the joints with friction, each k x 1; NaN
+    for a linkage that is not `resolved` (friction_scale.py), whose friction is not evaluated."""
 
     def __init__(self, model: LinkageModel) -> None:
         joints, p = rubbing(model.linkage), model.p
         self.coordinates = [model.coordinate(j.name) for j in joints]
         self.v, self.z = model.qd[self.coordinates], model.deflection
         self.f, self.d, self.v_f = (
-            ca.vertcat(*(p[f"{j.name}.{name}"] for j in joints))
+            ca.vertcat(*(p.get(f"{j.name}.{name}", ca.SX.nan()) for j in joints))
             for name in ("friction", "friction_deflection", "friction_speed")
         )
         self.tau = self.d / self.v_f

@@ -161,11 +161,12 @@ class Joint:
     """Viscous damping."""
     friction: Annotated[float, Quantity("N.m or N", ge=0)] | None = None
     """Coulomb friction, up to which the joint sticks."""
-    friction_speed: Annotated[float, Quantity("rad/s or m/s", gt=0)] = 0.01
-    """Sets the damping of a joint that sticks, friction / friction_speed."""
+    friction_speed: Annotated[float, Quantity("rad/s or m/s", gt=0)] | None = None
+    """Sets the damping of a joint that sticks, friction / friction_speed; by default as large as an
+    integration step resolves."""
     friction_deflection: Annotated[float, Quantity("rad or m", gt=0)] | None = None
     """Deflection at which a joint begins to slide: sets the stiffness of one that sticks,
-    friction / friction_deflection. By default 0.01 s times `friction_speed`."""
+    friction / friction_deflection; by default as large as an integration step resolves."""
     limits: Limits | None = None
     """Ends of the range of a revolute or prismatic joint."""
     drive: Drive | None = None

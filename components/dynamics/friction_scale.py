@@ -1,0 +1,86 @@
+"""Stiffness and damping of joints that stick (friction.py), as large as a step can integrate.
+
+With A the mobility of a joint at the start pose, its loops closed, and N joints with friction f, by
+default
+
+    v_f = 4 N f A h,   d = 4 h v_f
+
+for steps of h: all dampers together have a pole at 1/(4 h) or slower, and a joint that sticks has a
+damping ratio of sqrt(f A d)/(2 v_f) = 1/2 for N = 1, as it has where only one of both is given and
+this is not stiffer. So friction approaches Coulomb's law with h. Given values that an explicit
+method cannot integrate are refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NoReturn
+
+import casadi as ca
+import numpy as np
+
+from hapticlink.components.component import Signals
+from hapticlink.components.dynamics.assembly import assemble
+from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.variables import parameters, start_parameters
+from hapticlink.components.forces.dry_friction import LAG
+from hapticlink.components.forces.friction import rubbing
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.linkage import Joint, Linkage, Mechanism
+
+LEAST = 1e-9  # rad/s or m/s, of a default v_f
+STABLE = 2.0  # |pole| h up to which the explicit methods are stable
+IMPLICIT = "linearly-implicit"
+
+
+def resolved(linkage: Linkage, mechanism: Mechanism, step_s: float) -> Linkage:
+    """The linkage with the default speeds and deflections of its friction for integration steps of
+    step_s (s). Raises ValueError for given ones that are too stiff for the method."""
+    rubs = rubbing(linkage)
+    if not rubs:
+        return linkage
+    found = dict(zip((j.name for j in rubs), _mobilities(linkage, rubs), strict=True))
+    joints = [
+        _scaled(j, found[j.name], len(rubs), mechanism, step_s) if j.name in found else j
+        for j in linkage.joint
+    ]
+    return replace(linkage, joint=tuple(joints))
+
+
+def _scaled(joint: Joint, A: float, N: int, mechanism: Mechanism, h: float) -> Joint:
+    """The joint with both its v_f and d."""
+    d, v_f, name = joint.friction_deflection, joint.friction_speed, f"joint `{joint.name}`"
+    pull = (joint.friction or 0.0) * A
+    least = max(4 * N * pull * h, LEAST)
+    explicit = mechanism.integrator != IMPLICIT
+    if v_f is None:
+        v_f = max(least, (pull * (d or 0.0)) ** 0.5)
+    elif explicit and pull / v_f * h > STABLE:
+        _refuse(f"{name}: `friction_speed` = {v_f!r}", pull / v_f, least, h)
+    if d is None:
+        d = max(LAG * h * v_f, v_f**2 / pull if pull else 0.0)
+    elif explicit and (pole := max((pull / d) ** 0.5, v_f / d)) * h > STABLE:
+        _refuse(f"{name}: `friction_deflection` = {d!r}", pole, LAG * h * v_f, h)
+    return replace(joint, friction_speed=v_f, friction_deflection=d)
+
+
+def _refuse(what: str, pole: float, enough: float, h: float) -> NoReturn:
+    raise ValueError(
+        f"{what} makes a pole at {pole:.3g} 1/s, too fast for steps of {h:.3g} s: leave it out, "
+        f"take {enough:.2g} or more, a higher rate, more `mechanism.substeps`, or "
+        f"`mechanism.integrator` = {IMPLICIT!r}"
+    )
+
+
+def _mobilities(linkage: Linkage, joints: list[Joint]) -> list[float]:
+    """A (1/kg or 1/(kg.m2)) of joints at the start pose."""
+    p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
+    q0, _ = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
+    q, qd = ca.SX.sym("q", q0.numel()), ca.SX.sym("qd", q0.numel())
+    model = LinkageModel(linkage, p, q, qd)
+    J = ca.SX.eye(q.numel())[[model.coordinate(j.name) for j in joints], :]
+    start = ca.Function("start", [p.vector], [q0])
+    mobility = ca.Function("mobility", [q, p.vector], [OperationalSpace(model).mobility(J)])
+    values = [value for v in p.variables for value in v.starts]
+    found = np.array(mobility(start(values), values))
+    return [max(float(a), 0.0) for a in np.diag(found)]
