@@ -9,10 +9,11 @@ from pathlib import Path
 from hapticlink.orchestrator.api.result import Run
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, Interrupted
-from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import figures, folders, summary, tables
+from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -73,19 +74,29 @@ def _in_folder(
     found = ended.results
     if not ended.outcome.published:
         return Run(None, found.run, found.tables)
-    run = folders.add(folder, (), {"warnings": list(summary.lines(found))})
-    if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
-        try:
-            (folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed
-            with (folder / "plan.txt").open("x", encoding="utf-8") as file:
-                for line in explain.explain(Plan(ended.system)):
-                    interrupt.check()
-                    file.write(f"{line}\n")
-            run = folders.add(folder, ["plan.txt", *figures.save(figures.figures(found), folder)])
-        except Interrupted:
-            message = f"interrupted: {folder} has the results of the run, not all of its figures"
-            raise Fault(message) from None
+    warnings = {"warnings": list(summary.lines(found))}
+    run = found.run | warnings
+    try:
+        run = folders.add(folder, (), warnings)
+        if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
+            run = folders.add(folder, _drawn(ended, found))
+    except Interrupted:
+        message = f"interrupted: {folder} has the results of the run, not all of its figures"
+        raise Fault(message) from None
+    except OSError as error:  # a full disk; the rows are there, and why the run ended is told
+        said = "%s has the results of the run, not all of its figures: %s"
+        logging.getLogger(__name__).warning(said, folder, error.strerror or error)
     return Run(folder, run, found.tables)
+
+
+def _drawn(ended: Experiment, found: Results) -> list[str]:
+    """Writes plan and figures; returns their names. Raises Interrupted and OSError."""
+    (ended.folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed
+    with (ended.folder / "plan.txt").open("x", encoding="utf-8") as file:
+        for line in explain.explain(Plan(ended.system)):
+            interrupt.check()
+            file.write(f"{line}\n")
+    return ["plan.txt", *figures.save(figures.figures(found), ended.folder)]
 
 
 def load(folder: str | Path) -> Run:

@@ -188,6 +188,11 @@ def _unit(unit: Any) -> Unit:
 
 
 def _require_binary(archive: zipfile.ZipFile, identifier: str, fmi: str) -> None:
+    if not identifier or Path(identifier).name != identifier or "\\" in identifier:
+        raise InputFault(
+            f"{archive.filename}: its modelIdentifier {identifier!r} is no name of a library; "
+            "FMI has it be an identifier of C"
+        )
     here = platform if fmi == "2" else platform_tuple
     wanted = f"binaries/{here}/{identifier}{sharedLibraryExtension}"
     if wanted in archive.NameToInfo:

@@ -218,3 +218,19 @@ def test_what_a_run_warns_of_stands_in_run_json(tmp_path: Path, kept: bool) -> N
     if kept:
         assert hl.load(tmp_path).run["warnings"] == [warning]
     assert hl.run("closed-loop", options, out=out).run["warnings"] == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")
+def test_a_disk_that_is_full_for_the_figures_keeps_the_run(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def full(*_: object) -> list[str]:
+        with open("/dev/full", "wb", buffering=0) as file:
+            file.write(b"a figure")
+        return []
+
+    monkeypatch.setattr("hapticlink.orchestrator.results.figures.save", full)
+    made = hl.run(bar, out=tmp_path)
+    assert made.fault is None
+    assert "No space left on device" in caplog.text
+    assert hl.load(tmp_path).run["end"]["reason"] == "duration"

@@ -1,6 +1,7 @@
 """Malformed FMUs and SSPs are refused with a reason and write no file."""
 
 import os
+import re
 import stat
 import zipfile
 from collections.abc import Callable
@@ -160,3 +161,11 @@ def test_malformed_ssps(tmp_path: Path, make: Callable[[Path], Path], message: s
     with pytest.raises(InputFault, match=message):
         read.tables(path)
     assert {p.name for p in tmp_path.iterdir()} <= {"system.ssp"}
+
+
+@pytest.mark.parametrize("outside", ["/tmp/x", "../x", "a/b", "a\\b", ""])
+def test_a_library_outside_of_the_archive_is_not_looked_for(tmp_path: Path, outside: str) -> None:
+    text = re.sub(r'modelIdentifier="[^"]*"', f'modelIdentifier="{outside}"', DESCRIPTION)
+    entry = f"binaries/linux64/{outside}.so"
+    with pytest.raises(InputFault, match=r"is no name of a library"):
+        describe(fmu(tmp_path / "x.fmu", text, **{entry: ""}))
