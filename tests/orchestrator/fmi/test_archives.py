@@ -165,6 +165,8 @@ def test_malformed_ssps(tmp_path: Path, make: Callable[[Path], Path], message: s
 
 @pytest.mark.parametrize("outside", ["/tmp/x", "../x", "a/b", "a\\b", ""])
 def test_a_library_outside_of_the_archive_is_not_looked_for(tmp_path: Path, outside: str) -> None:
-    text = re.sub(r'modelIdentifier="[^"]*"', f'modelIdentifier="{outside}"', DESCRIPTION)
+    identifier = re.search(r'modelIdentifier="[^"]*"', DESCRIPTION)
+    assert identifier
+    text = DESCRIPTION.replace(identifier[0], f'modelIdentifier="{outside}"')
     with pytest.raises(InputFault, match=r"is no name of a library"):
         describe(fmu(tmp_path / "x.fmu", text))
