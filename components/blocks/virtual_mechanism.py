@@ -235,9 +235,10 @@ def _touching(
     if not found:
         return None
     touching = AllOneSidedForces(found)
-    felt = space.terms.J_h @ space.response(touching.efforts())[0]
+    J_h = space.terms.J_h
+    felt = J_h @ space.response(touching.efforts())[0]
     output["F_env"] = contact_forces.equivalent_wrench(
-        space.Lambda_inv, space.open_mobility, felt, block.p["length_scale"]
+        space.Lambda_inv, space.open_mobility(J_h), felt, block.p["length_scale"]
     )
     return touching
 

@@ -145,9 +145,7 @@ def _inertias(
     ]
     if not given:
         return
-    J, D = ca.jacobian(ca.vertcat(*given), space.model.q), space.terms.inertia
-    passed = D.inward(J.T)
-    with_open_loops = passed.T @ ca.diag(1 / (D.d + D.k)) @ passed
-    mobility = space.mobility(J)
+    J = ca.jacobian(ca.vertcat(*given), space.model.q)
+    closed, opened = space.mobility(J), space.open_mobility(J)
     for i in range(len(given)):
-        yield 1 / ca.fmax(mobility[i, i], LOCKED * with_open_loops[i, i])
+        yield 1 / ca.fmax(closed[i, i], LOCKED * opened[i, i])

@@ -111,7 +111,7 @@ def constrained_directions(
     steps from q to q1."""
     p, before, q = block.p, block.x["n_constrained"], space.model.q
     S = scaling(p["length_scale"])
-    least = locked(space.open_mobility, p["length_scale"])
+    least = locked(space.open_mobility(space.terms.J_h), p["length_scale"])
     scaled = ca.Function(
         "scaled", [q, block.u.vector, p.vector], [S @ space.Lambda_inv @ S, least], {"cse": True}
     )

@@ -1,14 +1,15 @@
 """Stiffness and damping of joints that stick (friction.py), as large as a step can integrate.
 
-With A the mobility of a joint at the start pose, its loops closed, and N joints with friction f, by
-default
+With A the mobility of a joint at the start pose, with its loops closed but at least a quarter of
+that with open loops, since it may be small there (at a dead centre), and N joints with friction f,
+by default
 
     v_f = 4 N f A h,   d = 4 h v_f
 
 for steps of h: all dampers together have a pole at 1/(4 h) or slower, and a joint that sticks has a
 damping ratio of sqrt(f A d)/(2 v_f) = 1/2 for N = 1, as it has where only one of both is given and
 this is not stiffer. So friction approaches Coulomb's law with h. Given values that an explicit
-method cannot integrate are refused.
+method cannot integrate at the start pose are refused.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Joint, Linkage, Mechanism
 
 LEAST = 1e-9  # rad/s or m/s, of a default v_f
+OPENED = 0.25  # share of the mobility with open loops
 STABLE = 2.0  # |pole| h up to which the explicit methods are stable
 IMPLICIT = "linearly-implicit"
 
@@ -40,28 +42,36 @@ def resolved(linkage: Linkage, mechanism: Mechanism, step_s: float) -> Linkage:
     if not rubs:
         return linkage
     found = dict(zip((j.name for j in rubs), _mobilities(linkage, rubs), strict=True))
-    joints = [
-        _scaled(j, found[j.name], len(rubs), mechanism, step_s) if j.name in found else j
-        for j in linkage.joint
-    ]
+    joints = []
+    for j in linkage.joint:
+        if j.name in found:
+            closed, opened = found[j.name]
+            if mechanism.integrator != IMPLICIT:
+                _require_slow(j, closed, step_s)
+            j = _scaled(j, max(closed, OPENED * opened), len(rubs), step_s)
+        joints.append(j)
     return replace(linkage, joint=tuple(joints))
 
 
-def _scaled(joint: Joint, A: float, N: int, mechanism: Mechanism, h: float) -> Joint:
-    """The joint with both its v_f and d."""
-    d, v_f, name = joint.friction_deflection, joint.friction_speed, f"joint `{joint.name}`"
-    pull = (joint.friction or 0.0) * A
-    least = max(4 * N * pull * h, LEAST)
-    explicit = mechanism.integrator != IMPLICIT
+def _scaled(joint: Joint, A: float, N: int, h: float) -> Joint:
+    """The joint with both its v_f and d; if f is 0, which may be tuned, those for f = 1."""
+    d, v_f, pull = joint.friction_deflection, joint.friction_speed, (joint.friction or 1.0) * A
     if v_f is None:
-        v_f = max(least, (pull * (d or 0.0)) ** 0.5)
-    elif explicit and pull / v_f * h > STABLE:
-        _refuse(f"{name}: `friction_speed` = {v_f!r}", pull / v_f, least, h)
+        v_f = max(4 * N * pull * h, LEAST)
+        v_f = v_f if d is None else max(min(v_f, d / h), (pull * d) ** 0.5)
     if d is None:
         d = max(LAG * h * v_f, v_f**2 / pull if pull else 0.0)
-    elif explicit and (pole := max((pull / d) ** 0.5, v_f / d)) * h > STABLE:
-        _refuse(f"{name}: `friction_deflection` = {d!r}", pole, LAG * h * v_f, h)
     return replace(joint, friction_speed=v_f, friction_deflection=d)
+
+
+def _require_slow(joint: Joint, A: float, h: float) -> None:
+    pull, d, v_f = (joint.friction or 0.0) * A, joint.friction_deflection, joint.friction_speed
+    name = f"joint `{joint.name}`"
+    if v_f and pull / v_f * h > STABLE:
+        _refuse(f"{name}: `friction_speed` = {v_f!r}", pull / v_f, 4 * pull * h, h)
+    if d and (pole := max((pull / d) ** 0.5, (v_f or 0.0) / d)) * h > STABLE:
+        enough = LAG * h * max(v_f or 0.0, pull * h)
+        _refuse(f"{name}: `friction_deflection` = {d!r}", pole, enough, h)
 
 
 def _refuse(what: str, pole: float, enough: float, h: float) -> NoReturn:
@@ -72,15 +82,17 @@ def _refuse(what: str, pole: float, enough: float, h: float) -> NoReturn:
     )
 
 
-def _mobilities(linkage: Linkage, joints: list[Joint]) -> list[float]:
-    """A (1/kg or 1/(kg.m2)) of joints at the start pose."""
+def _mobilities(linkage: Linkage, joints: list[Joint]) -> list[tuple[float, float]]:
+    """Mobilities (1/kg or 1/(kg.m2)) of joints at the start pose, with closed and open loops."""
     p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
     q0, _ = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
     q, qd = ca.SX.sym("q", q0.numel()), ca.SX.sym("qd", q0.numel())
     model = LinkageModel(linkage, p, q, qd)
     J = ca.SX.eye(q.numel())[[model.coordinate(j.name) for j in joints], :]
     start = ca.Function("start", [p.vector], [q0])
-    mobility = ca.Function("mobility", [q, p.vector], [OperationalSpace(model).mobility(J)])
+    space = OperationalSpace(model)
+    both = [ca.diag(space.mobility(J)), ca.diag(space.open_mobility(J))]
+    mobilities = ca.Function("mobilities", [q, p.vector], both)
     values = [value for v in p.variables for value in v.starts]
-    found = np.array(mobility(start(values), values))
-    return [max(float(a), 0.0) for a in np.diag(found)]
+    closed, opened = (np.array(m).ravel() for m in mobilities(start(values), values))
+    return [(max(float(c), 0.0), float(o)) for c, o in zip(closed, opened, strict=True)]

@@ -63,11 +63,11 @@ class OperationalSpace:
         """Lambda^-1, 3 x 3 and symmetric; 1/kg, 1/(kg.m), 1/(kg.m2)."""
         return self.mobility(self.terms.J_h)
 
-    @cached_property
-    def open_mobility(self) -> ca.SX:
-        """J_h D^-1 J_h' (3 x 3) of the linkage with open loops, light bodies with added inertia."""
+    def open_mobility(self, J: ca.SX) -> ca.SX:
+        """The mobility J D^-1 J' (k x k) of the linkage with open loops, light bodies with added
+        inertia."""
         inertia = self.terms.inertia
-        passed = inertia.inward(self.terms.J_h.T)
+        passed = inertia.inward(J.T)
         return passed.T @ ca.diag(1 / (inertia.d + inertia.k)) @ passed
 
     @cached_property

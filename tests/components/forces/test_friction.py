@@ -164,6 +164,29 @@ def test_defaults_suit_the_step(step_s):
     assert steps(thrown, 100 * step_s, 1 / step_s).state["q"][0] == pytest.approx(rest, abs=1e-9)
 
 
+def test_a_start_at_a_dead_centre_says_nothing_about_the_joint():
+    """The piston of `slider-crank` does not move there: friction in it stops the crank all the
+    same, and takes f times its way."""
+    linkage = open_scene.load("slider-crank").linkage
+    piston = next(j for j in linkage.joint if j.name == "cylinder")
+    rubbing = replace(piston, friction=5.0, damping=None)
+    joints = [
+        rubbing if j is piston else replace(j, drive=None, damping=None) for j in linkage.joint
+    ]
+    start = {"crank": 0.0, "big_end": 0.0, "cylinder": 0.2}
+    thrown = running(
+        replace(linkage, joint=tuple(joints), start=start, start_velocity={"crank": 60.0})
+    )
+    index = [j.name for j in joints].index("cylinder")
+    energy, way, before = thrown.y["energy"], 0.0, thrown.state["q"][index]
+    for _ in range(250):
+        thrown.step(5e-4)
+        way, before = way + abs(thrown.state["q"][index] - before), thrown.state["q"][index]
+    assert thrown.y["energy"] == pytest.approx(energy - 5.0 * way, rel=1e-3)
+    steps(thrown, 5.0)
+    assert np.abs(thrown.state["qd"]).max() < 1e-9
+
+
 @pytest.mark.parametrize(
     ("key", "value"), [("friction_speed", 1e-3), ("friction_deflection", 1e-7)]
 )
