@@ -11,6 +11,7 @@ step. The start pose is assembled in initialisation mode.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import casadi as ca
@@ -77,8 +78,8 @@ def virtual_mechanism(
 
     step_s (s), the communication step size, sets the default Baumgarte alpha; length_scale (m) is L
     where `directions` does not give it. Raises AssemblyError where a loop does not close,
-    MasslessError where a massless body is free to move, ValueError for an unknown method and for a
-    formulation that does not fit the other settings.
+    MasslessError where a massless body is free to move, ValueError for an unknown method, for a
+    formulation that does not fit the other settings and for friction that is too stiff.
     """
     independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
     linkage = friction_scale.resolved(linkage, mechanism, step_s / mechanism.substeps)
@@ -115,14 +116,7 @@ def virtual_mechanism(
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
-    further = {name: ca.SX(*block.x[name].shape) for name in DEFLECTIONS if name in block.x}
-    if DEFLECTIONS[0] in further:
-        settled = starting_friction.start(space, applied + pushed, q0, qd0, block.t)
-        others = [name for name in further if name != DEFLECTIONS[0]]
-        symbols = ca.vertcat(tabled, *(block.x[name] for name in others))
-        known = [time_tables.at(tables, ca.SX(0)), *(further[name] for name in others)]
-        further[DEFLECTIONS[0]] = ca.substitute(settled, symbols, ca.densify(ca.vertcat(*known)))
-    initial |= further
+    initial |= _deflections(block, space, applied + pushed, initial, tables)
     after, n = _step(block, model, mechanism, applied, touching, space, tables), model.q.numel()
     q1, qd1 = after[:n], after[n : 2 * n]
     if k := model.deflection.numel():
@@ -213,6 +207,25 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
         parameters += direction_parameters(directions)
         outputs += [mobility_output(), *direction_outputs()]
     return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
+
+
+def _deflections(
+    block: Block,
+    space: OperationalSpace,
+    Q: ca.SX,
+    start: Mapping[str, ca.SX],
+    tables: list[TimeTable],
+) -> dict[str, ca.SX]:
+    """The deflections of friction at the start pose and rates: contacts have none."""
+    joints, contacts = DEFLECTIONS
+    found = {name: ca.SX(*block.x[name].shape) for name in DEFLECTIONS if name in block.x}
+    if joints in found:
+        z = starting_friction.start(space, Q, start["q"], start["qd"], block.t)
+        none = block.x.get(contacts, ca.SX(0, 1))
+        symbols = ca.vertcat(space.model.tabled, none)
+        known = ca.vertcat(time_tables.at(tables, ca.SX(0)), ca.SX(*none.shape))
+        found[joints] = ca.substitute(z, symbols, ca.densify(known))
+    return found
 
 
 def _touching(
