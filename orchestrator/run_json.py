@@ -150,6 +150,7 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
         "isolated": outcome.isolated,
         "held_outputs": outcome.held,
         "smaller_steps": outcome.smaller_steps,
+        "in_python": outcome.in_python,
         "timings": {
             "build": built,
             "run": outcome.wall_time,

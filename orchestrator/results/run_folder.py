@@ -29,11 +29,14 @@ class RunFolder:
 
     A context manager that records how the run ended in run.json even when an exception or a second
     signal, which ends the process at once, breaks it off. `published`: the folder has the results
-    of this run.
+    of this run. at_once: whether each row has to be written before the FMUs are called again, since
+    one of them may crash or hang.
     """
 
-    def __init__(self, folder: Path, story: dict[str, Any] | None = None) -> None:
-        self.folder, self.published = folder, False
+    def __init__(
+        self, folder: Path, story: dict[str, Any] | None = None, at_once: bool = False
+    ) -> None:
+        self.folder, self.published, self._at_once = folder, False, at_once
         self._story = story
         self._recorders: list[Recorder] = []
 
@@ -50,8 +53,14 @@ class RunFolder:
     def recorder(self, clock: str, columns: Sequence[str], view: Vector) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
         path = self.folder / f"{clock}.csv"
-        self._recorders.append(Recorder(path, columns, view, self._publish))
-        return self._recorders[-1]
+        made = Recorder(path, columns, view, self._publish, self._at_once)
+        self._recorders.append(made)
+        return made
+
+    def flush(self) -> None:
+        """Write the rows of all clocks that are pending. Raises OSError, as on a full disk."""
+        for recorder in self._recorders:
+            recorder.flush()
 
     @property
     def last(self) -> float:
