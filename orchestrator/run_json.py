@@ -154,6 +154,7 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
         "timings": {
             "build": built,
             "run": outcome.wall_time,
+            "tables": outcome.table_time,
             "steps": outcome.step_time,
         },
         "iterations": outcome.iterations and asdict(outcome.iterations),

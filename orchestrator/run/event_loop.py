@@ -28,6 +28,8 @@ from hapticlink.orchestrator.run.step_control import Steps
 from hapticlink.orchestrator.system.haptic_loop import WORKSPACE
 
 Progress = Callable[[float], None]
+KEPT = 0.02
+"""Time (s) for which rows are kept in memory."""
 
 
 @dataclass
@@ -35,8 +37,8 @@ class Outcome:
     """How a run ended.
 
     end_time: time of the last row (s). fault: None for a regular end. asked: the FMU that requested
-    the end, and how. published: whether the folder has rows of this run. wall_time, step_time: s,
-    the latter by FMU. calls: counts by FMU and call. isolated: why an FMU ran in a process of its
+    the end, and how. published: whether the folder has rows of this run. wall_time, table_time,
+    step_time (s): of the loop, of writing its tables as CSV, of doStep by FMU. calls: counts by FMU and call. isolated: why an FMU ran in a process of its
     own. held: how often outputs of an FMU were held since they were not finite. smaller_steps:
     number of steps repeated with smaller ones. in_python: the operations that were carried out in
     Python rather than in C, "everything" if there was no compiled loop, with the reason.
@@ -48,6 +50,7 @@ class Outcome:
     asked: str = ""
     published: bool = False
     wall_time: float = 0.0
+    table_time: float = 0.0
     step_time: dict[str, float] = field(default_factory=dict)
     calls: dict[str, dict[str, int]] = field(default_factory=dict)
     isolated: dict[str, str] = field(default_factory=dict)
@@ -76,19 +79,25 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
             simulation = Simulation(plan.system, results, stack)
             loop = _loop(plan, simulation)
             simulation.start()
-            begin = perf_counter()
+            begin = flushed = perf_counter()
 
             def turn(tick: int) -> None:
+                nonlocal flushed
                 time = plan.system.timeline.seconds(tick)
                 interrupt.check(time)
-                if progress:
-                    progress(time)
+                if perf_counter() - flushed > KEPT:
+                    results.flush()
+                    flushed = perf_counter()
+                    if progress:
+                        progress(time)
 
             try:
                 loop.run(turn)
             finally:
                 results.flush()
                 outcome.wall_time = perf_counter() - begin
+                results.finish()
+                outcome.table_time = perf_counter() - begin - outcome.wall_time
     except Stop:
         outcome.reason = "stop_when"
     except AsksToEnd as end:

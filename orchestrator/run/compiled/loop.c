@@ -290,11 +290,11 @@ static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
 }
 
 static int record(const Loop *l, Table *t, int64_t tick) {
-    if (t->rows == t->room) return FULL;
-    double *row = t->block + t->rows * (1 + t->n);
+    if (*t->rows == t->room) return FULL;
+    double *row = t->block + *t->rows * (1 + t->n);
     row[0] = seconds(l, tick);
     memcpy(row + 1, t->view, t->n * sizeof *row);
-    t->rows++;
+    ++*t->rows;
     return 0;
 }
 

@@ -123,7 +123,7 @@ typedef struct {
 typedef struct {
     double *block;                        /* (room, 1 + n): time and values */
     const double *view;
-    int64_t n, rows, room;
+    int64_t *rows, n, room;               /* rows: those that are filled */
 } Table;
 
 /* --- the plan --------------------------------------------------------------------------------- */

@@ -28,14 +28,11 @@ from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.bonds import Reader
 from hapticlink.orchestrator.run.energy.meter import Meter
 from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
-from hapticlink.orchestrator.run.signals import Vector
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 
 EXACT = 2**53
 """Up to here every whole number is a double, and the quotient of two is rounded once."""
-ROOM = 1 << 16
-"""Bytes of a table's rows that are kept until they are written."""
 PATIENCE = 20_000_000
 """ns after which Python gets a turn: signals, progress."""
 
@@ -231,21 +228,11 @@ class Machine:
         recorder = self._simulation.recorders[clock]
 
         def make(at: int) -> object:
-            c, n = self._tables[at], len(recorder.view)
-            block = np.zeros((max(ROOM // (8 + 8 * n), 1), 1 + n))
-            c.block, c.room, c.view, c.n = (
-                block.ctypes.data,
-                len(block),
-                recorder.view.ctypes.data,
-                n,
-            )
-
-            def taken() -> Vector:
-                rows, c.rows = c.rows, 0
-                return block[:rows]
-
-            recorder.pending = taken
-            return block
+            c = self._tables[at]
+            c.block, c.room = recorder.block.ctypes.data, len(recorder.block)
+            c.view, c.n = recorder.view.ctypes.data, len(recorder.view)
+            c.rows = ctypes.addressof(recorder.count)
+            return recorder
 
         return self._index("table", clock, make)
 

@@ -90,7 +90,7 @@ class Meter(ctypes.Structure):
 
 
 class Table(ctypes.Structure):
-    _fields_ = (*_all(_POINTER, "block view"), *_all(_INT, "n rows room"))
+    _fields_ = (*_all(_POINTER, "block view rows"), *_all(_INT, "n room"))
 
 
 class Op(ctypes.Structure):
