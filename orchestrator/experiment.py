@@ -88,8 +88,9 @@ def _simulated(
         build_time = perf_counter() - begin
         story = _story(read, plan)
         alone = isolated(system.fmus)
-        risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
-        with RunFolder(folders.ensure(folder), story) as results:
+        foreign = [fmu.name for fmu in read.fmu if fmu.path]
+        risky = any(name not in alone for name in foreign)
+        with RunFolder(folders.ensure(folder), story, at_once=bool(foreign)) as results:
             with crash_monitor.watched(folder) if risky else nullcontext():
                 outcome = run(plan, results, progress)
             ending = _ending(system, outcome, build_time)

@@ -150,9 +150,11 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
         "isolated": outcome.isolated,
         "held_outputs": outcome.held,
         "smaller_steps": outcome.smaller_steps,
+        "in_python": outcome.in_python,
         "timings": {
             "build": built,
             "run": outcome.wall_time,
+            "tables": outcome.table_time,
             "steps": outcome.step_time,
         },
         "iterations": outcome.iterations and asdict(outcome.iterations),

@@ -19,7 +19,7 @@ class Bounds:
 
     def __init__(self, description: Description, outputs: NDArray[np.float64]) -> None:
         self._scalars, self._outputs = description.outputs, outputs
-        self._inverse, self._shares = np.zeros(len(outputs)), np.zeros(len(outputs))
+        self.inverse, self._shares = np.zeros(len(outputs)), np.zeros(len(outputs))
 
     def start(self) -> None:
         """Sets the bounds from the start values. Integers have the bounds of their types; a Real
@@ -31,18 +31,18 @@ class Bounds:
                 bounds[i] = scalar.bound
             elif scalar.unit is None or scalar.type not in ("Real", "Float64", "Float32"):
                 bounds[i] = np.inf
-        self._inverse[:] = 1.0 / bounds
+        self.inverse[:] = 1.0 / bounds
 
     def kept(self) -> bool:
         """Whether all outputs are certainly finite and within their bounds: one pass over the
         vector, since this is asked at every read."""
-        np.multiply(self._outputs, self._inverse, out=self._shares)
+        np.multiply(self._outputs, self.inverse, out=self._shares)
         return bool(self._shares.dot(self._shares) <= 1.0)  # not where one is NaN or infinite
 
     def first_beyond(self) -> tuple[Scalar, float, float] | None:
         """(output, value, bound) of the first output beyond its bound, None if there is none."""
         for scalar, value, inverse in zip(
-            self._scalars, self._outputs.tolist(), self._inverse.tolist(), strict=True
+            self._scalars, self._outputs.tolist(), self.inverse.tolist(), strict=True
         ):
             if abs(value) * inverse > 1.0:
                 return scalar, value, 1.0 / inverse

@@ -22,16 +22,17 @@ from fmpy import extract, fmi2
 
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi import messages
+from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 from hapticlink.orchestrator.fmi.python_exit import release_at_exit
 from hapticlink.orchestrator.fmi.retry import Retry, Saved
+from hapticlink.orchestrator.fmi.setter import Places, Setter
 from hapticlink.orchestrator.fmi.slave_module import require_slave_module
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
 from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
-from hapticlink.orchestrator.fmi.units import SAME
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -39,23 +40,24 @@ WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 
 
 class InProcess(Instance):
-    """An FMU of FMI 2.0 whose library is loaded into this process."""
+    """An FMU of FMI 2.0 whose library is loaded into this process. `slave`, `gets` and `retry` are
+    for the compiled loop."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self._retry: Retry | None = None
+        self.retry: Retry | None = None
         self._saved: dict[int, Saved] = {}
         self._saved_time: dict[int, float] = {}
         self._initialized = False
         self._status = 0
-        self._slave: Any = None
+        self.slave: Any = None
         self._key = messages.opened()
 
     def _load(self) -> None:
         before = os.getcwd()
         try:
             extract(str(self.description.path), self._folder)
-            self._slave = self._instantiate()
+            self.slave = self._instantiate()
         except Exception as error:  # FMPy raises bare Exception
             said = str(error)
             if said.startswith("Failed to instantiate"):
@@ -63,11 +65,16 @@ class InProcess(Instance):
             raise self._fault(f"could not be loaded: {said}", 0.0) from error
         finally:
             os.chdir(before)  # FMPy leaves it changed where a library cannot be loaded
-        self._gets = self._transfers("Get", self.description.outputs, self.outputs)
-        self._advance = self._stepper()
+        self.gets = self._transfers("Get", self.description.outputs, self.outputs)
+        do_step = self._stepper()
+
+        def advance(time: float, size: float) -> int:
+            return self._settled(do_step(time, size), time)
+
+        self._advance: Callable[[float, float], int] = advance
         if self.policy.discard == "retry" and Retry.possible(self.description):
-            self._retry = Retry(self._slave, self.description.fmi, self._advance)
-            self._advance = self._retry.step
+            self.retry = Retry(self.slave, self.description.fmi, advance)
+            self._advance = self.retry.step
 
     def _instantiate(self) -> Any:
         slave = fmi2.FMU2Slave(
@@ -83,25 +90,29 @@ class InProcess(Instance):
 
     def _stepper(self) -> Callable[[float, float], int]:
         """(time, size) -> status of a doStep."""
-        do_step, component = self._slave.dll["fmi2DoStep"], self._slave.component
+        do_step, component = self.slave.dll["fmi2DoStep"], self.slave.component
         do_step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
-        # noSetFMUStatePriorToCurrentPoint: whoever can go back may be asked to.
-        forward = int("canGetAndSetFMUstate" not in self.description.flags)
-        ended = ended_in_discard(self._slave)
+        self._ended = ended_in_discard(self.slave)
+        forward = int(self.forward)
+        return lambda time, size: do_step(component, time, size, forward)
 
-        def advance(time: float, size: float) -> int:
-            status: int = do_step(component, time, size, forward)
-            if status == DISCARD and (end := ended(time)) is not None:
-                self._end(end)
-                return 0
-            return status
+    @property
+    def forward(self) -> bool:
+        """noSetFMUStatePriorToCurrentPoint: whoever can go back may be asked to."""
+        return not restores_state(self.description)
 
-        return advance
+    def _settled(self, status: int, time: float) -> int:
+        """The status of a step from `time` (s) that returned `status`: ok where the FMU requests
+        the end of the simulation by it."""
+        if status == DISCARD and (end := self._ended(time)) is not None:
+            self._end(end)
+            return 0
+        return status
 
     def _end(self, end: float) -> None:
         """The FMU requests the end of the simulation at `end` (s). Raises AsksToEnd if that lies
         within its step."""
-        time, size = self._stepping
+        time, size = self.place.begin, self.place.size
         if end < time + (1 - SHARE) * size:
             what = f"asks to end the simulation at {end:.6g} s, within its step"
             raise AsksToEnd(self.name, what, time, passing=True)
@@ -114,59 +125,53 @@ class InProcess(Instance):
         values: Vector,
         exact: Mapping[str, int] = MappingProxyType({}),
     ) -> list[Transfer]:
-        return transfers(self._slave, self.description.fmi, verb, scalars, values, exact)
+        return transfers(self.slave, self.description.fmi, verb, scalars, values, exact)
 
     # --- initialisation -------------------------------------------------------------------
 
-    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
+    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Setter:
         return self._connected(scalars, places, {})
 
     def _connected(
         self, scalars: Sequence[Scalar], places: Sequence[int], exact: Mapping[str, int]
-    ) -> Callable[[Vector], None]:
+    ) -> Setter:
         """As `connect`; exact: integers, by name, to be set instead of the values."""
         order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
-        where = np.array([places[i] for i in order], dtype=np.intp)
-        conversions = [scalars[i].conversion for i in order]
-        plain = all(c == SAME for c in conversions)
-        factors = np.array([c.factor for c in conversions])
-        offsets = np.array([c.offset for c in conversions])
-        values, setting = self._setting([scalars[i] for i in order], exact)
+        where, conversions = [places[i] for i in order], [scalars[i].conversion for i in order]
+        setting = self._setting([scalars[i] for i in order], exact)
+        return Setter(where, conversions, *setting, self._set_all)
 
-        def set_from(board: Vector) -> None:
-            if self.ended:
-                return
-            board.take(where, out=values, mode="clip")  # "raise" would copy through a buffer
-            if not plain:
-                values.__imul__(factors).__iadd__(offsets)
-            try:
-                for call, name in setting:
-                    if (status := call()) > WARNING:
-                        raise self._failed(name, status)
-            except Unfit as why:
-                raise self._fault(str(why), self.time, repeatable=True) from None
+    def _set_all(self, transfers: Sequence[Transfer]) -> None:
+        if not self.ended:
+            self._carry_out(transfers)
 
-        return set_from
+    def _carry_out(self, transfers: Sequence[Transfer], passing: bool = False) -> None:
+        try:
+            for transfer in transfers:
+                if (status := transfer.call()) > WARNING:
+                    raise self.failed(transfer.name, status)
+        except Unfit as why:
+            raise self._fault(str(why), self.time, passing, repeatable=True) from None
 
     def connect_derivatives(
         self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
     ) -> Callable[[Vector], None]:
-        varying = Varying(self._slave, scalars, orders, places)
-        if self._retry:
-            self._retry.renew = varying.renew
+        varying = Varying(self.slave, scalars, orders, places)
+        if self.retry:
+            self.retry.renew = varying.renew
 
         def set_from(board: Vector) -> None:
             if not self.ended and (status := varying.set(board)) > WARNING:
-                raise self._failed(varying.name, status)
+                raise self.failed(varying.name, status)
 
         return set_from
 
     def _setting(
         self, scalars: Sequence[Scalar], exact: Mapping[str, int]
-    ) -> tuple[Vector, list[tuple[Callable[[], int], str]]]:
-        """An array of values of `scalars`, and the calls, with their names, that set them."""
+    ) -> tuple[Vector, Places | None, list[Transfer]]:
+        """`whole`, `into` and `transfers` of a Setter of `scalars`."""
         values = np.zeros(len(scalars))
-        return values, [(t.call, t.name) for t in self._transfers("Set", scalars, values, exact)]
+        return values, None, self._transfers("Set", scalars, values, exact)
 
     def _set_starts(self) -> None:
         self._set_numbers(tuple(row for row in self.starts if not row[0].structural))
@@ -197,62 +202,72 @@ class InProcess(Instance):
 
     def _call(self, name: str, *arguments: Any) -> None:
         try:
-            getattr(self._slave, name)(self._slave.component, *arguments)
+            getattr(self.slave, name)(self.slave.component, *arguments)
         except Exception as error:
-            raise self._failed(name, getattr(error, "status", ERROR)) from error
+            raise self.failed(name, getattr(error, "status", ERROR)) from error
 
     # --- the loop -------------------------------------------------------------------------
 
     def read(self) -> None:
-        try:
-            for transfer in self._gets:
-                if (status := transfer.call()) > WARNING:
-                    raise self._failed(transfer.name, status)
-        except Unfit as why:
-            raise self._fault(str(why), self.time, passing=True, repeatable=True) from None
+        self._carry_out(self.gets, passing=True)
 
     @property
     def smaller_steps(self) -> int:
-        return self._retry.smaller if self._retry else 0
+        return self.retry.smaller if self.retry else 0
 
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
-        return derivatives(self._slave, self.description, outputs, inputs)
+        return derivatives(self.slave, self.description, outputs, inputs)
 
     def step(self, time: float, end: float, size: float) -> None:
-        self.time, self._stepping = time, (time, size)
-        if self.ended:
+        place = self.place
+        place.time = place.begin = time
+        place.size, place.end = size, end
+        if place.ended:
             raise AsksToEnd(self.name, "has asked to end the simulation", time)
         begin = clock.perf_counter()
         status = self._advance(time, size)
-        self.step_time += clock.perf_counter() - begin
+        place.step_time += clock.perf_counter() - begin
+        self.stepped(status)
+
+    def stepped(self, status: int) -> None:
+        """Ends a step that returned `status`."""
         if status > WARNING:
             do_step = f"fmi{self.description.fmi}DoStep"
-            raise self._failed(do_step, status, passing=status in (DISCARD, ERROR))
-        self.time = end
+            raise self.failed(do_step, status, passing=status in (DISCARD, ERROR))
+        self.time = self.place.end
+
+    def after_step(self, status: int) -> None:
+        """Ends a step whose doStep, called by the compiled loop, returned `status`."""
+        begin, size = self.place.begin, self.place.size
+        status = self._settled(status, begin)
+        if self.retry:
+            self.retry.begin = begin
+            status = self.retry.after(status, begin, size)
+        self.stepped(status)
 
     def finish(self) -> None:
         """Nothing to wait for: `step` returns after doStep."""
 
     def save(self, slot: int = 0) -> None:
         if slot not in self._saved:
-            self._saved[slot] = Saved(self._slave, self.description.fmi)
+            self._saved[slot] = Saved(self.slave, self.description.fmi)
         if (status := self._saved[slot].save()) > WARNING:
-            raise self._failed(f"fmi{self.description.fmi}GetFMUstate", status)
+            raise self.failed(f"fmi{self.description.fmi}GetFMUstate", status)
         self._saved_time[slot] = self.time
 
     def rollback(self, slot: int = 0) -> None:
         if (status := self._saved[slot].restore()) > WARNING:
-            raise self._failed(f"fmi{self.description.fmi}SetFMUstate", status)
+            raise self.failed(f"fmi{self.description.fmi}SetFMUstate", status)
         self.time = self._saved_time[slot]
         self._status, self.ended = 0, False
 
     # --- ends -----------------------------------------------------------------------------
 
-    def _failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
+    def failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
         self._status = max(self._status, status)
         named = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
         if status == DISCARD and self.policy.discard == "retry":
-            why = "in steps of 1/1024 too" if self._retry else Retry.why_not(self.description)
+            why = "in steps of 1/1024 too" if self.retry else Retry.why_not(self.description)
             named += f" ({why})"
         what = f"{call} returned {named}"
         return self._fault(what, self.time, passing, repeatable=status == DISCARD)
@@ -265,18 +280,18 @@ class InProcess(Instance):
 
     def close(self) -> FmuFault | None:
         """After fmi2Fatal the FMU is not called again."""
-        slave, self._slave = self._slave, None
+        slave, self.slave = self.slave, None
         fault = None
         try:
             if slave is not None and self._status < FATAL:
-                if self._retry is not None:
-                    self._retry.free()
+                if self.retry is not None:
+                    self.retry.free()
                 for saved in self._saved.values():
                     saved.free()
                 if self._status < ERROR and self._initialized:
                     terminate = f"fmi{self.description.fmi}Terminate"
                     status = slave.dll[terminate](ctypes.c_void_p(slave.component))
-                    fault = self._failed(terminate, status) if status > WARNING else None
+                    fault = self.failed(terminate, status) if status > WARNING else None
                 if self._status < FATAL:
                     slave.freeInstance()
             return fault

@@ -16,8 +16,10 @@ from hapticlink.orchestrator.fmi.in_process import WARNING, InProcess
 from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.python_exit import release_at_exit
+from hapticlink.orchestrator.fmi.setter import Places
 from hapticlink.orchestrator.fmi.slave_module import require_slave_module
 from hapticlink.orchestrator.fmi.start_values import wide
+from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 
@@ -41,26 +43,27 @@ class InProcess3(InProcess):
         return slave
 
     def _stepper(self) -> Callable[[float, float], int]:
-        do_step, component = self._slave.dll["fmi3DoStep"], self._slave.component
-        event, end, early = (ctypes.c_bool() for _ in range(3))
-        told = [ctypes.byref(flag) for flag in (event, end, early)]
-        reached = ctypes.c_double()
-        last = ctypes.byref(reached)
-        forward = ctypes.c_bool("canGetAndSetFMUState" not in self.description.flags)
-        instance = ctypes.c_void_p(component)
+        do_step, component = self.slave.dll["fmi3DoStep"], self.slave.component
+        self.told = [ctypes.c_bool() for _ in range(3)]  # event, terminate, early return
+        self.reached = ctypes.c_double()
+        told, last = [ctypes.byref(flag) for flag in self.told], ctypes.byref(self.reached)
+        forward, instance = ctypes.c_bool(self.forward), ctypes.c_void_p(component)
 
         def advance(time: float, size: float) -> int:
             at, over = ctypes.c_double(time), ctypes.c_double(size)
             status: int = do_step(instance, at, over, forward, *told, last)
-            if end and status <= WARNING:
-                self._end(reached.value)
             return status
 
         return advance
 
+    def _settled(self, status: int, time: float) -> int:
+        if self.told[1] and status <= WARNING:
+            self._end(self.reached.value)
+        return status
+
     def _setting(
         self, scalars: Sequence[Scalar], exact: Mapping[str, int]
-    ) -> tuple[Vector, list[tuple[Callable[[], int], str]]]:
+    ) -> tuple[Vector, Places | None, list[Transfer]]:
         """Arrays are set as a whole: entries that are not connected keep their start values. Raises
         FmuFault if such an entry has none, because its array was resized."""
         references = {s.reference for s in scalars}
@@ -70,20 +73,13 @@ class InProcess3(InProcess):
         into = np.array([place[s.name] for s in scalars], dtype=np.intp)
         known = {s.name: float(v) for s, v in self.starts if not isinstance(v, str)}
         everything = np.array([known.get(s.name, s.start) for s in whole])
-        values = np.zeros(len(scalars))
         kept = set(place) - {s.name for s in scalars}
         for name in kept:
             if np.isnan(everything[place[name]]):
                 what = f"{name} has no start value in an array of this size; give start.{name}"
                 raise self._fault(what, 0.0)
         exact = {n: v for n, v in wide(self.starts).items() if n in kept} | dict(exact)
-        calls = [(t.call, t.name) for t in self._transfers("Set", whole, everything, exact)]
-
-        def spread() -> int:
-            everything[into] = values
-            return 0
-
-        return values, [(spread, "set"), *calls]
+        return everything, into, self._transfers("Set", whole, everything, exact)
 
     def _set_text(self, scalar: Scalar, text: str) -> None:
         reference = (ctypes.c_uint * 1)(scalar.reference)

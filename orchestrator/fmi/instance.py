@@ -16,6 +16,7 @@ from hapticlink.orchestrator.fmi.bounds import Bounds
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.fault_policy import Faults
+from hapticlink.orchestrator.fmi.place import Place
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:  # a worker process need not load what reads scenes
@@ -29,13 +30,9 @@ class Instance(ABC):
     FmuFault if the FMU fails while it is closed and nothing else has failed.
 
     outputs: the view that `get` fills. held: number of outputs held at their last value by
-    `faults.nan`. ended: the FMU has requested the end of the simulation; it is only read after
-    that.
+    `faults.nan`. good: the last finite outputs, None unless these are held. place: where the
+    instance stands.
     """
-
-    ended = False
-    time = 0.0
-    """Where the instance stands (s), for messages."""
 
     def __init__(
         self,
@@ -48,9 +45,9 @@ class Instance(ABC):
     ) -> None:
         self.name, self.description, self.outputs = name, description, outputs
         self.starts, self.policy, self.held = starts, policy or Faults(), 0
-        self._good: Vector | None = None
-        self.step_time = 0.0
-        self._bounds = Bounds(description, outputs)
+        self.good: Vector | None = None
+        self.place = Place()
+        self.bounds = Bounds(description, outputs)
         self._folder = folder or temporary_folders.new()
 
     def __enter__(self) -> Instance:
@@ -65,6 +62,37 @@ class Instance(ABC):
         fault = self.close()
         if fault and not isinstance(error, Fault | KeyboardInterrupt):
             raise fault
+
+    # --- where it stands ------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Where the instance stands (s), for messages."""
+        found: float = self.place.time
+        return found
+
+    @time.setter
+    def time(self, time: float) -> None:
+        self.place.time = time
+
+    @property
+    def ended(self) -> bool:
+        """Whether the FMU has requested the end of the simulation; it is only read after that."""
+        return bool(self.place.ended)
+
+    @ended.setter
+    def ended(self, ended: bool) -> None:
+        self.place.ended = ended
+
+    @property
+    def step_time(self) -> float:
+        """Time spent in doStep (s)."""
+        found: float = self.place.step_time
+        return found
+
+    @step_time.setter
+    def step_time(self, seconds: float) -> None:
+        self.place.step_time = seconds
 
     # --- what each kind does in its way, every call of which may raise FmuFault -----------
 
@@ -142,24 +170,27 @@ class Instance(ABC):
         """Read all outputs. Raises FmuFault for the first that is not finite, unless `faults.nan`
         holds its last value, and Diverged for the first beyond its bound."""
         self.read()
-        if not self._bounds.kept():
-            self._judge()
-        if self._good is not None:
-            self._good[:] = self.outputs
+        if not self.bounds.kept():
+            self.judge()
+        elif self.good is not None:
+            self.good[:] = self.outputs
 
-    def _judge(self) -> None:
-        if self._good is None:
+    def judge(self) -> None:
+        """What `get` does with outputs that are not all finite and within their bounds."""
+        if self.good is None:
             self.require_finite()
         else:
             lost = ~np.isfinite(self.outputs)
-            self.outputs[lost] = self._good[lost]
+            self.outputs[lost] = self.good[lost]
             self.held += int(lost.sum())
-        if beyond := self._bounds.first_beyond():
+        if beyond := self.bounds.first_beyond():
             scalar, value, bound = beyond
             what = f"output {scalar.name} is {value:.3g}, beyond {bound:.3g}: the run has diverged"
             remedy = "take a higher rate, a finer integrator, or weaker gains"
             said = f"{what} ({remedy})"
             raise Diverged(self.name, said, self.time, passing=True, repeatable=True)
+        if self.good is not None:
+            self.good[:] = self.outputs
 
     def require_finite(self) -> None:
         """Raises FmuFault naming the first output that is not finite."""
@@ -170,9 +201,9 @@ class Instance(ABC):
 
     def _start_loop(self) -> None:
         """Take the start values of the outputs as reference for their bounds."""
-        self._bounds.start()
+        self.bounds.start()
         if self.policy.nan == "hold":
-            self._good = self.outputs.copy()
+            self.good = self.outputs.copy()
 
     def _fault(
         self, what: str, time: float, passing: bool = False, repeatable: bool = False

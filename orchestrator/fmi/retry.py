@@ -22,29 +22,30 @@ class Saved:
 
     def __init__(self, slave: Any, fmi: str) -> None:
         state = "state" if fmi == "2" else "State"
-        self._instance, self._state = ctypes.c_void_p(slave.component), ctypes.c_void_p()
+        self._instance, self.state = ctypes.c_void_p(slave.component), ctypes.c_void_p()
         calls = (slave.dll[f"fmi{fmi}{verb}FMU{state}"] for verb in ("Get", "Set", "Free"))
-        self._get, self._set, self._free = calls
+        self.get, self._set, self._free = calls
 
     def save(self) -> int:
-        return self._get(self._instance, ctypes.byref(self._state))
+        return self.get(self._instance, ctypes.byref(self.state))
 
     def restore(self) -> int:
-        return self._set(self._instance, self._state)
+        return self._set(self._instance, self.state)
 
     def free(self) -> None:
-        if self._state:
-            self._free(self._instance, ctypes.byref(self._state))
+        if self.state:
+            self._free(self._instance, ctypes.byref(self.state))
 
 
 class Retry:
     """Takes steps with the state before each saved. smaller: number of steps taken in halves.
-    renew: sets varying inputs for a time (s) after the beginning of the step."""
+    begin: of the step (s). saved: the states by depth of halving. renew: sets varying inputs for a
+    time (s) after the beginning of the step."""
 
     def __init__(self, slave: Any, fmi: str, advance: Callable[[float, float], int]) -> None:
-        self._advance, self.smaller, self._begin = advance, 0, 0.0
+        self._advance, self.smaller, self.begin = advance, 0, 0.0
         self.renew: Callable[[float], int] = lambda elapsed: 0
-        self._saved = [Saved(slave, fmi) for _ in range(HALVINGS + 1)]
+        self.saved = [Saved(slave, fmi) for _ in range(HALVINGS + 1)]
 
     @staticmethod
     def possible(description: Description) -> bool:
@@ -61,24 +62,27 @@ class Retry:
     def step(self, time: float, size: float, depth: int = 0) -> int:
         """Status of a step from `time` over `size` (s), in up to 2^10 parts; inputs stay, or go on
         as they vary."""
-        saved = self._saved[depth]
+        saved = self.saved[depth]
         if depth == 0:
-            self._begin = time
+            self.begin = time
         if (status := saved.save()) > WARNING:
             return status
-        status = self._advance(time, size)
+        return self.after(self._advance(time, size), time, size, depth)
+
+    def after(self, status: int, time: float, size: float, depth: int = 0) -> int:
+        """Status of a step that returned `status`: taken again in halves if it was discarded."""
         if status != DISCARD or depth == HALVINGS:
             return status
         self.smaller += depth == 0
-        if (status := saved.restore()) > WARNING:
+        if (status := self.saved[depth].restore()) > WARNING:
             return status
         half = size / 2
         if (status := self.step(time, half, depth + 1)) > WARNING:
             return status
-        if (status := self.renew(time + half - self._begin)) > WARNING:
+        if (status := self.renew(time + half - self.begin)) > WARNING:
             return status
         return self.step(time + half, half, depth + 1)
 
     def free(self) -> None:
-        for saved in self._saved:
+        for saved in self.saved:
             saved.free()

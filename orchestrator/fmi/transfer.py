@@ -32,7 +32,9 @@ class Transfer:
     """The scalars of one FMI type within a vector, and the C call that moves them.
 
     Entries of an FMI 3.0 array are transferred together, so they have to be adjacent and complete.
-    exact: integers, by name, to set instead of the values, which are doubles.
+    exact: integers, by name, to set instead of the values, which are doubles. function, component
+    and references are the arguments of the call, `buffer` its values as the FMU has them: `values`
+    themselves where these are doubles.
     """
 
     def __init__(
@@ -47,30 +49,33 @@ class Transfer:
     ) -> None:
         chosen = [i for i, s in enumerate(scalars) if s.type == type_]
         self.name = f"fmi{fmi}{verb}{type_}"
-        self._values = values[chosen[0] : chosen[-1] + 1]
+        self.values = values[chosen[0] : chosen[-1] + 1]
+        self.type, self.fmi = type_, fmi
         in_c = _IN_C.get(type_) or _BOOLEAN[fmi]
         self._boolean, self._whole = type_ == "Boolean", np.issubdtype(in_c, np.integer)
         if self._whole:
             self._limits = np.iinfo(in_c)
             self._named = f"{type_} holds {self._limits.min} to {self._limits.max}"
             self._names = [scalars[i].name for i in chosen]
-        self._exact = [
+        self.exact = [
             (k, exact[scalars[i].name])
             for k, i in enumerate(chosen)
             if type_ in WIDE and scalars[i].name in exact
         ]
         self._wide = type_ in WIDE
         direct = in_c is np.float64
-        self._buffer: Any = self._values if direct else np.zeros(len(chosen), in_c)
+        self.buffer: Any = self.values if direct else np.zeros(len(chosen), in_c)
         references = [scalars[i].reference for i in chosen if scalars[i].entry == 0]
         count = [ctypes.c_size_t(len(chosen))] * (fmi == "3")
+        self.function, self.component = slave.dll[self.name], slave.component
+        self.references = (ctypes.c_uint * len(references))(*references)
         # Argument objects and pointers are made once; a fresh function has no other types set.
         self._transfer: Callable[[], int] = partial(
-            slave.dll[self.name],
+            self.function,
             ctypes.c_void_p(slave.component),
-            (ctypes.c_uint * len(references))(*references),
+            self.references,
             ctypes.c_size_t(len(references)),
-            ctypes.c_void_p(self._buffer.ctypes.data),
+            ctypes.c_void_p(self.buffer.ctypes.data),
             *count,
         )
         through = {"Get": self._get, "Set": self._set}[verb]
@@ -79,35 +84,35 @@ class Transfer:
     def _get(self) -> int:
         """Raises Unfit for an integer that is not exactly representable as a double."""
         status = self._transfer()
-        self._values[:] = self._buffer
+        self.values[:] = self.buffer
         if self._wide:
-            for name, whole, value in zip(self._names, self._buffer, self._values, strict=True):
+            for name, whole, value in zip(self._names, self.buffer, self.values, strict=True):
                 if int(whole) != int(value):
                     what = "which signals and results, of double precision, cannot hold"
                     raise Unfit(f"{name} is {int(whole)}, {what}")
         return status
 
     def _set(self) -> int:
-        for k, _ in self._exact:
-            self._values[k] = 0.0
+        for k, _ in self.exact:
+            self.values[k] = 0.0
         if self._boolean:
-            self._buffer[:] = self._values >= 0.5
+            self.buffer[:] = self.values >= 0.5
         else:
-            self._buffer[:] = self._rounded() if self._whole else self._values
-        for k, whole in self._exact:
+            self.buffer[:] = self._rounded() if self._whole else self.values
+        for k, whole in self.exact:
             if not self._limits.min <= whole <= self._limits.max:
                 raise Unfit(f"{self._names[k]} cannot be {whole}: {self._named}")
-            self._buffer[k] = whole
+            self.buffer[k] = whole
         return self._transfer()
 
     def _rounded(self) -> Vector:
         """The nearest integers. Raises Unfit for values beyond the range of the type."""
-        rounded, limits = np.rint(self._values), self._limits
+        rounded, limits = np.rint(self.values), self._limits
         # max + 1 is a power of two, so it is exact where max is not.
         fits = (rounded >= limits.min) & (rounded < float(limits.max + 1))
         if not fits.all():
             i = int(np.argmin(fits))
-            value = float(self._values[i])
+            value = float(self.values[i])
             raise Unfit(f"{self._names[i]} cannot be {value!r}: {self._named}")
         return rounded
 

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.holds.restorable import Restorable
+
 Vector = NDArray[np.float64]
 
 
-class EnergyTank:
+class EnergyTank(Restorable):
     """Available energy of one spring-damper, shared by the holds of its set position (row 0) and
     set velocity (row 1).
 
@@ -29,8 +31,8 @@ class EnergyTank:
         period: float,
         seconds: Callable[[float], float],
     ) -> None:
-        self._stiffness, self._damping = stiffness, damping
-        self._position, self._period, self._seconds = position, period, seconds
+        self.stiffness, self.damping = stiffness, damping
+        self.position, self.period, self._seconds = position, period, seconds
         self.newest = np.zeros((2, len(stiffness)))
         self._modulated = self.newest.copy()
         self._x = np.zeros(len(stiffness))
@@ -45,19 +47,20 @@ class EnergyTank:
         """Set position and set velocity (2, n) that apply from `tick` on; repeated calls at one
         tick return the same values."""
         if tick > self._tick:
-            x = self._position().copy()
+            x = self.position().copy()
             position, velocity = self.newest
             error = position - x
-            stored = float(self._stiffness @ error**2) / 2
+            stored = _sum(self.stiffness * (error * error)) / 2
             if self._tick < 0:
                 self.available = stored
             else:
                 self._update(x, self._seconds(tick - self._tick))
-            needed = stored + self._period / 4 * float(self._damping @ velocity**2)
-            if needed <= self.available:
+            needed = stored + self.period / 4 * _sum(self.damping * (velocity * velocity))
+            left = max(self.available, 0.0)
+            if needed <= left:
                 self._modulated[:] = self.newest
             else:
-                share = math.sqrt(max(self.available, 0.0) / needed)
+                share = math.sqrt(left / needed)
                 self._modulated[0], self._modulated[1] = x + share * error, share * velocity
             self._tick, self._x = tick, x
         return self._modulated
@@ -67,6 +70,14 @@ class EnergyTank:
         position, velocity = self._modulated
         moved = x - self._x
         # V(x) - V(x_k) without the difference of two squares.
-        spring = float((self._stiffness * moved) @ (self._x + moved / 2 - position))
-        damper = float((self._damping * moved) @ (moved / seconds - velocity))
+        spring = _sum(self.stiffness * moved * (self._x + moved / 2 - position))
+        damper = _sum(self.damping * moved * (moved / seconds - velocity))
         self.available += spring + damper
+
+
+def _sum(terms: Vector) -> float:
+    """The sum from the first to the last, each rounded; `sum` and NumPy have ways of their own."""
+    total = 0.0
+    for term in terms.tolist():
+        total += term
+    return total

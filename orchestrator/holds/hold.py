@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.restorable import Restorable
 
 Vector = NDArray[np.float64]
 
@@ -16,7 +17,7 @@ Vector = NDArray[np.float64]
 Needs = Literal["derivative", "power", "spring"]
 
 
-class Hold(ABC):
+class Hold(Restorable, ABC):
     """Gives the value of an input between two samples of its source. Times are in ticks.
 
     At t = 0 a hold receives the source's initial output, stamped 0, before its value is read, also

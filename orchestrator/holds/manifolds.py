@@ -74,16 +74,16 @@ class Unwrapped(Hold):
     def __init__(
         self, make: Callable[[], Hold], angles: Sequence[int], turn: Sequence[float]
     ) -> None:
-        self._hold, self._angles, self._turn = make(), list(angles), np.array(turn)
+        self.hold, self.angles, self.turn = make(), list(angles), np.array(turn)
         self._last: Vector | None = None
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         sample = sample.copy()
         if self._last is not None:
-            turns = np.round((self._last - sample[self._angles]) / self._turn)
-            sample[self._angles] += self._turn * turns
-        self._last = sample[self._angles]
-        self._hold.push(stamp, sample, arrival)
+            turns = np.round((self._last - sample[self.angles]) / self.turn)
+            sample[self.angles] += self.turn * turns
+        self._last = sample[self.angles]
+        self.hold.push(stamp, sample, arrival)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        return self._hold.value(tick, ahead)
+        return self.hold.value(tick, ahead)

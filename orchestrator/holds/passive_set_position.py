@@ -41,10 +41,10 @@ class PassiveSetPosition(Hold):
 
     def __init__(self, context: HoldContext) -> None:
         assert context.tank is not None
-        self._tank, self._row = context.tank
+        self.tank, self.row = context.tank
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        self._tank.newest[self._row] = sample
+        self.tank.newest[self.row] = sample
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        return self._tank.modulated(tick)[self._row]
+        return self.tank.modulated(tick)[self.row]

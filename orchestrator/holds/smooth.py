@@ -49,7 +49,7 @@ class Smooth(Hold):
         r = (time - self._arrival) / period
         if r >= 1.0:
             return newest + rise * (r - 1.0), rise / period
-        start, slope, falling = self._from, self._slope * period, (1.0 - r) ** 2
+        start, slope, falling = self._from, self._slope * period, (1.0 - r) * (1.0 - r)
         curve = start * ((1 + 2 * r) * falling) + slope * (r * falling)
         curve += newest * (r * r * (3 - 2 * r)) + rise * (r * r * (r - 1))
         tangent = (newest - start) * (6 * r * (1 - r)) + slope * ((1 - r) * (1 - 3 * r))

@@ -71,13 +71,13 @@ class Ages:
 
 
 MOST = 100_000
-"""Number of events that are processed before a run if their pattern does not repeat."""
+"""Number of events that are processed without a run if their pattern does not repeat."""
 
 
-def delays(plan: Plan) -> dict[str, Delay]:
-    """The delay of each connection by name, without a run."""
+def delays(plan: Plan, events: int = MOST) -> dict[str, Delay]:
+    """The delay of each connection by name over the first `events`, without a run."""
     ages = Ages(plan)
-    for tick, event in islice(plan, MOST):
+    for tick, event in islice(plan, events):
         if not ages.event(tick, event):
             break
     return ages.delays()

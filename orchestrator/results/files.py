@@ -1,7 +1,8 @@
-"""Writes result files: the rows of a clock as CSV, and JSON atomically."""
+"""Writes result files: the rows of a clock, and JSON atomically."""
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -9,29 +10,41 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import to_json
+import numpy as np
 
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.results import rows
 from hapticlink.orchestrator.results.tables import Vector
+
+ROOM = 1 << 16
+"""Bytes of the rows that are kept in memory."""
 
 
 class Recorder:
-    """Writes one CSV: `time` and the values of a view, as the shortest text that reads back to the
-    same float. A context manager.
+    """Writes a table: `time` and the values of a view. A context manager.
 
-    Each row has been passed to the operating system when `row` returns, so that a crash loses none;
-    buffering would save no time, which is spent on formatting. `last` is the time (s) of the last
-    complete row, None before the first. `first` is called after the first row and has to call
-    `publish`, which moves the file to its place.
+    at_once: each row is text in the CSV, and has been passed to the operating system, when `row`
+    returns. Otherwise rows are kept in `block`, of which `count` are filled, and go to a file of
+    doubles beside it (`rows`), of which `finish` makes the CSV: a crash loses those in the block.
+
+    `last` is the time (s) of the last complete row on the disk, None before the first. `first` is
+    called after the first and has to call `publish`, which moves the file to its place, `target`.
     """
 
     def __init__(
-        self, path: Path, columns: Sequence[str], view: Vector, first: Callable[[], object]
+        self,
+        path: Path,
+        columns: Sequence[str],
+        view: Vector,
+        first: Callable[[], object],
+        at_once: bool = False,
     ) -> None:
-        self.path, self._view, self._first = path, view, first
+        self.path, self.view, self._first, self.at_once = path, view, first, at_once
+        self.block = np.zeros((max(ROOM // (8 + view.nbytes), 1), 1 + len(view)))
+        self.count = ctypes.c_int64()
+        self.target = path if at_once else path.with_suffix(rows.SUFFIX)
         self.last: float | None = None
-        self._unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-        self._unfinished.unlink(missing_ok=True)
+        self._unfinished = self._beside(self.target)
         self._file = self._unfinished.open("xb", buffering=0)  # never through a link
         try:
             self._write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
@@ -41,24 +54,63 @@ class Recorder:
 
     def row(self, time: float) -> None:
         """Write a row at `time` (s). Raises OSError, as on a full disk."""
-        # pydantic's JSON writes floats ten times faster than repr, and round-trips too.
-        text = to_json([time, *self._view.tolist()], inf_nan_mode="constants")
-        self._write(text[1:-1] + b"\n")
-        before, self.last = self.last, time
+        row = self.block[self.count.value]
+        row[0], row[1:] = time, self.view
+        self.count.value += 1
+        if self.at_once or self.count.value == len(self.block):
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the rows of the block: all, or as many as the disk has room for, raising OSError."""
+        kept, self.count.value = self.block[: self.count.value], 0
+        if not len(kept):
+            return
+        try:
+            self._append(kept)
+        except OSError:
+            for i in range(len(kept)):
+                self._append(kept[i : i + 1])
+
+    def _append(self, kept: Vector) -> None:
+        self._write(rows.text(kept) if self.at_once else kept.tobytes())
+        before, self.last = self.last, float(kept[-1, 0])
         if before is None:
             self._first()
 
     def publish(self) -> None:
         """Replace the file of an earlier run by this one."""
         self._file.close()  # Windows moves no open file
-        os.replace(self._unfinished, self.path)
-        self._file = self.path.open("ab", buffering=0)
+        os.replace(self._unfinished, self.target)
+        self._file = self.target.open("ab", buffering=0)
 
-    def _write(self, text: bytes) -> None:
-        """Write all of `text`; or nothing, raising OSError, where the disk is full."""
+    def finish(self) -> None:
+        """Make the CSV of the rows, and remove these. Raises OSError, as on a full disk, and keeps
+        the rows."""
+        if self.at_once or self.last is None:
+            return
+        self._file.close()
+        made = self._beside(self.path)
+        try:
+            with made.open("xb") as file:
+                rows.write_csv(self.target, file)
+            os.replace(made, self.path)
+        except OSError:
+            made.unlink(missing_ok=True)
+            raise
+        self.target.unlink()
+
+    @staticmethod
+    def _beside(path: Path) -> Path:
+        """The name of an unfinished file, which is not there."""
+        unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+        unfinished.unlink(missing_ok=True)
+        return unfinished
+
+    def _write(self, content: bytes) -> None:
+        """Write all of `content`; or nothing, raising OSError, where the disk is full."""
         whole = self._file.tell()
         try:
-            left = memoryview(text)
+            left = memoryview(content)
             while left:
                 left = left[self._file.write(left) :]
         except OSError:

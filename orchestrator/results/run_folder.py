@@ -7,7 +7,6 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Interrupted
+from hapticlink.orchestrator.results import rows
 from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
 from hapticlink.orchestrator.results.tables import Vector
 
@@ -29,11 +29,14 @@ class RunFolder:
 
     A context manager that records how the run ended in run.json even when an exception or a second
     signal, which ends the process at once, breaks it off. `published`: the folder has the results
-    of this run.
+    of this run. at_once: whether each row has to be written before the FMUs are called again, since
+    one of them may crash or hang.
     """
 
-    def __init__(self, folder: Path, story: dict[str, Any] | None = None) -> None:
-        self.folder, self.published = folder, False
+    def __init__(
+        self, folder: Path, story: dict[str, Any] | None = None, at_once: bool = False
+    ) -> None:
+        self.folder, self.published, self._at_once = folder, False, at_once
         self._story = story
         self._recorders: list[Recorder] = []
 
@@ -47,11 +50,26 @@ class RunFolder:
             with suppress(OSError):
                 self._broken_off("fault", error)
 
-    def recorder(self, clock: str, columns: Sequence[str], view: Vector) -> Recorder:
+    def recorder(
+        self, clock: str, columns: Sequence[str], view: Vector, at_once: bool = False
+    ) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
         path = self.folder / f"{clock}.csv"
-        self._recorders.append(Recorder(path, columns, view, self._publish))
-        return self._recorders[-1]
+        made = Recorder(path, columns, view, self._publish, at_once or self._at_once)
+        self._recorders.append(made)
+        return made
+
+    def flush(self) -> None:
+        """Write the rows of all clocks that are kept in memory. Raises OSError, as on a full
+        disk."""
+        for recorder in self._recorders:
+            recorder.flush()
+
+    def finish(self) -> None:
+        """Make the CSV of all clocks. Raises OSError, as on a full disk; the rows can be read
+        nevertheless."""
+        for recorder in self._recorders:
+            recorder.finish()
 
     @property
     def last(self) -> float:
@@ -69,7 +87,7 @@ class RunFolder:
             write_json(self.folder / RUN, self._story | {"end": end}, ROOM)
         for recorder in self._recorders:
             recorder.publish()
-        for name in earlier - {RUN, *(recorder.path.name for recorder in self._recorders)}:
+        for name in earlier - {RUN, *(recorder.target.name for recorder in self._recorders)}:
             (self.folder / name).unlink(missing_ok=True)
         self.published = True
 
@@ -79,7 +97,7 @@ class RunFolder:
         OSError if the disk is full."""
         if not self.published and not _has_rows(self.folder):
             for clock, names in columns.items():
-                with self.recorder(clock, names, np.zeros(0)) as empty:
+                with self.recorder(clock, names, np.zeros(0), at_once=True) as empty:
                     empty.publish()
             self.published = True
         if self.published and self._story is not None:
@@ -108,19 +126,22 @@ class RunFolder:
 
 
 def _has_rows(folder: Path) -> bool:
-    """Whether an earlier run in `folder` has a row, a line after the header of a table."""
+    """Whether an earlier run in `folder` has a row behind the header of a table."""
     for name in _listed(folder):
-        if name.endswith(".csv"):
+        if name.endswith((".csv", rows.SUFFIX)):
             with suppress(OSError), (folder / name).open("rb") as file:
-                if len(list(islice(file, 2))) == 2:
+                if file.readline() and file.read(1):
                     return True
     return False
 
 
 def _listed(folder: Path) -> set[str]:
-    """The files that the run.json of an earlier run lists, without paths outside of `folder`."""
+    """The files that the run.json of an earlier run lists, without paths outside of `folder`, and
+    the rows that a run leaves that was killed."""
     try:
         names = json.loads((folder / RUN).read_text(encoding="utf-8")).get("files", ())
-        return {n for n in names if isinstance(n, str) and n != ".." and Path(n).name == n}
+        found = {n for n in names if isinstance(n, str) and n != ".." and Path(n).name == n}
     except (OSError, ValueError, AttributeError, TypeError):
         return set()
+    left = {Path(n).with_suffix(rows.SUFFIX).name for n in found if n.endswith(".csv")}
+    return found | {n for n in left if (folder / n).exists()}

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
+from hapticlink.orchestrator.results import rows
 
 Vector = NDArray[np.float64]
 
@@ -104,7 +105,13 @@ class Results:
 
 def size(folder: Path, run: Mapping[str, Any]) -> int:
     """Bytes of a run's tables."""
-    return sum((folder / f"{name}.csv").stat().st_size for name in run["rates"])
+    return sum(_place(folder / f"{name}.csv").stat().st_size for name in run["rates"])
+
+
+def _place(path: Path) -> Path:
+    """Where a table is: a CSV, or what it is made of where the run was killed."""
+    left = path.with_suffix(rows.SUFFIX)
+    return left if left.exists() and not path.exists() else path
 
 
 def load(folder: Path | str) -> Results:
@@ -122,12 +129,15 @@ def load(folder: Path | str) -> Results:
 
 
 def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
-    """Reads one CSV of a run; `others` are the run's other tables."""
+    """Reads one CSV of a run, or its rows where the run was killed; `others` are the run's other
+    tables."""
     import csv
 
+    if (place := _place(path)) != path:
+        return Table(*rows.read(place), {} if others is None else others)
     with path.open(encoding="utf-8", newline="") as file:
         columns = tuple(next(csv.reader([file.readline()])))
         first = file.readline()
-        rows = chain([first], file)  # the text of all of them would take twice what they take
-        values = np.loadtxt(rows, delimiter=",", ndmin=2) if first else np.zeros((0, len(columns)))
+        lines = chain([first], file)  # the text of all of them would take twice what they take
+        values = np.loadtxt(lines, delimiter=",", ndmin=2) if first else np.zeros((0, len(columns)))
     return Table(columns, values, {} if others is None else others)

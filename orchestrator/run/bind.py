@@ -27,12 +27,17 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
-from hapticlink.orchestrator.run import parallel_steps
 from hapticlink.orchestrator.run.fixed_point import FixedPoint
+from hapticlink.orchestrator.run.metered import Feed, Metering, Move, Read, Sample, metered
+from hapticlink.orchestrator.run.parallel_steps import Finish, with_barriers
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.step_control import Advancer
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system import held_polynomials
+
+Bound = list[tuple["Instruction", Call]]
+Instruction = Operation | Metering | Finish
+"""An operation of a run: of its plan, of its meters, or a barrier."""
 
 
 class Stop(Exception):
@@ -44,41 +49,63 @@ class Binder:
 
     calls: returns the bound operations of a part of the plan, for step control. `loops` and
     `advancers` are the fixed-point iterations and the step controls that were bound, whose counts
-    the run reports.
+    the run reports. joined: makes one call of a sequence of instructions and their calls; without
+    it each is a call.
     """
 
-    def __init__(self, simulation: Simulation, calls: Callable[[Part], Sequence[Call]]) -> None:
-        self._simulation, self._calls = simulation, calls
-        self._isolated = {name: simulation.instances[name] for name in simulation.isolated}
+    def __init__(
+        self,
+        simulation: Simulation,
+        calls: Callable[[Part], Sequence[Call]],
+        joined: Callable[[Bound], Call] | None = None,
+    ) -> None:
+        self._simulation, self._calls, self._joined = simulation, calls, joined
         self.loops: dict[Repeat, FixedPoint] = {}
         self.advancers: dict[str, Advancer] = {}
 
-    def bind_all(
-        self, operations: Iterable[Operation], bind: Callable[[Operation], Call] | None = None
-    ) -> list[Call]:
-        """The calls of a block, each operation bound by `bind`; steps of isolated FMUs run
-        concurrently."""
-        return parallel_steps.bound(operations, bind or self.bind, self._isolated)
+    def instructions(self, operations: Iterable[Operation], judged: bool = True) -> Bound:
+        """The instructions of a block with their calls. Not `judged`, outputs need not be
+        finite."""
+        simulation = self._simulation
+        taken = metered(operations, simulation.meters, judged)
+        return [(i, self.bind(i)) for i in with_barriers(taken, simulation.isolated)]
 
-    def bind(self, operation: Operation) -> Call:
+    def bind_all(self, operations: Iterable[Operation], judged: bool = True) -> list[Call]:
+        """The calls of a block."""
+        bound = self.instructions(operations, judged)
+        return [self._joined(bound)] if self._joined else [call for _, call in bound]
+
+    def bind(self, operation: Instruction) -> Call:
         """The call that executes an operation; its argument is the tick."""
         simulation = self._simulation
         match operation:
-            case Get(fmu, ahead):
-                return simulation.meters.read(fmu, ahead, simulation.instances[fmu].get)
+            case Get(fmu):
+                get = simulation.instances[fmu].get
+                return lambda tick: get()
+            case Read(fmu):
+                read = simulation.instances[fmu].read
+                return lambda tick: read()
+            case Sample(connection, ahead):
+                sample = simulation.meters.of[connection].sample
+                return lambda tick: sample(tick + ahead)
+            case Move(connection, ahead):
+                move = simulation.meters.of[connection].move
+                return lambda tick: move(tick + ahead)
+            case Feed(connection, share):
+                hold = simulation.meters.of[connection].hold
+                return lambda tick: hold(share)
+            case Finish(fmus):
+                return self._finish(fmus)
             case Set(fmu, now, derivatives):
-                if now:
-                    return simulation.now_setters[fmu]
-                setters = simulation.varying_setters if derivatives else simulation.setters
-                return simulation.meters.fed(fmu, setters[fmu])
+                return self._set(fmu, now, derivatives)
             case Step(fmu, dticks, part, parts):
                 return self._step(fmu, dticks, part, parts)
             case Push(connection, ahead):
                 return self._push(connection, ahead)
-            case Evaluate(connection, ahead, 0):
-                return self._evaluate(connection, float(ahead))
-            case Evaluate(connection, ahead, order, width):
-                return self._derive(connection, float(ahead), order, float(width))
+            case Evaluate(connection, instant, 0):
+                return self._evaluate(connection, float(instant))
+            case Evaluate(connection, instant, order, width):
+                return self._derive(connection, float(instant), order, float(width))
             case Blend(connection, points):
                 return self._blend(connection, points)
             case Save(fmu):
@@ -97,6 +124,28 @@ class Binder:
                 return lambda tick: row(seconds(tick))
             case StopWhen():
                 return self._stop_when()
+
+    def _finish(self, fmus: Iterable[str]) -> Call:
+        instances = [self._simulation.instances[fmu] for fmu in fmus]
+
+        def finish(tick: int) -> None:
+            for instance in instances:
+                instance.finish()
+
+        return finish
+
+    def _set(self, fmu: str, now: bool, derivatives: bool) -> Call:
+        simulation, values = self._simulation, self._simulation.signals.values
+        set_from = (simulation.now_setters if now else simulation.setters)[fmu]
+        if not derivatives:
+            return lambda tick: set_from(values)
+        derive = simulation.derivative_setters[fmu]
+
+        def set_both(tick: int) -> None:
+            set_from(values)
+            derive(values)
+
+        return set_both
 
     def _step(self, fmu: str, dticks: int, part: int, parts: int) -> Call:
         """doStep over `dticks`, or over substep `part` of `parts`; outputs are stamped at its end,
@@ -191,16 +240,10 @@ class Binder:
 
     def _repeat(self, operation: Repeat) -> FixedPoint:
         """The fixed-point iteration of a Repeat, shared by all events, with its solver's state."""
-        simulation = self._simulation
         if operation in self.loops:
             return self.loops[operation]
 
-        def bind(op: Operation) -> Call:  # accepts non-finite outputs, which iterations can have
-            if isinstance(op, Get):
-                return simulation.meters.read(op.fmu, op.ahead, simulation.instances[op.fmu].read)
-            return self.bind(op)
-
-        body = self.bind_all(operation.body, bind)
+        body = self.bind_all(operation.body, judged=False)  # iterations can have non-finite outputs
         calls = (self.bind_all(operation.guess), body, self.bind_all(operation.again))
         held = [self.bind(op) for op in operation.body if isinstance(op, Blend)]
         loop = FixedPoint(operation, self._simulation, calls, held)

@@ -1,8 +1,7 @@
-"""Executes a plan: binds operations to calls once, then loops over the events."""
+"""Executes a plan, and says how the run ended."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -12,29 +11,25 @@ import numpy as np
 
 from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
-from hapticlink.orchestrator.plan.operations import (
-    Event,
-    Get,
-    Operation,
-    Part,
-    Rollback,
-    Save,
-    Set,
-    Step,
-)
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import Ages, Delay
+from hapticlink.orchestrator.plan.sample_ages import Delay, delays
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.bind import Binder, Stop
+from hapticlink.orchestrator.run.bind import Stop
+from hapticlink.orchestrator.run.compiled.library import Unavailable, load
+from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
+from hapticlink.orchestrator.run.compiled.machine import too_long
 from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.energy.meter import Energy
-from hapticlink.orchestrator.run.fixed_point import Iterations, total
-from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.run.fixed_point import Iterations
+from hapticlink.orchestrator.run.python_loop import PythonLoop
+from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.run.step_check import StepErrors
 from hapticlink.orchestrator.run.step_control import Steps
 from hapticlink.orchestrator.system.haptic_loop import WORKSPACE
 
 Progress = Callable[[float], None]
+KEPT = 0.02
+"""Time (s) for which rows are kept in memory."""
 
 
 @dataclass
@@ -42,10 +37,11 @@ class Outcome:
     """How a run ended.
 
     end_time: time of the last row (s). fault: None for a regular end. asked: the FMU that requested
-    the end, and how. published: whether the folder has rows of this run. wall_time, step_time: s,
-    the latter by FMU. calls: counts by FMU and call. isolated: why an FMU ran in a process of its
+    the end, and how. published: whether the folder has rows of this run. wall_time, table_time,
+    step_time (s): of the loop, of writing its tables as CSV, of doStep by FMU. calls: counts by FMU and call. isolated: why an FMU ran in a process of its
     own. held: how often outputs of an FMU were held since they were not finite. smaller_steps:
-    number of steps repeated with smaller ones.
+    number of steps repeated with smaller ones. in_python: the operations that were carried out in
+    Python rather than in C, "everything" if there was no compiled loop, with the reason.
     """
 
     end_time: float = 0.0
@@ -54,6 +50,7 @@ class Outcome:
     asked: str = ""
     published: bool = False
     wall_time: float = 0.0
+    table_time: float = 0.0
     step_time: dict[str, float] = field(default_factory=dict)
     calls: dict[str, dict[str, int]] = field(default_factory=dict)
     isolated: dict[str, str] = field(default_factory=dict)
@@ -65,6 +62,7 @@ class Outcome:
     iterations: Iterations | None = None
     steps: dict[str, Steps] = field(default_factory=dict)
     step_errors: dict[str, StepErrors] = field(default_factory=dict)
+    in_python: dict[str, str] = field(default_factory=dict)
 
 
 def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Outcome:
@@ -74,24 +72,32 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
     """
     outcome = Outcome()
     simulation: Simulation | None = None
-    ages, counting = Ages(plan), True
-    begin = perf_counter()
     try:
         # Non-finite values are detected by 0 x NaN, for which numpy would warn.
         with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
             interrupt.check()
             simulation = Simulation(plan.system, results, stack)
-            bound = _Bound(plan, simulation)
+            loop = _loop(plan, simulation)
             simulation.start()
-            begin = perf_counter()
-            for count, (tick, event) in enumerate(plan):
-                for call in bound.calls(event):
-                    call(tick)
-                if counting:
-                    counting = ages.event(tick, event)
-                interrupt.check(simulation.seconds(tick))
-                if progress and not count % 64:
-                    progress(simulation.seconds(tick))
+            begin = flushed = perf_counter()
+
+            def turn(tick: int) -> None:
+                nonlocal flushed
+                time = plan.system.timeline.seconds(tick)
+                interrupt.check(time)
+                if perf_counter() - flushed > KEPT:
+                    results.flush()
+                    flushed = perf_counter()
+                    if progress:
+                        progress(time)
+
+            try:
+                loop.run(turn)
+            finally:
+                results.flush()
+                outcome.wall_time = perf_counter() - begin
+                results.finish()
+                outcome.table_time = perf_counter() - begin - outcome.wall_time
     except Stop:
         outcome.reason = "stop_when"
     except AsksToEnd as end:
@@ -108,7 +114,7 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
     except KeyboardInterrupt:  # a second signal does not wait for the end of the event
         outcome.reason, outcome.fault = "interrupted", Interrupted(results.last)
     finally:
-        outcome.wall_time, outcome.published = perf_counter() - begin, results.published
+        outcome.published = results.published
         if simulation:
             outcome.end_time = results.last
             outcome.step_time = {n: i.step_time for n, i in simulation.instances.items()}
@@ -118,12 +124,13 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
             outcome.smaller_steps = {n: s for n, s in smaller.items() if s}
             outcome.energies = simulation.meters.energies()
             outcome.links = simulation.links()
-            outcome.delays = ages.delays()
-            outcome.calls = bound.counts()
-            outcome.steps = bound.steps()
-            outcome.iterations = bound.iterations()
             found = {n: check.errors() for n, check in simulation.step_checks.items()}
             outcome.step_errors = {n: errors for n, errors in found.items() if errors}
+            outcome.delays = delays(plan, loop.complete)
+            outcome.calls = loop.calls()
+            outcome.steps = loop.steps()
+            outcome.iterations = loop.iterations()
+            outcome.in_python = loop.in_python
             if outcome.fault is None and (why := _judged(outcome, simulation)):
                 outcome.reason, outcome.fault = "diverged", why
     if progress:
@@ -151,38 +158,12 @@ def _reason(fault: Fault) -> str:
     return next((reason for kind, reason in ends.items() if isinstance(fault, kind)), "fault")
 
 
-class _Bound:
-    """The calls of each kind of event, bound at its first occurrence, and its number of
-    occurrences."""
-
-    def __init__(self, plan: Plan, simulation: Simulation) -> None:
-        self._plan, self._simulation = plan, simulation
-        self._binder = Binder(simulation, self.calls)
-        self._bound: dict[Event | Part, list[Call]] = {}
-        self._events: Counter[Event | Part] = Counter()
-
-    def calls(self, event: Event | Part) -> list[Call]:
-        self._events[event] += 1
-        if (found := self._bound.get(event)) is None:
-            found = self._bound[event] = self._binder.bind_all(self._plan.block(event))
-        return found
-
-    def counts(self) -> dict[str, dict[str, int]]:
-        """Number of FMI calls by FMU and kind; blocks interrupted by a fault count in full."""
-        totals: dict[str, Counter[str]] = {name: Counter() for name in self._simulation.instances}
-        ran: list[tuple[Operation, int]] = []
-        for event, times in self._events.items():
-            ran += [(op, times) for op in self._plan.block(event)]
-        for repeat, loop in self._binder.loops.items():
-            ran += [(op, loop.counts.iterations) for op in repeat.body]
-            ran += [(op, loop.counts.rollbacks) for op in repeat.again]
-        for op, times in ran:
-            if isinstance(op, Get | Set | Step | Save | Rollback):
-                totals[op.fmu][type(op).__name__.lower()] += times
-        return {name: dict(sorted(counter.items())) for name, counter in totals.items()}
-
-    def steps(self) -> dict[str, Steps]:
-        return {clock: a.steps for clock, a in self._binder.advancers.items()}
-
-    def iterations(self) -> Iterations | None:
-        return total(loop.counts for loop in self._binder.loops.values())
+def _loop(plan: Plan, simulation: Simulation) -> PythonLoop:
+    """The compiled loop, or the one in Python where there is none."""
+    why = too_long(simulation)
+    if not why:
+        try:
+            return CompiledLoop(plan, simulation, load())
+        except Unavailable as reason:
+            why = str(reason)
+    return PythonLoop(plan, simulation, {"everything": why})

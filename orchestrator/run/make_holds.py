@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.hold import Hold, Vector
 from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.run.checked_hold import CheckedHold
-from hapticlink.orchestrator.run.energy.bonds import bond, reader
+from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.system.latency import Late, Link
@@ -21,7 +22,7 @@ from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
 
-def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], list[EnergyTank]]:
+def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], list[Restorable]]:
     """The hold of each connection by name, and the energy tanks, each shared by the holds of one
     spring-damper."""
     shared: dict[SetSpring, EnergyTank] = {}
@@ -59,22 +60,22 @@ def make_hold(
         hold = Late(hold, Link(connection.latency, system.timeline.base))
     if kind.needs == "derivative" and (slope := derivative(connection, system.fmu)):
         slopes = [signals.scalar(connection.source, s.name) for s in slope]
-        hold = _WithDerivative(hold, _reader(signals, slopes))
+        hold = WithDerivative(hold, _reader(signals, slopes))
     return hold
 
 
-class _WithDerivative(Hold):
+class WithDerivative(Hold):
     """Appends the source's derivative to each sample, so that both have the same latency."""
 
-    def __init__(self, hold: Hold, derivative: Callable[[], Vector]) -> None:
-        self._hold, self._derivative = hold, derivative
+    def __init__(self, hold: Hold, derivative: Reader) -> None:
+        self.hold, self.derivative = hold, derivative
         self.link: Link | None = getattr(hold, "link", None)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        self._hold.push(stamp, np.concatenate([sample, self._derivative()]), arrival)
+        self.hold.push(stamp, np.concatenate([sample, self.derivative()]), arrival)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        return self._hold.value(tick, ahead)
+        return self.hold.value(tick, ahead)
 
 
 def _context(
@@ -91,10 +92,10 @@ def _context(
         # scaled instead.
         entries, work, places = list(found.entries), np.zeros(size), np.zeros(size, np.intp)
         work[entries], places[entries] = found.work, found.moved
-        moved = reader(signals, places.tolist(), work)
+        moved = Reader(signals, places.tolist(), work)
         if found.moving:
             places[entries] = found.moving
-            moving = reader(signals, places.tolist(), work)
+            moving = Reader(signals, places.tolist(), work)
     if HOLDS[connection.hold or ""].needs == "spring":
         of = spring(connection, system.springs)
         assert of is not None
@@ -121,6 +122,5 @@ def _set_point(of: SetSpring, system: System, signals: SignalVector) -> EnergyTa
     )
 
 
-def _reader(signals: SignalVector, places: Sequence[int]) -> Callable[[], Vector]:
-    view = signals.view(places)
-    return (lambda: view) if view is not None else lambda: signals.values[list(places)]
+def _reader(signals: SignalVector, places: Sequence[int]) -> Reader:
+    return Reader(signals, places, np.ones(len(places)))

@@ -6,46 +6,36 @@ execution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Container, Iterable, Iterator
+from dataclasses import dataclass
 
-from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Operation, Set, Step
+from hapticlink.orchestrator.run.metered import Feed, Metering
 
-Call = Callable[[int], object]
+
+@dataclass(frozen=True)
+class Finish:
+    """Wait until the steps of isolated FMUs have been taken."""
+
+    fmus: tuple[str, ...]
 
 
-def bound(
-    operations: Iterable[Operation],
-    bind: Callable[[Operation], Call],
-    isolated: Mapping[str, Instance],
-) -> list[Call]:
-    """The calls of a block's operations, with a barrier after each group of concurrent steps."""
-    calls: list[Call] = []
+def with_barriers(
+    operations: Iterable[Operation | Metering], isolated: Container[str]
+) -> Iterator[Operation | Metering | Finish]:
+    """The operations of a block, with a barrier after each group of concurrent steps."""
     stepping: list[str] = []
-
-    def wait() -> None:
-        if stepping:
-            calls.append(_finish([isolated[n] for n in stepping]))
-            stepping.clear()
-
     for operation in operations:
         match operation:
-            case Evaluate() | Blend():
+            case Evaluate() | Blend() | Feed():
                 pass
             case Set(fmu) | Step(fmu) if fmu in isolated and fmu not in stepping:
                 pass
-            case _:
-                wait()
-        calls.append(bind(operation))
+            case _ if stepping:
+                yield Finish(tuple(stepping))
+                stepping.clear()
+        yield operation
         if isinstance(operation, Step) and operation.fmu in isolated:
             stepping.append(operation.fmu)
-    wait()
-    return calls
-
-
-def _finish(instances: list[Instance]) -> Call:
-    def finish(tick: int) -> None:
-        for instance in instances:
-            instance.finish()
-
-    return finish
+    if stepping:
+        yield Finish(tuple(stepping))

@@ -8,6 +8,8 @@ from contextlib import ExitStack
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.holds import Hold
+from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.energy.balance import Balance
@@ -15,18 +17,19 @@ from hapticlink.orchestrator.run.energy.meters import Meters
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.open_fmus import instance, isolated
-from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.signals import SignalVector, Vector
 from hapticlink.orchestrator.run.step_check import StepCheck
 from hapticlink.orchestrator.system.system import Connection, System
 
 Call = Callable[[int], object]
+Set = Callable[[Vector], object]
 
 
 class Simulation:
     """The objects of a run, which `stack` closes; rows are written to `results`.
 
-    setters, varying_setters and now_setters set the inputs of an FMU from the signals: with held
-    values, with held values and their derivatives, and with the newest outputs of the sources.
+    setters, now_setters and derivative_setters set inputs of an FMU from the signals: with held
+    values, with the newest outputs of the sources, and the derivatives of held values.
     """
 
     def __init__(self, system: System, results: RunFolder, stack: ExitStack) -> None:
@@ -47,13 +50,15 @@ class Simulation:
             for fmu in system.fmus
             if fmu.name not in self.isolated and StepCheck.possible(fmu.description)
         }
+        self.holds: dict[str, Hold]
+        self.springs: list[Restorable]
         self.holds, self.springs = make_holds(system, self.signals)
         self.meters = Meters(system, self.signals)
         self.balance = Balance(system, self.signals)
         self.recorders: dict[str, Recorder] = {}
-        self.setters: dict[str, Call] = {}
-        self.varying_setters: dict[str, Call] = {}
-        self.now_setters: dict[str, Call] = {}
+        self.setters: dict[str, Set] = {}
+        self.now_setters: dict[str, Set] = {}
+        self.derivative_setters: dict[str, Set] = {}
 
     def _dismiss(self) -> None:
         for made in self.instances.values():
@@ -76,14 +81,13 @@ class Simulation:
             connect = self.instances[fmu.name].connect
             scalars = [s for c in incoming for s in c.inputs]
             held = [p for c in incoming for p in self.signals.places(c)]
-            set_held = connect(scalars, held)
-            self.setters[fmu.name] = _from(set_held, self.signals)
+            self.setters[fmu.name] = connect(scalars, held)
             if derived := self._derived(incoming):
-                derive = self.instances[fmu.name].connect_derivatives(*derived)
-                self.varying_setters[fmu.name] = _from_both(set_held, derive, self.signals)
+                derive = self.instances[fmu.name].connect_derivatives
+                self.derivative_setters[fmu.name] = derive(*derived)
             if fmu.name in self.system.get_after_set:
                 sources = [p for c in incoming for p in self.signals.sources(c)]
-                self.now_setters[fmu.name] = _from(connect(scalars, sources), self.signals)
+                self.now_setters[fmu.name] = connect(scalars, sources)
         for clock in self.system.timeline.clocks:
             view = values[self.signals.clock(clock.name)]
             made = self._results.recorder(clock.name, self.signals.columns(clock.name), view)
@@ -114,18 +118,3 @@ class Simulation:
             for n, k in links.items()
             if k
         }
-
-
-def _from(set_from: Callable, signals: SignalVector) -> Call:
-    values = signals.values
-    return lambda tick: set_from(values)
-
-
-def _from_both(first: Callable, second: Callable, signals: SignalVector) -> Call:
-    values = signals.values
-
-    def set_both(tick: int) -> None:
-        first(values)
-        second(values)
-
-    return set_both

@@ -14,6 +14,7 @@ FMUs with a hapticlink annotation are checked: others may keep what they do not 
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -62,7 +63,7 @@ class StepCheck:
         self._ports = sorted(set(ports))
         self._port = np.array([self._ports.index(p) for p in ports], dtype=np.intp)
         self._scales = np.zeros(len(self._ports))
-        self._steps = 0
+        self.steps = ctypes.c_int64()  # which the compiled loop shares
         self._errors: list[Vector] = []
         self._times: list[float] = []
         self._size = 0.0
@@ -80,8 +81,8 @@ class StepCheck:
 
     def around(self, step: Callable[[], object], time: float, end: float) -> None:
         """Call `step`, which takes the FMU from `time` to `end` (s), and check it if it is due."""
-        self._steps += 1
-        if self._steps % EVERY != FIRST:
+        self.steps.value += 1
+        if self.steps.value % EVERY != FIRST:
             step()
             return
         instance, outputs = self._instance, self._instance.outputs

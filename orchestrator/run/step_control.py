@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -136,9 +135,8 @@ class Advancer:
     def _save(self) -> Any:
         for instance in self._instances:
             instance.save(SLOT)
-        # deepcopy leaves functions as they are, so a hold's constant context is not copied. An
-        # energy tank is shared between holds and is restored as one of `_holds`.
-        holds = [deepcopy(vars(hold)) for hold in self._holds]
+        # An energy tank is shared between holds and is restored as one of `_holds`.
+        holds = [hold.saved() for hold in self._holds]
         return self._values.copy(), holds, self._meters.checkpoint(deep=True)
 
     def _restore(self, saved: Any) -> None:
@@ -147,7 +145,7 @@ class Advancer:
             instance.rollback(SLOT)
         self._values[:] = values
         for hold, kept in zip(self._holds, holds, strict=True):
-            vars(hold).update(deepcopy(kept))
+            hold.restore(kept)
         self._meters.rollback(mark)
 
     # --- ecco -----------------------------------------------------------------------------

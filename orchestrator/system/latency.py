@@ -35,13 +35,24 @@ class Link:
         self._order, self._newest = count(), 0
         self.sent = self.lost = self.overtaken = 0
 
-    def send(self, stamp: int, item: Any = None) -> None:
+    def draw(self) -> int:
+        """The latency of the next sample (ticks), -1 if it is lost."""
         share, luck = self._draw(), self._draw()
-        self.sent += 1
         if luck < self._loss:
+            return -1
+        return math.ceil((self._low + self._spread * Fraction(share)) / self._base)
+
+    @property
+    def most(self) -> int:
+        """The longest latency (ticks)."""
+        return math.ceil((self._low + self._spread) / self._base)
+
+    def send(self, stamp: int, item: Any = None) -> None:
+        late = self.draw()
+        self.sent += 1
+        if late < 0:
             self.lost += 1
             return
-        late = math.ceil((self._low + self._spread * Fraction(share)) / self._base)
         heapq.heappush(self._in_transit, (stamp + late, stamp, next(self._order), item))
 
     def arrived(self, tick: int) -> Iterator[tuple[int, int, Any]]:
@@ -59,17 +70,17 @@ class Late(Hold):
     """A hold that receives its samples through a link."""
 
     def __init__(self, hold: Hold, link: Link) -> None:
-        self._hold, self.link = hold, link
+        self.hold, self.link = hold, link
         self._started = False
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         if self._started:
             self.link.send(stamp, sample.copy())
         else:
-            self._hold.push(stamp, sample, arrival)
+            self.hold.push(stamp, sample, arrival)
             self._started = True
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         for arrival, stamp, sample in self.link.arrived(tick):
-            self._hold.push(stamp, sample, arrival)
-        return self._hold.value(tick, ahead)
+            self.hold.push(stamp, sample, arrival)
+        return self.hold.value(tick, ahead)

@@ -8,7 +8,7 @@ use N and m, N.m and rad.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,11 +89,26 @@ def _factor(target: Description, scalar: Scalar) -> float:
     return unit.factor if unit else 1.0
 
 
-def reader(
-    signals: SignalVector, places: Sequence[int], factor: Vector, offset: Vector | float = 0.0
-) -> Callable[[], Vector]:
-    """A function that returns factor y + offset of the values y at `places`, as a new vector."""
-    values, view, where = signals.values, signals.view(places), np.array(places, dtype=np.intp)
-    if np.any(factor != 1.0) or np.any(offset != 0.0):
-        return lambda: factor * values[where] + offset
-    return (lambda: values[where]) if view is None else view.copy
+class Reader:
+    """Reads factor y + offset of the values y at `places`, as a new vector. factor and offset are
+    None where all are 1 and 0."""
+
+    def __init__(
+        self,
+        signals: SignalVector,
+        places: Sequence[int],
+        factor: Vector,
+        offset: Vector | float = 0.0,
+    ) -> None:
+        self._values, self._view = signals.values, signals.view(places)
+        self.where = np.array(places, dtype=np.intp)
+        self.factor: Vector | None = None
+        self.offset: Vector | None = None
+        if np.any(factor != 1.0) or np.any(offset != 0.0):
+            self.factor = np.array(factor, dtype=np.float64)
+            self.offset = np.full(len(self.where), offset, dtype=np.float64)
+
+    def __call__(self) -> Vector:
+        if self.factor is not None and self.offset is not None:
+            return self.factor * self._values[self.where] + self.offset
+        return self._values[self.where] if self._view is None else self._view.copy()

@@ -14,18 +14,18 @@ changes over the substeps of a step counts with its mean.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 Read = Callable[[], Vector]
+Rows = TypeVar("Rows", NDArray[np.float64], NDArray[np.int64])
 ROWS = 1024
-"""Steps of the target that are kept before they are added to the sums."""
+"""Rows of the target's steps that are kept before they are added to the sums."""
 Mark = tuple[int, int, int]
 
 
@@ -59,75 +59,86 @@ class Meter:
     source and held read the effort at the source and as the target gets it, x the displacement with
     the sign of the power, each into a new vector; `sample`, `hold` and `move` call them. Old rows
     are added to sums from time to time.
+
+    stamps and samples are of the source, ticks, moves and efforts of the target's steps, `full` the
+    number of these that are kept; counts: of stamps, ticks and efforts. The compiled loop writes
+    rows, too; `changed` is called when the arrays have been replaced.
     """
 
     def __init__(self, source: Read, held: Read, x: Read) -> None:
-        self._source, self._held, self._x = source, held, x
-        self._stamps: list[int] = []
-        self._samples: list[Vector] = []
-        self._ticks: list[int] = []
-        self._moves: list[Vector] = []
-        self._efforts: list[Vector] = []
+        self.source, self.held, self.x = source, held, x
+        self.changed: Callable[[], object] = lambda: None
+        n = len(source())
+        self.counts = np.zeros(3, np.int64)
+        self.stamps: NDArray[np.int64] = np.zeros(ROWS, np.int64)
+        self.ticks: NDArray[np.int64] = np.zeros(ROWS, np.int64)
+        self.samples, self.moves = np.zeros((ROWS, n)), np.zeros((ROWS, n))
+        self.efforts = np.zeros((ROWS, n))
         self._work = self._ideal = self._peak = 0.0
-        self._full = ROWS
+        self.full = ROWS
 
     def sample(self, stamp: int) -> None:
         """Record the source's new sample, stamped `stamp`."""
-        if self._stamps and self._stamps[-1] == stamp:
-            self._samples[-1] = self._source()
+        n = self.counts[0]
+        if n and self.stamps[n - 1] == stamp:
+            self.samples[n - 1] = self.source()
             return
-        self._stamps.append(stamp)
-        self._samples.append(self._source())
+        if n == len(self.stamps):
+            self.stamps, self.samples = _grown(self.stamps, 2 * n), _grown(self.samples, 2 * n)
+            self.changed()
+        self.stamps[n], self.samples[n] = stamp, self.source()
+        self.counts[0] = n + 1
 
     def move(self, tick: int) -> None:
         """Record the target's displacement at `tick`."""
-        if self._ticks and self._ticks[-1] == tick:
+        n = self.counts[1]
+        if n and self.ticks[n - 1] == tick:
             return
-        if len(self._ticks) >= self._full:
+        if n >= self.full:
             self._fold()
-        self._ticks.append(tick)
-        self._moves.append(self._x())
+            n = self.counts[1]
+        self.ticks[n], self.moves[n] = tick, self.x()
+        self.counts[1] = n + 1
 
     def hold(self, share: float) -> None:
         """Record the effort that the target holds over a fraction `share` of its step."""
-        effort = self._held() if share == 1.0 else self._held() * share
-        if len(self._efforts) < len(self._moves):
-            self._efforts.append(effort)
+        effort = self.held() if share == 1.0 else self.held() * share
+        _, moves, n = self.counts
+        if n < moves:
+            self.efforts[n] = effort
+            self.counts[2] = n + 1
         else:
-            self._efforts[-1] += effort
+            self.efforts[n - 1] += effort
 
     def checkpoint(self, rows: int) -> Mark:
         """Checkpoint for `rollback`, valid for up to `rows` further rows."""
-        if len(self._ticks) + rows >= self._full:
+        if self.counts[1] + rows >= self.full:
             self._fold()
-        return len(self._stamps), len(self._ticks), len(self._efforts)
+        stamps, ticks, efforts = self.counts.tolist()
+        return stamps, ticks, efforts
 
     def rollback(self, mark: Mark) -> None:
         """Remove what was recorded since the checkpoint `mark`."""
-        stamps, ticks, efforts = mark
-        del self._stamps[stamps:], self._samples[stamps:]
-        del self._ticks[ticks:], self._moves[ticks:], self._efforts[efforts:]
+        self.counts[:] = np.minimum(self.counts, mark)
 
     def energy(self, seconds: float) -> Energy:
         """The energies until now; `seconds` is the length of a tick (s)."""
-        if not self._stamps or not self._ticks:
+        if not self.counts[0] or not self.counts[1]:
             return Energy(0.0, 0.0, 0.0, 0.0, 0.0)
         sums = self._sums()
-        until = self._stamps[sums.sample] * seconds
+        until = int(self.stamps[sums.sample]) * seconds
         return Energy(sums.work - sums.ideal, sums.work, sums.ideal, until, sums.peak)
 
     def _sums(self) -> _Sums:
         """All sums up to the newest sample that the target has stepped past."""
-        ticks, x = np.array(self._ticks), np.array(self._moves)
-        sample = max(bisect_right(self._stamps, self._ticks[-1]) - 1, 0)
-        stamps, efforts = (
-            np.array(self._stamps[: sample + 1]),
-            np.array(self._samples[: sample + 1]),
-        )
-        row = max(bisect_right(self._ticks, self._stamps[sample]) - 1, 0)
+        ticks, x = self.ticks[: self.counts[1]], self.moves[: self.counts[1]]
+        known = self.stamps[: self.counts[0]]
+        sample = max(int(np.searchsorted(known, ticks[-1], "right")) - 1, 0)
+        stamps, efforts = known[: sample + 1], self.samples[: sample + 1]
+        row = max(int(np.searchsorted(ticks, stamps[-1], "right")) - 1, 0)
         work = np.zeros(len(ticks))
         if len(ticks) > 1:
-            done = np.array(self._efforts[: len(ticks) - 1]) * np.diff(x, axis=0)
+            done = self.efforts[: len(ticks) - 1] * np.diff(x, axis=0)
             work[1:] = done.sum(axis=1).cumsum()
         x_stamps = np.stack([np.interp(stamps, ticks, column) for column in x.T], axis=1)
         ideal = np.zeros(len(stamps))
@@ -144,10 +155,24 @@ class Meter:
         )
 
     def _fold(self) -> None:
-        """Add rows to the sums and drop them; grow the buffer if a slow source still needs them."""
-        if self._stamps:
+        """Add rows to the sums and drop them; grow the arrays if a slow source still needs them."""
+        if self.counts[0]:
             sums = self._sums()
             self._work, self._ideal, self._peak = sums.work_at_row, sums.ideal, sums.peak
-            del self._stamps[: sums.sample], self._samples[: sums.sample]
-            del self._ticks[: sums.row], self._moves[: sums.row], self._efforts[: sums.row]
-        self._full = max(ROWS, 2 * len(self._ticks))
+            for array in (self.stamps, self.samples):
+                array[: -sums.sample or None] = array[sums.sample :]
+            for array in (self.ticks, self.moves, self.efforts):
+                array[: -sums.row or None] = array[sums.row :]
+            self.counts -= (sums.sample, sums.row, min(sums.row, self.counts[2]))
+        self.full = max(ROWS, 2 * int(self.counts[1]))
+        if self.full > len(self.ticks):
+            self.ticks, self.moves = _grown(self.ticks, self.full), _grown(self.moves, self.full)
+            self.efforts = _grown(self.efforts, self.full)
+        self.changed()
+
+
+def _grown(array: Rows, rows: int) -> Rows:
+    """A copy with `rows` rows, the new ones 0."""
+    grown = np.zeros((rows, *array.shape[1:]), array.dtype)
+    grown[: len(array)] = array
+    return grown

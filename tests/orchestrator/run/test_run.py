@@ -157,7 +157,7 @@ def test_a_full_disk_is_a_fault(
             target.symlink_to("/dev/full")
 
     monkeypatch.setattr(os, "replace", full)
-    outcome = run(plan, RunFolder(tmp_path))
+    outcome = run(plan, RunFolder(tmp_path, at_once=True))
     assert "No space left on device" in str(outcome.fault)
     assert left_behind() == before
 

@@ -1,0 +1,65 @@
+"""Build hook: compiles the event loop, and links what editable installs import.
+
+Wheels map the top-level folders through `sources` in pyproject.toml. For an editable install
+`.editable/hapticlink/` gets links to them, and to the package's own files, which are in `api/`.
+"""
+
+import os
+import runpy
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+FOLDERS = ("components", "fmus", "orchestrator", "scenes")
+LOOP = Path("orchestrator", "run", "compiled")
+
+
+class Build(BuildHookInterface):
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        if self.target_name != "wheel":
+            return
+        if library := self._compiled():
+            build_data["artifacts"].append(str(library.as_posix()))
+            build_data["pure_python"] = False
+            platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+            build_data["tag"] = f"py3-none-{platform}"
+        if version == "editable":
+            self._link()
+
+    def _compiled(self) -> Path | None:
+        """The compiled loop; None where it cannot be compiled here. It is then compiled at its
+        first use, or runs in Python."""
+        build = runpy.run_path(str(Path(self.root, LOOP, "build.py")))
+        library = LOOP / build["name"]()
+        for older in Path(self.root, LOOP).glob(f"loop-*{library.suffix}"):
+            older.unlink()
+        try:
+            build["compile_loop"](Path(self.root, library), build["zig"]())
+        except (subprocess.CalledProcessError, OSError) as error:
+            said = getattr(error, "stderr", None) or str(error).encode()
+            self.app.display_warning(f"no compiled loop: {said.decode(errors='replace')}")
+            return None
+        return library
+
+    def _link(self) -> None:
+        root = Path(self.root)
+        package = root / ".editable" / "hapticlink"
+        package.mkdir(parents=True, exist_ok=True)
+        targets = [root / name for name in FOLDERS]
+        targets += [path for path in (root / "api").iterdir() if path.is_file()]
+        for target in targets:
+            link = package / target.name
+            if sys.platform == "win32" and target.is_file():
+                link.unlink(missing_ok=True)  # git may have written a new file since
+                os.link(target, link)  # a symlink needs a privilege
+            elif link.exists() or link.is_symlink():
+                continue
+            elif sys.platform == "win32":
+                command = ["cmd", "/c", "mklink", "/J", str(link), str(target)]
+                subprocess.run(command, check=True)
+            else:
+                link.symlink_to(os.path.relpath(target, package))

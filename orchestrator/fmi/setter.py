@@ -1,0 +1,49 @@
+"""Sets inputs of an FMU in this process from a signal vector."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.fmi.transfer import Transfer
+from hapticlink.orchestrator.fmi.units import SAME, Linear
+
+Vector = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+
+class Setter:
+    """values[i] = factors[i] board[where[i]] + offsets[i], then the calls of `transfers`.
+
+    factors and offsets are None where all are 1 and 0. Of arrays that are set as a whole, `into`
+    are the places of the values in `whole`, else None. carry_out makes the calls.
+    """
+
+    def __init__(
+        self,
+        where: Sequence[int],
+        conversions: Sequence[Linear],
+        whole: Vector,
+        into: Places | None,
+        transfers: Sequence[Transfer],
+        carry_out: Callable[[Sequence[Transfer]], None],
+    ) -> None:
+        self.where, self.whole, self.into = np.array(where, dtype=np.intp), whole, into
+        self.values = whole if into is None else np.zeros(len(where))
+        self.factors: Vector | None = None
+        self.offsets: Vector | None = None
+        if any(c != SAME for c in conversions):
+            self.factors = np.array([c.factor for c in conversions])
+            self.offsets = np.array([c.offset for c in conversions])
+        self.transfers, self._carry_out = transfers, carry_out
+
+    def __call__(self, board: Vector) -> None:
+        # "raise" would copy through a buffer.
+        board.take(self.where, out=self.values, mode="clip")
+        if self.factors is not None and self.offsets is not None:
+            self.values.__imul__(self.factors).__iadd__(self.offsets)
+        if self.into is not None:
+            self.whole[self.into] = self.values
+        self._carry_out(self.transfers)

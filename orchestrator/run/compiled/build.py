@@ -1,0 +1,61 @@
+"""Compiles the loop's C files to a shared library. It needs the standard library only, since the
+build of the package runs it, too."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+HERE = Path(__file__).parent
+SOURCES = ("loop.h", "loop.c", "holds.c")
+# No contraction: a fused multiply-add rounds once where Python rounds twice.
+FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", "-g0", "-fvisibility=hidden", "-ffp-contract=off")
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+def name() -> str:
+    """The library's file name, with a hash of its sources, so that an older one is never taken."""
+    sha = hashlib.sha256()
+    for source in SOURCES:
+        sha.update((HERE / source).read_bytes().replace(b"\r\n", b"\n"))
+    return f"loop-{sha.hexdigest()[:16]}{SUFFIX}"
+
+
+def compilers() -> Iterator[list[str]]:
+    """The commands of the compilers that are there: the machine's own, which takes a fraction of a
+    second, then the package `ziglang`."""
+    for command in ("cc", "gcc", "clang"):
+        if sys.platform != "win32" and (found := shutil.which(command)):
+            yield [found]
+    if find_spec("ziglang"):
+        yield zig()
+
+
+def zig() -> list[str]:
+    """The command of `ziglang`, on Linux for a version of glibc that is old enough for the systems
+    in use."""
+    target = []
+    if sys.platform == "linux" and platform.libc_ver()[0] == "glibc":
+        target = ["-target", f"{platform.machine()}-linux-gnu.2.17"]
+    return [sys.executable, "-m", "ziglang", "cc", *target]
+
+
+def compile_loop(library: Path, compiler: Sequence[str]) -> None:
+    """Compile the loop to `library`, which is there whole or not at all. Raises
+    subprocess.CalledProcessError, or OSError, where that fails."""
+    with tempfile.TemporaryDirectory(dir=library.parent, prefix=".loop-") as room:
+        made = Path(room) / library.name
+        sources = [str(HERE / source) for source in SOURCES if source.endswith(".c")]
+        math = [] if sys.platform == "win32" else ["-lm"]
+        command = [*compiler, *FLAGS, "-o", str(made), *sources, *math]
+        environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(Path(room) / "cache")}
+        subprocess.run(command, check=True, capture_output=True, env=environment)
+        os.replace(made, library)

@@ -1,0 +1,197 @@
+"""Holds in C, with the Python classes as their specification."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.holds.delayed import Delayed
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank
+from hapticlink.orchestrator.holds.first_order import FirstOrder
+from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDerivative
+from hapticlink.orchestrator.holds.hermite import Hermite
+from hapticlink.orchestrator.holds.hold import Hold, Vector
+from hapticlink.orchestrator.holds.lead import Lead
+from hapticlink.orchestrator.holds.manifolds import Unwrapped
+from hapticlink.orchestrator.holds.mean import Mean
+from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
+from hapticlink.orchestrator.holds.restorable import Restorable
+from hapticlink.orchestrator.holds.second_order import SecondOrder
+from hapticlink.orchestrator.holds.smooth import Smooth
+from hapticlink.orchestrator.holds.zero_order import Latest, ZeroOrder
+from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.energy.bonds import Reader
+from hapticlink.orchestrator.run.make_holds import WithDerivative
+from hapticlink.orchestrator.system.latency import Late, Link
+
+KINDS: Mapping[type[Hold], tuple[int, int]] = {
+    kind: (code, depth)
+    for code, depth, *kinds in (
+        (0, 1, ZeroOrder, Latest), (1, 2, Lead), (2, 2, FirstOrder), (3, 1, FirstOrderDerivative),
+        (4, 3, SecondOrder), (5, 2, Hermite), (6, 2, Delayed), (7, 2, Smooth), (8, 1, Mean),
+        (9, 1, PassiveSetPosition),
+    )
+    for kind in kinds
+}  # fmt: skip
+"""By class: its code in loop.h, and the number of samples that it keeps."""
+DRAWN = 256
+"""Latencies that are drawn at a time."""
+
+
+class Parts(NamedTuple):
+    """What a hold is made of: its own class, and what wraps it."""
+
+    own: Hold
+    angles: Unwrapped | None
+    link: Link | None
+    derivative: Reader | None
+
+
+def parts(hold: Hold) -> Parts:
+    """The parts of a hold that `make_hold` has made; `own` is a wrapper that has no C where one is
+    left."""
+    derivative, link, angles = None, None, None
+    if isinstance(hold, WithDerivative):
+        derivative, hold = hold.derivative, hold.hold
+    if isinstance(hold, Late):
+        link, hold = hold.link, hold.hold
+    if isinstance(hold, Unwrapped):
+        angles = hold
+        hold = hold.hold
+    return Parts(hold, angles, link, derivative)
+
+
+def can(hold: Hold, rolls_back: bool) -> bool:
+    """Whether there is C for a hold: not for classes of plugins, and not for samples in transit
+    that a rollback takes back."""
+    found = parts(hold)
+    return type(found.own) in KINDS and not (found.link and rolls_back)
+
+
+class State(Restorable):
+    """Words of 8 bytes with a structure at their beginning and its arrays behind it, which is all
+    that a rollback restores."""
+
+    def __init__(self, words: int) -> None:
+        self.words, self._end = np.zeros(words, np.int64), 0
+
+    def place(self, words: int) -> int:
+        """The address of the next `words`."""
+        at, self._end = self._end, self._end + words
+        address: int = self.words.ctypes.data + 8 * at
+        return address
+
+    def structure(self, kind: type[ctypes.Structure]) -> ctypes.Structure:
+        at = self._end
+        self.place(ctypes.sizeof(kind) // 8)
+        return kind.from_buffer(self.words.data, 8 * at)
+
+    def saved(self) -> NDArray[np.int64]:
+        return self.words.copy()
+
+    def restore(self, saved: NDArray[np.int64]) -> None:
+        self.words[:] = saved
+
+
+def _words(kind: type[ctypes.Structure]) -> int:
+    return ctypes.sizeof(kind) // 8
+
+
+class CompiledTank(State):
+    """An energy tank in C."""
+
+    def __init__(self, tank: EnergyTank) -> None:
+        n = len(tank.stiffness)
+        super().__init__(_words(structures.Tank) + 6 * n)
+        assert isinstance(tank.position, Reader)
+        self._kept = tuple(map(np.ascontiguousarray, (tank.stiffness, tank.damping)))
+        self._where = tank.position.where
+        c = self.structure(structures.Tank)
+        c.n, c.tick, c.period = n, -1, tank.period
+        c.stiffness, c.damping = (a.ctypes.data for a in self._kept)
+        c.where = self._where.ctypes.data
+        c.newest, c.modulated, c.x, c.at = (self.place(k * n) for k in (2, 2, 1, 1))
+
+
+class CompiledHold(Hold, State):
+    """A hold in C. sources: the indices of its samples in the signal vector; held: where `evaluate`
+    puts its value. room: for samples in transit. loop: the address of the Loop that it runs in."""
+
+    def __init__(
+        self,
+        library: ctypes.CDLL,
+        loop: int,
+        hold: Hold,
+        sources: Sequence[int],
+        held: Vector,
+        room: int = 0,
+        tank: CompiledTank | None = None,
+    ) -> None:
+        own, angles, link, derivative = parts(hold)
+        n, (code, depth) = len(held), KINDS[type(own)]
+        places = [*sources, *(derivative.where if derivative else ())]
+        width, turned = len(places), len(angles.angles) if angles else 0
+        words = depth * width + 6 * n + turned + _words(structures.Hold)
+        words += _words(structures.Link) + room * (2 + width) if link else 0
+        State.__init__(self, words)
+        self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
+        self._sources, self._derivative = np.array(places, np.intp), derivative
+        self._held, self._tank = held, tank
+        c = self.structure(structures.Hold)
+        c.kind, c.n, c.width, c.depth = code, n, width, depth
+        c.samples, c.vectors = self.place(depth * width), self.place(6 * n)
+        c.sources, c.held = self._sources.ctypes.data, held.ctypes.data
+        if angles:
+            self._angles = np.array(angles.angles, np.int64), np.array(angles.turn, np.float64)
+            c.n_angles, c.last = turned, self.place(turned)
+            c.angles, c.turns = (a.ctypes.data for a in self._angles)
+        self.link = None
+        if link:
+            self._link, self._late = link, np.zeros(DRAWN, np.int64)
+            self.link = k = self.structure(structures.Link)
+            k.late, k.n_late, k.at_late, k.room = self._late.ctypes.data, DRAWN, DRAWN, room
+            k.arrivals, k.stamps = self.place(room), self.place(room)
+            k.samples = self.place(room * width)
+            c.link = ctypes.addressof(k)
+        if tank and isinstance(own, PassiveSetPosition):
+            c.tank, c.row = tank.words.ctypes.data, own.row
+        self.address: int = ctypes.addressof(c)
+
+    def draw(self) -> None:
+        """Draw the next latencies."""
+        assert self.link is not None
+        self._late[:] = [self._link.draw() for _ in range(DRAWN)]
+        self.link.at_late = 0
+
+    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
+        if self._derivative:
+            sample = np.concatenate([sample, self._derivative()])
+        own = np.ascontiguousarray(sample, np.float64)
+        assert len(own) == len(self._sources)
+        while code := self._push(self.address, own.ctypes.data, stamp, arrival):
+            if code != structures.DRAW:
+                raise RuntimeError("more samples in transit than there is room for")
+            self.draw()
+
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
+        found = np.zeros(self._n)
+        self._value(self.address, self._loop, tick, ahead, found.ctypes.data)
+        return found
+
+
+def tanks(holds: Iterable[Hold], rolls_back: bool) -> dict[int, CompiledTank]:
+    """The energy tanks in C, by the id of the tank, of those all whose holds have C."""
+    shared: dict[int, tuple[EnergyTank, list[Hold]]] = {}
+    for hold in holds:
+        own = parts(hold).own
+        if isinstance(own, PassiveSetPosition):
+            shared.setdefault(id(own.tank), (own.tank, []))[1].append(hold)
+    return {
+        key: CompiledTank(tank)
+        for key, (tank, of) in shared.items()
+        if all(can(hold, rolls_back) for hold in of)
+    }

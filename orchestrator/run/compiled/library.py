@@ -1,0 +1,70 @@
+"""Finds the compiled loop: built with the package, or compiled at its first use and cached."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+from functools import cache
+from pathlib import Path
+
+from hapticlink.fmus import cache as fmu_cache
+from hapticlink.orchestrator.run.compiled import build, structures
+
+CHOICE = "HAPTICLINK_LOOP"
+"""Environment variable: with the value "python" no compiled loop is used."""
+
+
+class Unavailable(Exception):
+    """There is no compiled loop here; the text says why."""
+
+
+def load() -> ctypes.CDLL:
+    """The library. Raises Unavailable where it is switched off, or can neither be found nor be
+    compiled."""
+    if os.environ.get(CHOICE) == "python":
+        raise Unavailable(f"{CHOICE}=python")
+    return _loaded()
+
+
+@cache
+def _loaded() -> ctypes.CDLL:
+    built = build.HERE / build.name()
+    found = ctypes.CDLL(str(built if built.exists() else _compiled()))
+    pointer, integer, number = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+    for name, arguments in {
+        "events": (pointer, pointer),
+        "block": (pointer, pointer, integer),
+        "push": (pointer, pointer, integer, integer),
+        "value": (pointer, pointer, integer, number, pointer),
+        "sizes": (pointer,),
+        "watch": (ctypes.c_int,),
+    }.items():
+        function = found[f"hapticlink_{name}"]
+        function.argtypes = arguments
+        setattr(found, name, function)
+    sizes = (ctypes.c_int64 * len(structures.ALL))()
+    found.sizes(sizes)
+    assert [*sizes] == [ctypes.sizeof(kind) for kind in structures.ALL]
+    return found
+
+
+def _compiled() -> Path:
+    root = fmu_cache.folder()
+    if root is None:
+        raise Unavailable("it is not built, and there is no cache folder to compile it to")
+    library = root / build.name()
+    if library.exists():
+        return library
+    why = "it is not built, and there is no C compiler: pip install '.[native]'"
+    for compiler in build.compilers():
+        try:
+            root.mkdir(parents=True, exist_ok=True)
+            build.compile_loop(library, compiler)
+        except subprocess.CalledProcessError as error:
+            why = f"{compiler[0]} could not compile it: {error.stderr.decode(errors='replace')}"
+        except OSError as error:
+            why = f"it could not be compiled: {error}"
+        else:
+            return library
+    raise Unavailable(why)

@@ -1,0 +1,413 @@
+/* The event loop: carries out the operations of a plan and calls the FMUs.
+ *
+ * It returns to Python for whatever it cannot do (see the codes in loop.h); Python does that and
+ * calls it again where it stopped. Times are ticks; a tick is numerator/denominator s, and the
+ * products below are below 2^53, so that each quotient is rounded once.
+ */
+
+#include "loop.h"
+
+#include <math.h>
+#include <string.h>
+
+#ifdef _WIN32
+#include <windows.h>
+#define EXPORT __declspec(dllexport)
+
+static int64_t now(void) {
+    static int64_t frequency;
+    LARGE_INTEGER found;
+    if (!frequency) {
+        QueryPerformanceFrequency(&found);
+        frequency = found.QuadPart;
+    }
+    QueryPerformanceCounter(&found);
+    return found.QuadPart / frequency * 1000000000 + found.QuadPart % frequency * 1000000000 / frequency;
+}
+#else
+#include <time.h>
+#define EXPORT __attribute__((visibility("default")))
+
+static int64_t now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+}
+#endif
+
+/* --- signals ---------------------------------------------------------------------------------- */
+
+#ifdef _WIN32
+static int came;
+
+EXPORT void hapticlink_watch(int on) { (void)on; } /* Python notices them when it has its turn */
+#else
+#include <signal.h>
+
+static const int SIGNALS[] = {SIGINT, SIGTERM};
+static struct sigaction before[2];
+static volatile sig_atomic_t came;
+
+static void take(int number) {
+    const struct sigaction *python = before + (number == SIGTERM);
+    came = 1;
+    if (python->sa_handler != SIG_DFL && python->sa_handler != SIG_IGN) python->sa_handler(number);
+}
+
+/* Notices signals beside Python, whose handlers run only when it has its turn: the loop then gives
+ * it one after the event. */
+EXPORT void hapticlink_watch(int on) {
+    for (int i = 0; i < 2; i++) {
+        struct sigaction now, ours = {.sa_handler = take};
+        sigaction(SIGNALS[i], NULL, &now);
+        if (!on && now.sa_handler == take) sigaction(SIGNALS[i], before + i, NULL);
+        if (!on || now.sa_handler == take || now.sa_flags & SA_SIGINFO) continue;
+        if (now.sa_handler == SIG_DFL || now.sa_handler == SIG_IGN) continue;
+        before[i] = now;
+        ours.sa_mask = now.sa_mask;
+        ours.sa_flags = now.sa_flags;
+        sigaction(SIGNALS[i], &ours, NULL);
+    }
+}
+#endif
+
+enum { WARNING = 1 };
+enum { SHORT = 1000, ALL = 64, EACH = 16 };
+/* Steps below SHORT ns, after ALL steps that were all timed, are timed one in EACH: reading the
+ * clock takes longer than the shortest steps. */
+
+static double seconds(const Loop *l, int64_t tick) {
+    return (double)tick * l->numerator / l->denominator;
+}
+
+/* --- FMUs ------------------------------------------------------------------------------------- */
+
+typedef int (*Transfer2)(void *, const uint32_t *, size_t, void *);
+typedef int (*Transfer3)(void *, const uint32_t *, size_t, void *, size_t);
+typedef int (*DoStep2)(void *, double, double, int);
+typedef int (*DoStep3)(void *, double, double, _Bool, uint8_t *, uint8_t *, uint8_t *, double *);
+typedef int (*GetState)(void *, void *);
+
+static int transferred(const Transfer *t) {
+    if (t->fmi == 2)
+        return ((Transfer2)t->call)(t->fmu, t->references, t->n_references, t->buffer);
+    return ((Transfer3)t->call)(t->fmu, t->references, t->n_references, t->buffer, t->n);
+}
+
+/* Doubles from what the FMU has given; 0 where a number of 64 bits may not be exact as one. */
+static int from_buffer(const Transfer *t) {
+    const double exact = 9007199254740992.0;
+#define FROM(kind, type)                                                                           \
+    case kind:                                                                                     \
+        for (int64_t i = 0; i < t->n; i++) t->values[i] = (double)((type *)t->buffer)[i];          \
+        break;
+    switch (t->type) {
+    case DOUBLE: return 1;
+        FROM(FLOAT, float)
+        FROM(INT64, int64_t)
+        FROM(INT32, int32_t)
+        FROM(INT16, int16_t)
+        FROM(INT8, int8_t)
+        FROM(UINT64, uint64_t)
+        FROM(UINT32, uint32_t)
+        FROM(UINT16, uint16_t)
+        FROM(UINT8, uint8_t)
+        FROM(BOOL2, int32_t)
+        FROM(BOOL3, uint8_t)
+    }
+    if (t->type == INT64 || t->type == UINT64)
+        for (int64_t i = 0; i < t->n; i++)
+            if (fabs(t->values[i]) >= exact) return 0;
+    return 1;
+}
+
+/* The nearest numbers of the FMU's type; 0 where one is beyond its range. */
+static int to_buffer(const Transfer *t) {
+#define TO(kind, type, least, beyond)                                                              \
+    case kind:                                                                                     \
+        for (int64_t i = 0; i < t->n; i++) {                                                       \
+            const double whole = rint(t->values[i]);                                               \
+            if (!(whole >= least && whole < beyond)) return 0;                                     \
+            ((type *)t->buffer)[i] = (type)whole;                                                  \
+        }                                                                                          \
+        break;
+    switch (t->type) {
+    case FLOAT:
+        for (int64_t i = 0; i < t->n; i++) ((float *)t->buffer)[i] = (float)t->values[i];
+        break;
+        TO(INT64, int64_t, -9223372036854775808.0, 9223372036854775808.0)
+        TO(INT32, int32_t, -2147483648.0, 2147483648.0)
+        TO(INT16, int16_t, -32768.0, 32768.0)
+        TO(INT8, int8_t, -128.0, 128.0)
+        TO(UINT64, uint64_t, 0.0, 18446744073709551616.0)
+        TO(UINT32, uint32_t, 0.0, 4294967296.0)
+        TO(UINT16, uint16_t, 0.0, 65536.0)
+        TO(UINT8, uint8_t, 0.0, 256.0)
+    case BOOL2:
+        for (int64_t i = 0; i < t->n; i++) ((int32_t *)t->buffer)[i] = t->values[i] >= 0.5;
+        break;
+    case BOOL3:
+        for (int64_t i = 0; i < t->n; i++) ((uint8_t *)t->buffer)[i] = t->values[i] >= 0.5;
+        break;
+    }
+    return 1;
+}
+
+static int failed(At *at, int64_t what, int status) {
+    at->what = what;
+    at->status = status;
+    return FAILED;
+}
+
+static int get(const Fmu *f, int64_t judged, At *at) {
+    for (int64_t i = 0; i < f->n_gets; i++) {
+        const int status = transferred(f->gets + i);
+        if (status > WARNING) return failed(at, i, status);
+        if (!from_buffer(f->gets + i)) return CALL;
+    }
+    if (!judged) return 0;
+    for (int64_t i = 0; i < f->n_outputs; i++)
+        if (!(fabs(f->outputs[i]) * f->inverse[i] <= 1.0)) return JUDGE;
+    if (f->good) memcpy(f->good, f->outputs, f->n_outputs * sizeof(double));
+    return 0;
+}
+
+static int set(const Setter *s, const double *board, At *at) {
+    if (s->place->ended) return 0;
+    if (s->factors)
+        for (int64_t i = 0; i < s->n; i++)
+            s->values[i] = board[s->where[i]] * s->factors[i] + s->offsets[i];
+    else
+        for (int64_t i = 0; i < s->n; i++) s->values[i] = board[s->where[i]];
+    if (s->into)
+        for (int64_t i = 0; i < s->n; i++) s->whole[s->into[i]] = s->values[i];
+    for (int64_t i = 0; i < s->n_sets; i++) {
+        if (!to_buffer(s->sets + i)) return CALL;
+        const int status = transferred(s->sets + i);
+        if (status > WARNING) return failed(at, i, status);
+    }
+    return 0;
+}
+
+static int step(Fmu *f, double time, double end, double size, At *at) {
+    Place *p = f->place;
+    p->time = p->begin = time;
+    p->size = size;
+    p->end = end;
+    if (p->ended) return CALL;
+    if (f->get_state && (at->status = ((GetState)f->get_state)(f->fmu, f->state)) > WARNING)
+        return UNSAVED;
+    const int timed = !f->sparse || f->n_steps % EACH == 0;
+    const int64_t begin = timed ? now() : 0;
+    if (f->fmi == 2)
+        at->status = ((DoStep2)f->do_step)(f->fmu, time, size, (int)f->forward);
+    else
+        at->status = ((DoStep3)f->do_step)(f->fmu, time, size, f->forward != 0, f->event,
+                                           f->terminate, f->early, f->reached);
+    if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
+    if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
+    if (at->status > WARNING || (f->fmi == 3 && *f->terminate)) return STEPPED;
+    p->time = end;
+    return 0;
+}
+
+/* Whether step_check.py takes the next step; otherwise it is counted here. */
+static int is_checked(const Fmu *f) {
+    if (!f->checked) return 0;
+    if ((*f->checked + 1) % f->every == f->first) return 1;
+    ++*f->checked;
+    return 0;
+}
+
+/* --- meters ----------------------------------------------------------------------------------- */
+
+static void reading(const Reader *r, const double *board, double *into) {
+    for (int64_t i = 0; i < r->n; i++)
+        into[i] = r->factor ? r->factor[i] * board[r->where[i]] + r->offset[i] : board[r->where[i]];
+}
+
+/* Meter.sample; CALL where there is no room, which Python then makes. */
+static int meter_sample(Meter *m, const double *board, int64_t stamp) {
+    int64_t *count = m->counts;
+    if (!*count || m->stamps[*count - 1] != stamp) {
+        if (*count == m->room) return CALL;
+        m->stamps[(*count)++] = stamp;
+    }
+    reading(&m->source, board, m->samples + (*count - 1) * m->source.n);
+    return 0;
+}
+
+static int meter_move(Meter *m, const double *board, int64_t tick) {
+    int64_t *count = m->counts + 1;
+    if (*count && m->ticks[*count - 1] == tick) return 0;
+    if (*count >= m->full) return CALL;
+    m->ticks[*count] = tick;
+    reading(&m->x, board, m->moves + *count * m->x.n);
+    ++*count;
+    return 0;
+}
+
+static void meter_feed(Meter *m, const double *board, double share) {
+    const int64_t n = m->held.n, moves = m->counts[1];
+    int64_t *count = m->counts + 2;
+    const int fresh = *count < moves;
+    double effort[n], *row = m->efforts + (fresh ? *count : *count - 1) * n;
+    reading(&m->held, board, effort);
+    for (int64_t i = 0; i < n; i++) {
+        const double part = share == 1.0 ? effort[i] : effort[i] * share;
+        row[i] = fresh ? part : row[i] + part;
+    }
+    *count += fresh;
+}
+
+/* --- operations ------------------------------------------------------------------------------- */
+
+static int compares(double value, int64_t comparison, double limit) {
+    switch (comparison) {
+    case 0: return value < limit;
+    case 1: return value <= limit;
+    case 2: return value > limit;
+    case 3: return value >= limit;
+    }
+    return 0;
+}
+
+static void blend(const Loop *l, const Op *op, int64_t tick) {
+    Hold *h = l->holds[op->a];
+    double value[h->n], sum[h->n];
+    for (int64_t k = 0; k < h->n; k++) sum[k] = 0.0;
+    for (int64_t i = op->b; i < op->c; i++) {
+        hold_value(h, l, tick, l->points[i][1], value);
+        for (int64_t k = 0; k < h->n; k++) sum[k] += l->points[i][0] * value[k];
+    }
+    memcpy(h->held, sum, h->n * sizeof *sum);
+}
+
+static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
+    double sample[h->width];
+    for (int64_t k = 0; k < h->width; k++) sample[k] = l->values[h->sources[k]];
+    return hold_push(h, sample, stamp, arrival);
+}
+
+static int record(const Loop *l, Table *t, int64_t tick) {
+    if (*t->rows == t->room) return FULL;
+    double *row = t->block + *t->rows * (1 + t->n);
+    row[0] = seconds(l, tick);
+    memcpy(row + 1, t->view, t->n * sizeof *row);
+    ++*t->rows;
+    return 0;
+}
+
+/* Carries out the operations from at->op to at->last. Returns DONE, or a code for operation
+ * at->op. */
+static int carry_out(Loop *l, int64_t tick, At *at) {
+    for (; at->op < at->last; at->op++) {
+        const Op *op = l->ops + at->op;
+        int code = 0;
+        switch (op->code) {
+        case PYTHON: return CALL;
+        case GET: code = get(l->fmus + op->a, op->b, at); break;
+        case SET: code = set(l->setters + op->a, l->values, at); break;
+        case STEP: {
+            const int64_t start = tick * op->c + op->b, end = start + op->d;
+            const double whole = l->denominator * (double)op->c;
+            if (op->c == 1 && is_checked(l->fmus + op->a)) return CALL;
+            code = step(l->fmus + op->a, (double)start * l->numerator / whole,
+                        (double)end * l->numerator / whole, op->x, at);
+            break;
+        }
+        case PUSH: code = push(l, l->holds[op->a], tick + op->b, tick); break;
+        case EVALUATE: hold_value(l->holds[op->a], l, tick, op->x, l->holds[op->a]->held); break;
+        case BLEND: blend(l, op, tick); break;
+        case SAMPLE: code = meter_sample(l->meters[op->a], l->values, tick + op->b); break;
+        case MOVE: code = meter_move(l->meters[op->a], l->values, tick + op->b); break;
+        case FEED: meter_feed(l->meters[op->a], l->values, op->x); break;
+        case RECORD: code = record(l, l->tables + op->a, tick); break;
+        case STOP_WHEN:
+            if (compares(l->values[op->a], op->b, op->x)) code = STOP;
+            break;
+        }
+        if (code) return code;
+    }
+    return DONE;
+}
+
+/* --- events ----------------------------------------------------------------------------------- */
+
+/* The next event: e->tick and e->key (whether it is the first; 2 dticks + final of each clock that
+ * fires, 0 of the others). DONE after the last. */
+static int next_event(Events *e) {
+    int64_t tick = INT64_MAX;
+    for (int64_t i = 0; i < e->n_clocks; i++) {
+        Clock *c = e->clocks + i;
+        if (c->at + 1 >= c->n) {
+            e->at.what = i;
+            return STARTS;
+        }
+        if (c->starts[c->at] < tick) tick = c->starts[c->at];
+    }
+    if (tick > e->end) return DONE;
+    e->tick = tick;
+    e->key[0] = tick == 0;
+    for (int64_t i = 0; i < e->n_clocks; i++) {
+        const Clock *c = e->clocks + i;
+        const int64_t start = c->starts[c->at], after = start < tick + 1 ? c->starts[c->at + 1] : 0;
+        e->key[1 + i] = after ? 2 * (after - start) + (after > e->end) : 0;
+    }
+    const size_t width = (1 + e->n_clocks) * sizeof *e->key;
+    for (e->kind = 0; e->kind < e->n_kinds; e->kind++)
+        if (!memcmp(e->keys + e->kind * (1 + e->n_clocks), e->key, width)) break;
+    if (e->kind == e->n_kinds) return KIND;
+    Block *b = e->kinds + e->kind;
+    b->count++;
+    e->at.op = b->first;
+    e->at.last = b->last;
+    return -1;
+}
+
+static void complete(Events *e) {
+    for (int64_t i = 0; i < e->n_clocks; i++)
+        if (e->key[1 + i]) e->clocks[i].at++;
+    e->events++;
+    e->at.op = -1;
+}
+
+/* Runs events until there are none left (DONE), `patience` ns have passed `since` the last PAUSE or a
+ * signal has come, or Python is needed. e->at.op is -1 between events. */
+EXPORT int hapticlink_events(Loop *l, Events *e) {
+    for (;;) {
+        if (e->at.op < 0) {
+            const int code = next_event(e);
+            if (code >= 0) return code;
+        }
+        const int code = carry_out(l, e->tick, &e->at);
+        if (code != DONE) return code;
+        complete(e);
+        const int64_t time = now();
+        if (time - e->since >= e->patience || came) {
+            e->since = time;
+            came = 0;
+            return PAUSE;
+        }
+    }
+}
+
+/* Runs one sequence of operations at a tick, within an operation that Python carries out. */
+EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick) { return carry_out(l, tick, at); }
+
+EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival) {
+    return hold_push(h, sample, stamp, arrival);
+}
+
+EXPORT void hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
+    hold_value(h, l, tick, ahead, value);
+}
+
+/* The sizes of the structures, in the order of `structures.py`. */
+EXPORT void hapticlink_sizes(int64_t *sizes) {
+    const int64_t found[] = {sizeof(Place), sizeof(Transfer), sizeof(Fmu), sizeof(Setter),
+                             sizeof(Link), sizeof(Tank), sizeof(Hold), sizeof(Reader),
+                             sizeof(Meter), sizeof(Table), sizeof(Op), sizeof(Clock),
+                             sizeof(Block), sizeof(Loop), sizeof(At), sizeof(Events)};
+    memcpy(sizes, found, sizeof found);
+}

@@ -1,0 +1,210 @@
+/* What the compiled loop works on. `structures.py` has the same structures, field by field.
+ *
+ * All arrays belong to Python, which resolves everything that does not change during a run into
+ * them. Every field has 8 bytes, so that there is no padding to agree on.
+ */
+
+#ifndef LOOP_H
+#define LOOP_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* --- FMUs ------------------------------------------------------------------------------------- */
+
+/* Where an instance stands (s), shared with its Python object. */
+typedef struct {
+    double time, begin, size, end, step_time;
+    int64_t ended;
+} Place;
+
+/* A call of fmiXGet<Type> or fmiXSet<Type>: n numbers in `buffer` as the FMU has them, in `values`
+ * as doubles. These are the same memory where the FMU has doubles. */
+typedef struct {
+    void *call, *fmu;
+    const uint32_t *references;
+    void *buffer;
+    double *values;
+    int64_t n_references, n, type, fmi;
+} Transfer;
+
+enum { DOUBLE, FLOAT, INT64, INT32, INT16, INT8, UINT64, UINT32, UINT16, UINT8, BOOL2, BOOL3 };
+
+typedef struct {
+    Place *place;
+    void *fmu, *do_step;
+    void *get_state, *state;              /* saved before each step that may be repeated */
+    int64_t fmi, forward;                 /* noSetFMUStatePriorToCurrentPoint */
+    uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
+    double *reached;
+    const Transfer *gets;
+    int64_t n_gets;
+    double *outputs, *inverse, *good;     /* 1/bound; the last finite outputs, or NULL */
+    int64_t n_outputs, n_steps, sparse;   /* sparse: steps so short that few of them are timed */
+    int64_t *checked, every, first;       /* steps so far, of which step_check.py takes some */
+} Fmu;
+
+/* Sets the inputs of an FMU: values[i] = factors[i] board[where[i]] + offsets[i]. `into`: where
+ * they belong in `whole`, the entries of arrays that are set as a whole; NULL without arrays. */
+typedef struct {
+    Place *place;
+    const int64_t *where;
+    const double *factors, *offsets;      /* NULL where all are 1 and 0 */
+    double *values;
+    const int64_t *into;
+    double *whole;
+    const Transfer *sets;
+    int64_t n, n_sets;
+} Setter;
+
+/* --- holds ------------------------------------------------------------------------------------ */
+
+/* Samples in transit: latency.py. `late` are latencies (ticks) drawn in advance, -1 for a lost
+ * sample. */
+typedef struct {
+    int64_t started, newest, sent, lost, overtaken;
+    int64_t *late;
+    int64_t n_late, at_late;
+    int64_t *arrivals, *stamps;
+    double *samples;
+    int64_t n, room;
+} Link;
+
+/* Of a spring-damper: energy_tank.py. */
+typedef struct {
+    int64_t n, tick;
+    const double *stiffness, *damping;
+    const int64_t *where;
+    double period, available;
+    double *newest, *modulated, *x, *at;   /* (2, n), (2, n), (n,), (n,) */
+} Tank;
+
+/* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
+ * followed by its derivative. `vectors`: (6, n), what else the kind remembers. */
+typedef struct {
+    int64_t kind, n, width, depth, count;
+    int64_t stamps[3];
+    double *samples, *vectors;
+    int64_t arrival, span, interval, begun;
+    const int64_t *sources;
+    double *held;                         /* where `evaluate` puts the value */
+    int64_t n_angles;
+    const int64_t *angles;
+    const double *turns;
+    double *last;
+    int64_t unwrapped;
+    Link *link;
+    Tank *tank;
+    int64_t row;
+} Hold;
+
+enum {
+    ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
+    MEAN, PASSIVE_SET_POSITION
+};
+
+/* --- meters, tables --------------------------------------------------------------------------- */
+
+/* factor board[where] + offset; factor is NULL where it is 1 and offset 0. */
+typedef struct {
+    const int64_t *where;
+    const double *factor, *offset;
+    int64_t n;
+} Reader;
+
+/* The rows that meter.py adds up; counts: of stamps, ticks, efforts. */
+typedef struct {
+    Reader source, held, x;
+    int64_t *counts, *stamps, *ticks;
+    double *samples, *moves, *efforts;
+    int64_t room, full;                   /* of stamps and samples; of the others */
+} Meter;
+
+typedef struct {
+    double *block;                        /* (room, 1 + n): time and values */
+    const double *view;
+    int64_t *rows, n, room;               /* rows: those that are filled */
+} Table;
+
+/* --- the plan --------------------------------------------------------------------------------- */
+
+typedef struct {
+    int64_t code, a, b, c, d;
+    double x;
+} Op;
+
+enum {
+    PYTHON,      /* whatever has no code of its own */
+    GET,         /* fmu a; b: whether outputs are judged */
+    SET,         /* setter a */
+    STEP,        /* fmu a; from part b of c of a tick, over d of them, x s */
+    PUSH,        /* hold a; stamp b ticks ahead */
+    EVALUATE,    /* hold a; x ticks ahead */
+    BLEND,       /* hold a; points b to c */
+    SAMPLE,      /* meter a; stamp b ticks ahead */
+    MOVE,        /* meter a; b ticks ahead */
+    FEED,        /* meter a; x: share of its step */
+    RECORD,      /* table a */
+    STOP_WHEN,   /* signal a, comparison b, limit x */
+};
+
+/* A window of a clock's communication points (ticks), at the current one. */
+typedef struct {
+    const int64_t *starts;
+    int64_t n, at;
+} Clock;
+
+/* The operations of a kind of event, and how many of these there were. */
+typedef struct {
+    int64_t first, last, count;
+} Block;
+
+typedef struct {
+    double (*points)[2];
+    double *values;
+    Op *ops;
+    Fmu *fmus;
+    Setter *setters;
+    Hold **holds;
+    Meter **meters;
+    Table *tables;
+    double numerator, denominator;        /* of a tick (s) */
+} Loop;
+
+/* Where a sequence of operations stands, and what the loop returned for. */
+typedef struct {
+    int64_t op, last, what, status;
+} At;
+
+typedef struct {
+    Clock *clocks;
+    int64_t n_clocks, end;
+    int64_t *keys, *key;                  /* of the kinds, and of the current event */
+    Block *kinds;
+    int64_t n_kinds, kind;
+    int64_t tick, events;                 /* events that are complete */
+    int64_t patience, since;              /* ns after which, and from when, Python gets a turn */
+    At at;
+} Events;
+
+/* Why the loop returns to Python. */
+enum {
+    DONE,
+    CALL,        /* carry out this operation in Python */
+    JUDGE,       /* outputs are not finite, or beyond a bound */
+    FAILED,      /* call number `what` of a get or set returned `status` */
+    STEPPED,     /* doStep returned `status`, or asks to end */
+    UNSAVED,     /* the state before a step could not be saved */
+    FULL,        /* a table's block */
+    DRAW,        /* latencies */
+    STOP,        /* the condition to stop holds */
+    KIND,        /* an event of a kind that is new */
+    STARTS,      /* of clock `what`: its next window */
+    PAUSE,
+    OVERFLOW_,   /* more samples in transit than there is room for */
+};
+
+int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
+void hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+
+#endif

@@ -1,0 +1,300 @@
+"""The operations of a run as records for the compiled loop, and what it returns to Python for."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.setter import Setter
+from hapticlink.orchestrator.plan.operations import (
+    Blend,
+    Evaluate,
+    Get,
+    Push,
+    Record,
+    Set,
+    Step,
+    StopWhen,
+)
+from hapticlink.orchestrator.run.bind import Bound, Instruction, Stop
+from hapticlink.orchestrator.run.compiled import fmus, structures
+from hapticlink.orchestrator.run.compiled.holds import CompiledHold, can, parts, tanks
+from hapticlink.orchestrator.run.compiled.structures import Op
+from hapticlink.orchestrator.run.energy.bonds import Reader
+from hapticlink.orchestrator.run.energy.meter import Meter
+from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
+from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.scene.conditions import COMPARISONS
+
+EXACT = 2**53
+"""Up to here every whole number is a double, and the quotient of two is rounded once."""
+PATIENCE = 20_000_000
+"""ns after which Python gets a turn: signals, progress."""
+
+
+def too_long(simulation: Simulation) -> str:
+    """Why the times of a run are not exact in the compiled loop, "" where they are."""
+    timeline, parts = (
+        simulation.system.timeline,
+        max(simulation.system.substeps.values(), default=1),
+    )
+    base, last = timeline.base, timeline.end + max(c.longest for c in timeline.clocks)
+    if max(last * parts * base.numerator, base.denominator * parts) < EXACT:
+        return ""
+    return "its ticks, times the substeps, are more than 2^53"
+
+
+class Machine:
+    """The structures of a run. Holds that have C replace those of the simulation; `in_python` are
+    the operations that are carried out in Python, with the reason."""
+
+    def __init__(self, library: ctypes.CDLL, simulation: Simulation) -> None:
+        self.library, self._simulation = library, simulation
+        self.in_python: dict[str, str] = {}
+        base, system = simulation.system.timeline.base, simulation.system
+        self.loop = structures.Loop()
+        self.loop.numerator, self.loop.denominator = base.numerator, base.denominator
+        self.loop.values = simulation.signals.values.ctypes.data
+        self._kept: list[object] = []
+        self._bound: Bound = []
+        self._ops = np.zeros(0, np.dtype(Op))
+        self._points: list[tuple[float, float]] = []
+        self._fmus = self._array("fmus", structures.Fmu, len(system.fmus))
+        self._setters = self._array("setters", structures.Setter, 2 * len(system.fmus))
+        self._tables = self._array("tables", structures.Table, len(system.timeline.clocks))
+        self._holds = self._array("holds", ctypes.c_void_p, len(system.connections))
+        self._meters = self._array("meters", ctypes.c_void_p, len(simulation.meters.of))
+        self._indices: dict[tuple[str, Any], int] = {}
+        self._make_holds()
+
+    def _array(self, name: str, kind: Any, n: int) -> Any:
+        made = (kind * max(n, 1))()
+        setattr(self.loop, name, ctypes.addressof(made))
+        self._kept.append(made)
+        return made
+
+    def _make_holds(self) -> None:
+        simulation, signals = self._simulation, self._simulation.signals
+        system = simulation.system
+        rolls_back = system.coupling == "iterated" or system.step_control is not None
+        shared = tanks(simulation.holds.values(), rolls_back)
+        for name, hold in simulation.holds.items():
+            own, connection = parts(hold).own, system.connection[name]
+            tank = shared.get(id(getattr(own, "tank", None)))
+            if not can(hold, rolls_back) or (hasattr(own, "tank") and tank is None):
+                continue
+            link, clock = (
+                parts(hold).link,
+                system.timeline.clock(system.fmu[connection.source].clock),
+            )
+            room = 2 * (link.most // clock.shortest + 2) if link else 0
+            values = signals.values[signals.hold(name)]
+            sources = signals.sources(connection)
+            loop = ctypes.addressof(self.loop)
+            simulation.holds[name] = CompiledHold(
+                self.library, loop, hold, sources, values, room, tank
+            )
+        simulation.springs[:] = [shared.get(id(tank), tank) for tank in simulation.springs]
+
+    # --- records --------------------------------------------------------------------------
+
+    def block(self, bound: Bound) -> tuple[int, int]:
+        """Adds a sequence of instructions; the indices of its first, and of the one after its
+        last."""
+        first = len(self._bound)
+        self._bound += bound
+        rows = [self._record(instruction) for instruction, _ in bound]
+        self._ops = np.concatenate([self._ops, np.array(rows, np.dtype(Op))])
+        self.loop.ops = self._ops.ctypes.data
+        return first, len(self._bound)
+
+    def joined(self, bound: Bound) -> Call:
+        """One call that carries out a sequence of instructions at a tick."""
+        first, last = self.block(bound)
+        at, run = structures.At(), self.library.block
+        loop, here = ctypes.addressof(self.loop), ctypes.addressof(at)
+
+        def call(tick: int) -> None:
+            at.op, at.last = first, last
+            while code := run(loop, here, tick):
+                self.serve(code, at, tick)
+
+        return call
+
+    def _record(self, instruction: Instruction) -> tuple[float, ...]:
+        record = self._found(instruction)
+        if record is None:
+            self.in_python[_named(instruction)] = "it has no C"
+            return (structures.PYTHON, 0, 0, 0, 0, 0.0)
+        return (*record, *(0,) * (5 - len(record)), 0.0) if len(record) < 6 else record
+
+    def _found(self, instruction: Instruction) -> tuple[float, ...] | None:
+        """Code, a, b, c, d and x of an operation; None where it is for Python."""
+        simulation, system = self._simulation, self._simulation.system
+        match instruction:
+            case Get(fmu) | Read(fmu) if (at := self._fmu(fmu)) is not None:
+                return structures.GET, at, isinstance(instruction, Get)
+            case Set(fmu, now, False) if (at := self._setter(fmu, now)) is not None:
+                return structures.SET, at
+            case Step(fmu, dticks, part, parts) if (at := self._fmu(fmu)) is not None:
+                size = float(dticks * (system.timeline.base / parts))
+                over = 0 if system.fmu[fmu].sampled and parts == 1 else dticks
+                return structures.STEP, at, part * dticks, parts, over, size
+            case Push(connection, ahead) if (at := self._hold(connection)) is not None:
+                return structures.PUSH, at, ahead
+            case Evaluate(connection, ahead, 0) if (at := self._hold(connection)) is not None:
+                return structures.EVALUATE, at, 0, 0, 0, float(ahead)
+            case Blend(connection, points) if (at := self._hold(connection)) is not None:
+                first = len(self._points)
+                self._points += [(weight, float(ahead)) for weight, ahead in points]
+                self._kept.append(of := np.array(self._points))
+                self.loop.points = of.ctypes.data
+                return structures.BLEND, at, first, len(self._points)
+            case Sample(connection, ahead):
+                return structures.SAMPLE, self._meter(connection), ahead
+            case Move(connection, ahead):
+                return structures.MOVE, self._meter(connection), ahead
+            case Feed(connection, share):
+                return structures.FEED, self._meter(connection), 0, 0, 0, share
+            case Record(clock) if not simulation.recorders[clock].at_once:
+                return structures.RECORD, self._table(clock)
+            case StopWhen():
+                condition = system.ends_when
+                assert condition is not None
+                place = simulation.signals.scalar(condition.fmu, condition.variable)
+                comparison = [*COMPARISONS].index(condition.comparison)
+                return structures.STOP_WHEN, place, comparison, 0, 0, condition.value
+        return None
+
+    def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
+        """The index of an object of `kind`, made at its first use."""
+        if (kind, key) not in self._indices:
+            at = sum(k == kind for k, _ in self._indices)
+            self._kept.append(make(at))
+            self._indices[kind, key] = at
+        return self._indices[kind, key]
+
+    def _fmu(self, name: str) -> int | None:
+        instance = self._simulation.instances[name]
+        if not isinstance(instance, InProcess):
+            return None
+        check = self._simulation.step_checks.get(name)
+        return self._index(
+            "fmu", name, lambda at: fmus.of_instance(instance, check, self._fmus[at])
+        )
+
+    def _setter(self, name: str, now: bool) -> int | None:
+        simulation = self._simulation
+        setter = (simulation.now_setters if now else simulation.setters)[name]
+        instance = simulation.instances[name]
+        if not isinstance(setter, Setter) or not isinstance(instance, InProcess):
+            return None
+        if any(transfer.exact for transfer in setter.transfers):
+            return None
+        make = partial(fmus.of_setter, setter, instance)
+        return self._index("setter", (name, now), lambda at: make(self._setters[at]))
+
+    def _hold(self, connection: str) -> int | None:
+        hold = self._simulation.holds[connection]
+        if not isinstance(hold, CompiledHold):
+            return None
+
+        def make(at: int) -> object:
+            self._holds[at] = hold.address
+            return hold
+
+        return self._index("hold", connection, make)
+
+    def _meter(self, connection: str) -> int:
+        meter, c = self._simulation.meters.of[connection], structures.Meter()
+
+        def make(at: int) -> object:
+            self._meters[at] = ctypes.addressof(c)
+            for kind in ("source", "held", "x"):
+                _fill_reader(getattr(c, kind), getattr(meter, kind))
+            c.counts = meter.counts.ctypes.data
+            meter.changed = partial(_fill_meter, c, meter)
+            meter.changed()
+            return c
+
+        return self._index("meter", connection, make)
+
+    def _table(self, clock: str) -> int:
+        recorder = self._simulation.recorders[clock]
+
+        def make(at: int) -> object:
+            c = self._tables[at]
+            c.block, c.room = recorder.block.ctypes.data, len(recorder.block)
+            c.view, c.n = recorder.view.ctypes.data, len(recorder.view)
+            c.rows = ctypes.addressof(recorder.count)
+            return recorder
+
+        return self._index("table", clock, make)
+
+    # --- what the loop returns for --------------------------------------------------------
+
+    def serve(self, code: int, at: structures.At, tick: int) -> None:
+        """Does what the loop cannot do at operation `at.op`, and sets where it goes on."""
+        instruction, call = self._bound[at.op]
+        simulation = self._simulation
+        if code == structures.CALL:
+            call(tick)
+        elif code == structures.STOP:
+            raise Stop
+        elif code == structures.FULL:
+            assert isinstance(instruction, Record)
+            simulation.recorders[instruction.clock].flush()
+            return
+        elif code == structures.DRAW:
+            assert isinstance(instruction, Push)
+            hold = simulation.holds[instruction.connection]
+            assert isinstance(hold, CompiledHold)
+            hold.draw()
+            return
+        else:
+            assert isinstance(instruction, Get | Read | Set | Step)
+            instance = simulation.instances[instruction.fmu]
+            assert isinstance(instance, InProcess)
+            if code == structures.FAILED:
+                raise instance.failed(self._called(instruction, at.what, instance), at.status)
+            if code == structures.JUDGE:
+                instance.judge()
+            elif code == structures.STEPPED:
+                instance.after_step(at.status)
+            else:
+                assert code == structures.UNSAVED
+                instance.stepped(at.status)
+        at.op += 1
+
+    def _called(self, instruction: Instruction, number: int, instance: InProcess) -> str:
+        """The name of a failed call of a get or a set."""
+        transfers = instance.gets
+        if isinstance(instruction, Set):
+            simulation = self._simulation
+            setters = simulation.now_setters if instruction.now else simulation.setters
+            setter = setters[instruction.fmu]
+            assert isinstance(setter, Setter)
+            transfers = [*setter.transfers]
+        return transfers[number].name
+
+
+def _fill_reader(c: structures.Reader, reader: Reader) -> None:
+    c.where, c.n = reader.where.ctypes.data, len(reader.where)
+    if reader.factor is not None and reader.offset is not None:
+        c.factor, c.offset = reader.factor.ctypes.data, reader.offset.ctypes.data
+
+
+def _fill_meter(c: structures.Meter, meter: Meter) -> None:
+    c.stamps, c.samples = meter.stamps.ctypes.data, meter.samples.ctypes.data
+    c.ticks, c.moves = meter.ticks.ctypes.data, meter.moves.ctypes.data
+    c.efforts, c.room, c.full = meter.efforts.ctypes.data, len(meter.stamps), meter.full
+
+
+def _named(instruction: Instruction) -> str:
+    first = next(iter(vars(instruction).values()), "")
+    return f"{type(instruction).__name__.lower()} {first if isinstance(first, str) else ''}".strip()

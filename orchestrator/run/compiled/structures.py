@@ -1,0 +1,142 @@
+"""The structures of loop.h, field by field. Pointers are addresses; whoever writes one keeps what
+it points to."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+
+from hapticlink.orchestrator.fmi.place import Place
+
+_INT, _DOUBLE, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+Fields = tuple[tuple[str, type], ...]
+
+
+def _all(kind: type, names: str) -> Iterator[tuple[str, type]]:
+    return ((name, kind) for name in names.split())
+
+
+class Transfer(ctypes.Structure):
+    _fields_ = (
+        *_all(_POINTER, "call fmu references buffer values"),
+        *_all(_INT, "n_references n type fmi"),
+    )
+
+
+class Fmu(ctypes.Structure):
+    _fields_ = (
+        *_all(_POINTER, "place fmu do_step get_state state"),
+        *_all(_INT, "fmi forward"),
+        *_all(_POINTER, "event terminate early reached gets"),
+        ("n_gets", _INT),
+        *_all(_POINTER, "outputs inverse good"),
+        *_all(_INT, "n_outputs n_steps sparse"),
+        ("checked", _POINTER),
+        *_all(_INT, "every first"),
+    )
+
+
+class Setter(ctypes.Structure):
+    _fields_ = (
+        *_all(_POINTER, "place where factors offsets values into whole sets"),
+        *_all(_INT, "n n_sets"),
+    )
+
+
+class Link(ctypes.Structure):
+    _fields_ = (
+        *_all(_INT, "started newest sent lost overtaken"),
+        ("late", _POINTER),
+        *_all(_INT, "n_late at_late"),
+        *_all(_POINTER, "arrivals stamps samples"),
+        *_all(_INT, "n room"),
+    )
+
+
+class Tank(ctypes.Structure):
+    _fields_ = (
+        *_all(_INT, "n tick"),
+        *_all(_POINTER, "stiffness damping where"),
+        *_all(_DOUBLE, "period available"),
+        *_all(_POINTER, "newest modulated x at"),
+    )
+
+
+class Hold(ctypes.Structure):
+    _fields_ = (
+        *_all(_INT, "kind n width depth count"),
+        ("history", _INT * 3),
+        *_all(_POINTER, "samples vectors"),
+        *_all(_INT, "arrival span interval begun"),
+        *_all(_POINTER, "sources held"),
+        ("n_angles", _INT),
+        *_all(_POINTER, "angles turns last"),
+        ("unwrapped", _INT),
+        *_all(_POINTER, "link tank"),
+        ("row", _INT),
+    )
+
+
+class Reader(ctypes.Structure):
+    _fields_ = (*_all(_POINTER, "where factor offset"), ("n", _INT))
+
+
+class Meter(ctypes.Structure):
+    _fields_ = (
+        *_all(Reader, "source held x"),
+        *_all(_POINTER, "counts stamps ticks samples moves efforts"),
+        *_all(_INT, "room full"),
+    )
+
+
+class Table(ctypes.Structure):
+    _fields_ = (*_all(_POINTER, "block view rows"), *_all(_INT, "n room"))
+
+
+class Op(ctypes.Structure):
+    _fields_ = (*_all(_INT, "code a b c d"), ("x", _DOUBLE))
+
+
+class Clock(ctypes.Structure):
+    _fields_ = (("starts", _POINTER), *_all(_INT, "n at"))
+
+
+class Block(ctypes.Structure):
+    _fields_ = (*_all(_INT, "first last count"),)
+
+
+class Loop(ctypes.Structure):
+    _fields_ = (
+        *_all(_POINTER, "points values ops fmus setters holds meters tables"),
+        *_all(_DOUBLE, "numerator denominator"),
+    )
+
+
+class At(ctypes.Structure):
+    _fields_ = (*_all(_INT, "op last what status"),)
+
+
+class Events(ctypes.Structure):
+    _fields_ = (
+        ("clocks", _POINTER),
+        *_all(_INT, "n_clocks end"),
+        *_all(_POINTER, "keys key kinds"),
+        *_all(_INT, "n_kinds kind tick events patience since"),
+        ("at", At),
+    )
+
+
+ALL = (
+    Place, Transfer, Fmu, Setter, Link, Tank, Hold, Reader,
+    Meter, Table, Op, Clock, Block, Loop, At, Events,
+)  # fmt: skip
+
+(
+    PYTHON, GET, SET, STEP, PUSH, EVALUATE, BLEND, SAMPLE, MOVE, FEED, RECORD, STOP_WHEN,
+) = range(12)  # fmt: skip
+"""Codes of operations."""
+
+(
+    DONE, CALL, JUDGE, FAILED, STEPPED, UNSAVED, FULL, DRAW, STOP, KIND, STARTS, PAUSE, OVERFLOW,
+) = range(13)  # fmt: skip
+"""Why the loop returns."""

@@ -1,0 +1,80 @@
+"""The event loop in Python: binds operations to calls once, then loops over the events. It is the
+reference of the compiled loop."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+
+from hapticlink.orchestrator.plan.operations import (
+    Event,
+    Get,
+    Operation,
+    Part,
+    Rollback,
+    Save,
+    Set,
+    Step,
+)
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.run.bind import Binder, Bound
+from hapticlink.orchestrator.run.fixed_point import Iterations, total
+from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.run.step_control import Steps
+
+
+class PythonLoop:
+    """The loop of a plan. complete: number of events that are complete. in_python: what is carried
+    out in Python, with the reason."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        simulation: Simulation,
+        in_python: dict[str, str],
+        joined: Callable[[Bound], Call] | None = None,
+    ) -> None:
+        self._plan, self._simulation, self.in_python = plan, simulation, in_python
+        self._binder = Binder(simulation, self._calls, joined)
+        self._bound: dict[Event | Part, list[Call]] = {}
+        self._counts: Counter[Event | Part] = Counter()
+        self.complete = 0
+
+    def run(self, turn: Callable[[int], object]) -> None:
+        """Run all events; `turn` is called after each with its tick."""
+        for tick, event in self._plan:
+            for call in self._calls(event):
+                call(tick)
+            self.complete += 1
+            turn(tick)
+
+    def _calls(self, kind: Event | Part) -> list[Call]:
+        """The calls of a kind of event, bound at its first occurrence."""
+        self._counts[kind] += 1
+        if (found := self._bound.get(kind)) is None:
+            found = self._bound[kind] = self._binder.bind_all(self._plan.block(kind))
+        return found
+
+    def _times(self) -> Mapping[Event | Part, int]:
+        """How often each kind of event was begun."""
+        return self._counts
+
+    def calls(self) -> dict[str, dict[str, int]]:
+        """Number of FMI calls by FMU and kind; blocks interrupted by a fault count in full."""
+        totals: dict[str, Counter[str]] = {name: Counter() for name in self._simulation.instances}
+        ran: list[tuple[Operation, int]] = []
+        for event, times in self._times().items():
+            ran += [(op, times) for op in self._plan.block(event)]
+        for repeat, loop in self._binder.loops.items():
+            ran += [(op, loop.counts.iterations) for op in repeat.body]
+            ran += [(op, loop.counts.rollbacks) for op in repeat.again]
+        for op, times in ran:
+            if isinstance(op, Get | Set | Step | Save | Rollback):
+                totals[op.fmu][type(op).__name__.lower()] += times
+        return {name: dict(sorted(counter.items())) for name, counter in totals.items()}
+
+    def steps(self) -> dict[str, Steps]:
+        return {clock: a.steps for clock, a in self._binder.advancers.items()}
+
+    def iterations(self) -> Iterations | None:
+        return total(loop.counts for loop in self._binder.loops.values())

@@ -1,0 +1,185 @@
+"""The compiled loop writes the bytes of the one in Python: every scene, hold, scheme and fault."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
+from hapticlink.orchestrator.scene.records import Iteration, StepControl
+from tests.orchestrator import coupled, oscillator
+from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
+
+try:
+    load()
+except Unavailable as why:
+    pytest.skip(str(why), allow_module_level=True)
+
+SCENES = sorted(p.stem for p in (Path(__file__).parents[3] / "scenes").glob("*.toml"))
+OWN = ("timings", "in_python")
+"""What run.json says of how a run was carried out."""
+
+
+def both(
+    scene: str, folder: Path, monkeypatch: pytest.MonkeyPatch, *options: str
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """The run.json that both loops give, and what the compiled loop left to Python."""
+    told, files = [], []
+    for choice in ("python", "compiled"):
+        monkeypatch.setenv(CHOICE, choice)
+        out = folder / choice
+        simulate(scene, out, options)
+        run = json.loads((out / "run.json").read_text())
+        left = run["in_python"]
+        told.append({key: value for key, value in run.items() if key not in OWN})
+        files.append({p.name: p.read_bytes() for p in out.iterdir() if p.suffix == ".csv"})
+    assert told[0] == told[1]
+    assert files[0] == files[1]
+    return told[1], left
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_shipped_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    run, left = both(name, tmp_path, monkeypatch, "duration=0.1")
+    assert run["fault"] is None
+    assert not left
+
+
+@pytest.mark.parametrize("hold", [*HOLDS.names()])
+def test_every_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str) -> None:
+    kind = "downsampling" if HOLDS[hold].downsamples else "hold"
+    options = [f"{kind}={hold}", "graphics.rate=60", "duration=0.3"]
+    run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options)
+    assert hold in run["holds"].values()
+    late = "delays.virtual_mechanism.x={ min = 0.001, max = 0.03, loss = 0.1, seed = 3 }"
+    run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options, late)
+    assert sum(link["lost"] for link in run["links"].values())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["coupling=jacobi"],
+        ["coupling=gauss-seidel-plants"],
+        ["graphics.rate={ min = 20, max = 60, seed = 2 }"],
+        ["graphics.align=tick", "graphics.rate=29.97", "graphics.phase=0.01"],
+        ["controller.bias=full"],
+        ["stop_when='virtual_mechanism.energy > 1e-5'"],
+    ],
+    ids=lambda options: options[0],
+)
+def test_every_scheme_and_rate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str]
+) -> None:
+    both("closed-loop", tmp_path, monkeypatch, "duration=0.2", *options)
+
+
+STEPS = """
+coupling = "{coupling}"
+[substeps]
+two = 3
+[[fmu]]
+name = "one"
+path = "Gives.fmu"
+[[fmu]]
+name = "two"
+path = "Gives.fmu"
+rate = 24
+[[connection]]
+from = "one.y"
+to = "two.u"
+factor = 0.3
+hold = "foh"
+[[connection]]
+from = "two.y"
+to = "one.u"
+hold = "smooth"
+"""
+
+
+@pytest.mark.parametrize("isolate", ["", "isolate = true"])
+@pytest.mark.parametrize("coupling", ["gauss-seidel", "jacobi"])
+def test_substeps_and_isolated_fmus(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coupling: str, isolate: str
+) -> None:
+    python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
+    text = STEPS.format(coupling=coupling).replace("rate = 24", f"rate = 24\n{isolate}")
+    _, left = both(str(scene(tmp_path, text)), tmp_path, monkeypatch)
+    assert ("step two" in left) == bool(isolate)
+
+
+ONE = '[[fmu]]\nname = "one"\npath = "{}.fmu"\n'
+FAULTS = {
+    "raises": "if time > 0.2: raise RuntimeError('broken gear')",
+    "NaN": "self.y = float('nan') if self.steps == 5 else float(self.steps)",
+    "discards": "return time < 0.2",
+    "takes only short steps": "if size > 0.005: return False\n        self.y += size",
+}
+
+
+@pytest.mark.parametrize("policy", ["", "faults.nan=hold", "faults.discard=retry"])
+@pytest.mark.parametrize("body", FAULTS.values(), ids=FAULTS)
+def test_faults_of_python_fmus(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, policy: str
+) -> None:
+    python_fmu(tmp_path, "Fails", body, canGetAndSetFMUstate=True)
+    options = [policy] if policy else []
+    both(str(scene(tmp_path, ONE.format("Fails"))), tmp_path, monkeypatch, *options)
+
+
+@pytest.mark.parametrize("mode", range(1, 5))
+def test_every_status_of_a_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int) -> None:
+    c_fmu(tmp_path)
+    text = ONE.format("faults") + f"start.mode = {mode}\n"
+    run, _ = both(str(scene(tmp_path, text)), tmp_path, monkeypatch)
+    assert (run["fault"] is None) == (mode == 1)
+
+
+ITERATED = {"iteration": Iteration(method="newton", tolerance=1e-10), "between": "hermite"}
+DOUBLING = StepControl(method="doubling", tolerance=0.01, min="1/50000")
+ECCO = StepControl(method="ecco", tolerance=1e-4, min="1/50000", energy=100.0)
+REPEATED: dict[str, tuple[str, dict[str, Any]]] = {
+    "Newton": ("iterated", ITERATED),
+    "Aitken, substeps": ("iterated", {"between": "foh", "substeps": 2}),
+    "doubling": ("jacobi", {"step_control": DOUBLING, "hold": "foh"}),
+    "doubling, iterated": ("iterated", {"step_control": DOUBLING, "between": "foh"}),
+    "ecco": ("gauss-seidel", {"step_control": ECCO, "hold": "smooth"}),
+}
+
+
+@pytest.mark.parametrize("how", REPEATED)
+def test_steps_that_are_taken_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    """The two-mass oscillator, iterated or in steps of controlled size."""
+    coupling, settings = REPEATED[how]
+    fmus = coupled.described((oscillator.one(), coupled.with_derivative()), tmp_path)
+    base = Fraction(1, 50000) if "step_control" in settings else None
+    found = []
+    for choice in ("python", "compiled"):
+        monkeypatch.setenv(CHOICE, choice)
+        made = coupled.system(
+            fmus,
+            coupled.HERMITE,
+            coupling,
+            Fraction(1, 50),
+            Fraction(1, 2),
+            base=base,
+            get_after_set=("one", "two"),
+            power=coupled.POWER,
+            **settings,
+        )
+        outcome, table = coupled.simulate(made, tmp_path)
+        told = asdict(outcome)
+        for own in ("wall_time", "step_time", "in_python"):
+            del told[own]
+        found.append((told, table.rows.tobytes()))
+    assert found[0] == found[1]
+    assert found[0][0]["energies"]

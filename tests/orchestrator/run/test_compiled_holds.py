@@ -1,0 +1,104 @@
+"""Each hold in C returns the bits of its Python class, whatever it is given."""
+
+from __future__ import annotations
+
+import ctypes
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hapticlink.orchestrator.holds import HOLDS, HoldContext
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank
+from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.manifolds import Unwrapped
+from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.holds import KINDS, CompiledHold, CompiledTank, parts
+from hapticlink.orchestrator.run.compiled.library import load
+from hapticlink.orchestrator.run.energy.bonds import Reader
+from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.system.latency import Late, Link
+
+NUMERATOR, DENOMINATOR = 3, 7680
+SIZE = 3
+NAMES = [*HOLDS.names(lambda kind: kind in KINDS)]
+
+
+class Signals:
+    """As many as a hold reads: samples with their derivatives, then positions."""
+
+    def __init__(self) -> None:
+        self.values = np.zeros(3 * SIZE)
+
+    def view(self, places: list[int]) -> None:
+        return None
+
+
+def seconds(ticks: float) -> float:
+    return ticks * NUMERATOR / DENOMINATOR
+
+
+class Pair:
+    """A hold in Python and the same in C."""
+
+    def __init__(self, name: str, wrapped: str, generator: np.random.Generator) -> None:
+        self.signals, self.position = Signals(), list(range(2 * SIZE, 3 * SIZE))
+        self.python, own = (self._made(name, wrapped, generator) for _ in range(2))
+        self._loop = structures.Loop(values=self.signals.values.ctypes.data)
+        self._loop.numerator, self._loop.denominator = NUMERATOR, DENOMINATOR
+        tank = getattr(parts(own).own, "tank", None)
+        shared = CompiledTank(tank) if tank else None
+        twice = HOLDS[name].needs == "derivative"
+        self.width = SIZE * (1 + twice)
+        held, loop = np.zeros(SIZE), ctypes.addressof(self._loop)
+        places = range(self.width)
+        self.compiled = CompiledHold(load(), loop, own, places, held, 1000, shared)
+
+    def _made(self, name: str, wrapped: str, generator: np.random.Generator) -> Hold:
+        reader = Reader(self.signals, self.position, np.ones(SIZE))  # type: ignore[arg-type]
+        tank = EnergyTank(np.array([40.0, 3.0, 7.0]), np.full(SIZE, 0.5), reader, 0.02, seconds)
+        needed = (tank, 0) if HOLDS[name].needs == "spring" else None
+        context = HoldContext(SIZE, seconds, tank=needed)
+        if wrapped == "angle":
+            return Unwrapped(lambda: HOLDS[name](context), [0, 2], [2 * np.pi, 360.0])
+        if wrapped == "late":
+            latency = Latency(min=0.001, max=0.02, loss=0.2, seed=5)
+            return Late(HOLDS[name](context), Link(latency, Fraction(NUMERATOR, DENOMINATOR)))
+        return HOLDS[name](context)
+
+
+@pytest.mark.parametrize("wrapped", ["", "angle", "late"])
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_holds_in_c_are_those_in_python(name: str, wrapped: str, seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    pair = Pair(name, wrapped, generator)
+    holds = (pair.python, pair.compiled)
+    tick, stamp = 0, 0
+    saved = [hold.saved() for hold in holds]
+    for step in range(60):
+        sample = generator.normal(size=pair.width) * 10.0 ** generator.integers(-3, 4)
+        pair.signals.values[pair.position] = generator.normal(size=SIZE)
+        if step == 0 or generator.random() < 0.7:
+            for hold in holds:
+                hold.push(stamp, sample, tick)
+        if step == 30 and wrapped != "late" and name != "pspm":  # a tank is restored beside it
+            saved = [hold.saved() for hold in holds]
+        for ahead in (0.0, float(generator.integers(1, 40)) / 2):
+            expected = np.array(pair.python.value(tick, ahead), copy=True)
+            assert pair.compiled.value(tick, ahead).tobytes() == expected.tobytes()
+        tick += int(generator.integers(0, 30))
+        stamp = int(generator.integers(stamp, tick + 1)) if generator.random() < 0.8 else stamp
+    if wrapped == "late":
+        ways = [hold.link for hold in (pair.python, pair.compiled)]  # type: ignore[union-attr]
+        counts = [(way.sent, way.lost, way.overtaken) for way in ways]
+        assert counts[0] == counts[1]
+    elif name != "pspm":
+        for hold, state in zip(holds, saved, strict=True):
+            hold.restore(state)
+        later = tick + 7
+        expected = np.array(pair.python.value(later, 1.5), copy=True)
+        assert pair.compiled.value(later, 1.5).tobytes() == expected.tobytes()
