@@ -61,7 +61,7 @@ class Recorder:
             self.flush()
 
     def flush(self) -> None:
-        """Write the rows of the block: all, or as many as the disk has room for, raising OSError."""
+        """Write the block's rows: all, or as many as the disk has room for, raising OSError."""
         kept, self.count.value = self.block[: self.count.value], 0
         if not len(kept):
             return
