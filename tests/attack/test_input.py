@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="forks")
 
 @pytest.mark.parametrize(
     ("attack", "number"),
-    [(scenes.attack, 12), (options.attack, 30), (ssps.attack, 5)],
+    [(scenes.attack, 20), (options.attack, 30), (ssps.attack, 5)],
     ids=["scenes", "options", "ssps"],
 )
 def test_nothing_is_lost_crashes_or_hangs(
