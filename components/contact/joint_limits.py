@@ -3,9 +3,8 @@
     g = c - c_lower,  g' = c'    and    g = c_upper - c,  g' = -c'
     Q = (dc/dq)' (F_lower - F_upper)
 
-c is the coordinate of a joint, or that of a cut joint which closes a loop: the angle of the first
-body from the second, or the displacement of the first point from the second along the axis. A
-restitution e, the rate after an impact by that before it, gives the damping
+c is the coordinate of a joint or a cut joint (joint_coordinates.py). A restitution e, the rate
+after an impact by that before it, gives the damping
 
     b = 2 z sqrt(k m),   1/m = (dc/dq) D^-1 (1 - W' (W D^-1 W')^-1 W D^-1) (dc/dq)'
     e = exp(-2 z acos(z)/sqrt(1 - z^2))
@@ -20,7 +19,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import casadi as ca
 from scipy.optimize import brentq
@@ -29,35 +27,8 @@ from hapticlink.components.component import Variable
 from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
 from hapticlink.components.dynamics.constrained_directions import LOCKED
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import loop_name
-from hapticlink.components.specs.linkage import COORDINATE_UNITS, Limits, Linkage
-
-
-@dataclass(frozen=True)
-class Limited:
-    """A joint, or a cut joint by its index, with limits; unit of its coordinate."""
-
-    name: str
-    limits: Limits
-    unit: str
-    loop: int | None = None
-
-
-def limited(linkage: Linkage) -> list[Limited]:
-    """The joints with limits. Raises ValueError for limits on a free joint, which has three
-    coordinates."""
-    found = []
-    for j in linkage.joint:
-        if j.limits is not None:
-            if len(COORDINATE_UNITS[j.type]) != 1:
-                raise ValueError(f"joint `{j.name}`: limits act on one coordinate, and it has 3")
-            found.append(Limited(j.name, j.limits, COORDINATE_UNITS[j.type][0]))
-    for i, loop in enumerate(linkage.loop):
-        if loop.limits is not None:
-            unit = "rad" if loop.type == "revolute" else "m"
-            found.append(Limited(loop_name(linkage, i), loop.limits, unit, i))
-    return found
+from hapticlink.components.linkage.joint_coordinates import JointCoordinate, joints_with
+from hapticlink.components.specs.linkage import Limits, Linkage
 
 
 def damping_ratio(restitution: float) -> float:
@@ -74,8 +45,8 @@ def damping_ratio(restitution: float) -> float:
 
 def parameters(linkage: Linkage) -> list[Variable]:
     found = []
-    for joint in limited(linkage):
-        limits, effort = joint.limits, "N.m" if joint.unit == "rad" else "N"
+    for joint in joints_with(linkage, "limits"):
+        limits, effort = _limits(joint), joint.effort_unit
         stiffness, damping = f"{effort}/{joint.unit}", f"{effort}.s/{joint.unit}"
         given = {
             "lower": (joint.unit, limits.lower, "lower end of the range"),
@@ -99,17 +70,17 @@ class JointLimits(OneSidedForces):
     def __init__(self, space: OperationalSpace) -> None:
         model = space.model
         self._n, p = model.q.numel(), model.p
-        joints = limited(model.linkage)
-        coordinates = [_coordinate(model, joint) for joint in joints]
+        joints = joints_with(model.linkage, "limits")
+        coordinates = [joint.value(model) for joint in joints]
         inertias = _inertias(space, joints, coordinates)
         self.sides, self._ways = [], []
         for joint, c in zip(joints, coordinates, strict=True):
             k, rate = p[f"{joint.name}.limit_stiffness"], model.rate(c)
             b = ca.SX(0)
-            if joint.limits.restitution is not None:
+            if _limits(joint).restitution is not None:
                 ratio = p[f"{joint.name}.limit_damping_ratio"]
                 b = 2 * ratio * ca.sqrt(k * next(inertias))
-            elif joint.limits.damping is not None:
+            elif _limits(joint).damping is not None:
                 b = p[f"{joint.name}.limit_damping"]
             for end, sign in (("lower", 1), ("upper", -1)):
                 if (limit := p.get(f"{joint.name}.{end}")) is not None:
@@ -123,26 +94,18 @@ class JointLimits(OneSidedForces):
         return Q
 
 
-def _coordinate(model: LinkageModel, joint: Limited) -> ca.SX:
-    if joint.loop is None:
-        return model.q[model.coordinate(joint.name)]
-    loop = model.linkage.loop[joint.loop]
-    first, second = (model.frames[body] for body in loop.bodies)
-    if loop.type == "revolute":
-        return first.angle - second.angle
-    axis, ends = model.p[f"{joint.name}.axis"], [model.p[f"{joint.name}.at{k}"] for k in (1, 2)]
-    along = second.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis))
-    return ca.dot(along, first.point(ends[0]) - second.point(ends[1]))
+def _limits(joint: JointCoordinate) -> Limits:
+    assert joint.joint.limits is not None
+    return joint.joint.limits
 
 
 def _inertias(
-    space: OperationalSpace, joints: list[Limited], coordinates: list[ca.SX]
+    space: OperationalSpace, joints: list[JointCoordinate], coordinates: list[ca.SX]
 ) -> Iterator[ca.SX]:
     """The inertia m of each coordinate whose limits have a restitution, with the loops closed; that
     of one which the loops lock is bounded by its inertia with open loops."""
-    given = [
-        c for j, c in zip(joints, coordinates, strict=True) if j.limits.restitution is not None
-    ]
+    both = zip(joints, coordinates, strict=True)
+    given = [c for joint, c in both if _limits(joint).restitution is not None]
     if not given:
         return
     J = ca.jacobian(ca.vertcat(*given), space.model.q)

@@ -15,7 +15,7 @@ method cannot integrate at the start pose are refused.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import casadi as ca
 import numpy as np
@@ -26,8 +26,9 @@ from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import parameters, start_parameters
 from hapticlink.components.forces.dry_friction import LAG
 from hapticlink.components.forces.friction import rubbing
+from hapticlink.components.linkage.joint_coordinates import JointCoordinate
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.specs.linkage import Joint, Linkage, Mechanism
+from hapticlink.components.specs.linkage import Linkage, Mechanism
 
 LEAST = 1e-9  # rad/s or m/s, of a default v_f
 OPENED = 0.25  # share of the mobility with open loops
@@ -41,19 +42,19 @@ def resolved(linkage: Linkage, mechanism: Mechanism, step_s: float) -> Linkage:
     rubs = rubbing(linkage)
     if not rubs:
         return linkage
-    found = dict(zip((j.name for j in rubs), _mobilities(linkage, rubs), strict=True))
-    joints = []
-    for j in linkage.joint:
-        if j.name in found:
-            closed, opened = found[j.name]
-            if mechanism.integrator != IMPLICIT:
-                _require_slow(j, closed, step_s)
-            j = _scaled(j, max(closed, OPENED * opened), len(rubs), step_s)
-        joints.append(j)
-    return replace(linkage, joint=tuple(joints))
+    joints, loops = {j.name: j for j in linkage.joint}, list(linkage.loop)
+    for j, (closed, opened) in zip(rubs, _mobilities(linkage, rubs), strict=True):
+        if mechanism.integrator != IMPLICIT:
+            _require_slow(j, closed, step_s)
+        scaled = _scaled(j.joint, max(closed, OPENED * opened), len(rubs), step_s)
+        if j.cut is None:
+            joints[j.name] = scaled
+        else:
+            loops[j.cut] = scaled
+    return replace(linkage, joint=tuple(joints.values()), loop=tuple(loops))
 
 
-def _scaled(joint: Joint, A: float, N: int, h: float) -> Joint:
+def _scaled(joint: Any, A: float, N: int, h: float) -> Any:
     """The joint with both its v_f and d; if f is 0, which may be tuned, those for f = 1."""
     d, v_f, pull = joint.friction_deflection, joint.friction_speed, (joint.friction or 1.0) * A
     if v_f is None:
@@ -64,9 +65,9 @@ def _scaled(joint: Joint, A: float, N: int, h: float) -> Joint:
     return replace(joint, friction_speed=v_f, friction_deflection=d)
 
 
-def _require_slow(joint: Joint, A: float, h: float) -> None:
+def _require_slow(rubbing: JointCoordinate, A: float, h: float) -> None:
+    joint, name = rubbing.joint, f"joint `{rubbing.name}`"
     pull, d, v_f = (joint.friction or 0.0) * A, joint.friction_deflection, joint.friction_speed
-    name = f"joint `{joint.name}`"
     if v_f and pull / v_f * h > STABLE:
         _refuse(f"{name}: `friction_speed` = {v_f!r}", pull / v_f, 4 * pull * h, h)
     if d and (pole := max((pull / d) ** 0.5, (v_f or 0.0) / d)) * h > STABLE:
@@ -82,13 +83,13 @@ def _refuse(what: str, pole: float, enough: float, h: float) -> NoReturn:
     )
 
 
-def _mobilities(linkage: Linkage, joints: list[Joint]) -> list[tuple[float, float]]:
+def _mobilities(linkage: Linkage, joints: list[JointCoordinate]) -> list[tuple[float, float]]:
     """Mobilities (1/kg or 1/(kg.m2)) of joints at the start pose, with closed and open loops."""
     p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
     q0, _ = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
     q, qd = ca.SX.sym("q", q0.numel()), ca.SX.sym("qd", q0.numel())
     model = LinkageModel(linkage, p, q, qd)
-    J = ca.SX.eye(q.numel())[[model.coordinate(j.name) for j in joints], :]
+    J = ca.jacobian(ca.vertcat(*(j.value(model) for j in joints)), q)
     start = ca.Function("start", [p.vector], [q0])
     space = OperationalSpace(model)
     both = [ca.diag(space.mobility(J)), ca.diag(space.open_mobility(J))]

@@ -27,12 +27,11 @@ def start(space: OperationalSpace, Q: ca.SX, q: ca.SX, qd: ca.SX, t: ca.SX) -> c
     symbols of the model."""
     model = space.model
     at, k = Joints(model), model.deflection.numel()
-    J = ca.SX(k, model.q.numel())
-    for i, coordinate in enumerate(at.coordinates):
-        J[i, coordinate] = 1
+    J = at.jacobian
     resting = ca.fabs(at.v) < MOVING * at.v_f
     sliding = ca.if_else(resting, 0, at.d * ca.sign(at.v))
-    a = ca.substitute(J @ space.motion(Q)[0], model.deflection, sliding)
+    motion = J @ space.motion(Q)[0] + ca.jtimes(at.v, model.q, model.qd)
+    a = ca.substitute(motion, model.deflection, sliding)
     a = ca.if_else(resting, a, 0)
     rest = ca.diag(resting)
     A = rest @ space.mobility(J) @ rest

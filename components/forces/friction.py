@@ -1,6 +1,6 @@
 """Coulomb friction on single joint coordinates (dry_friction.py), with the deflection z as a state:
 
-    Q = -f e/d,   tau = d/v_f
+    Q = -(dc/dq)' f e/d,   tau = d/v_f
 
 f is the friction, d the deflection at which a joint that sticks begins to slide, and v_f the speed
 at which it slides without any.
@@ -8,62 +8,53 @@ at which it slides without any.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import casadi as ca
 
 from hapticlink.components.component import Variable
 from hapticlink.components.forces import dry_friction
-from hapticlink.components.specs.linkage import Joint, Linkage
+from hapticlink.components.linkage.joint_coordinates import JointCoordinate, joints_with
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.linkage import Linkage
 
-if TYPE_CHECKING:
-    from hapticlink.components.linkage.model import LinkageModel
-
-_UNITS = {"revolute": ("N.m", "rad", "rad/s"), "prismatic": ("N", "m", "m/s")}
+KEYS = ("friction", "friction_deflection", "friction_speed")
 
 
-def rubbing(linkage: Linkage) -> list[Joint]:
-    """The joints with friction. Raises ValueError for friction on a free joint, which has three
-    coordinates."""
-    found = [j for j in linkage.joint if j.friction is not None]
-    for j in found:
-        if j.type not in _UNITS:
-            raise ValueError(f"joint `{j.name}`: friction acts on one coordinate, and it has 3")
-    return found
+def rubbing(linkage: Linkage) -> list[JointCoordinate]:
+    """The joints and cut joints with friction. Raises ValueError for friction on a free joint,
+    which has three coordinates."""
+    return joints_with(linkage, "friction")
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
     """The parameters of joints with friction, those that are given (friction_scale.py)."""
     found = []
+    texts = ("friction", "deflection at which it slides", "speed at which it slides")
     for j in rubbing(linkage):
-        given = {
-            "friction": (j.friction, "friction"),
-            "friction_deflection": (j.friction_deflection, "deflection at which it slides"),
-            "friction_speed": (j.friction_speed, "speed at which it slides"),
-        }
-        for (name, (value, text)), unit in zip(given.items(), _UNITS[j.type], strict=True):
-            if value is not None:
-                found.append(Variable(f"{j.name}.{name}", (), unit, value, f"{text} of {j.name}"))
+        units = (j.effort_unit, j.unit, f"{j.unit}/s")
+        for key, unit, text in zip(KEYS, units, texts, strict=True):
+            if (value := getattr(j.joint, key)) is not None:
+                found.append(Variable(f"{j.name}.{key}", (), unit, value, f"{text} of {j.name}"))
     return found
 
 
 def states(linkage: Linkage) -> list[Variable]:
     """The deflections of the joints with friction, none without."""
-    units = tuple(_UNITS[j.type][1] for j in rubbing(linkage))
+    units = tuple(j.unit for j in rubbing(linkage))
     return [Variable("deflection", (len(units),), units)] if units else []
 
 
 class Joints:
-    """Rates v, deflections z and d, friction f and tau of the joints with friction, each k x 1; NaN
-    for a linkage that is not `resolved` (friction_scale.py), whose friction is not evaluated."""
+    """Rates v, deflections z and d, friction f and tau of the joints with friction, each k x 1, and
+    the Jacobian of their coordinates (k x n); NaN for a linkage that is not `resolved`
+    (friction_scale.py), whose friction is not evaluated."""
 
     def __init__(self, model: LinkageModel) -> None:
         joints, p = rubbing(model.linkage), model.p
-        self.coordinates = [model.coordinate(j.name) for j in joints]
-        self.v, self.z = model.qd[self.coordinates], model.deflection
+        c = ca.vertcat(*(j.value(model) for j in joints))
+        self.jacobian = ca.jacobian(c, model.q)
+        self.v, self.z = model.rate(c), model.deflection
         self.f, self.d, self.v_f = (
-            ca.vertcat(*(p.get(f"{j.name}.{name}", ca.SX.nan()) for j in joints))
-            for name in ("friction", "friction_deflection", "friction_speed")
+            ca.vertcat(*(p.get(f"{j.name}.{key}", ca.SX.nan()) for j in joints)) for key in KEYS
         )
         self.tau = self.d / self.v_f
 
@@ -78,9 +69,8 @@ def energy(model: LinkageModel) -> ca.SX | None:
 def efforts(model: LinkageModel) -> ca.SX | None:
     if not rubbing(model.linkage):
         return None
-    at, Q = Joints(model), ca.SX(model.q.numel(), 1)
-    Q[at.coordinates] = -at.f * dry_friction.held(at.z, at.v, at.d, at.tau) / at.d
-    return Q
+    at = Joints(model)
+    return -at.jacobian.T @ (at.f * dry_friction.held(at.z, at.v, at.d, at.tau) / at.d)
 
 
 def bounded(model: LinkageModel, z: ca.SX) -> ca.SX:

@@ -1,64 +1,53 @@
-"""Springs and viscous friction on single joint coordinates: Q = -k (q - q_rest) - b qd."""
+"""Springs and viscous friction on single joint coordinates (joint_coordinates.py):
+
+Q = (dc/dq)' (-k (c - c_rest) - b c')
+"""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from hapticlink.components.component import Variable
+from hapticlink.components.linkage.joint_coordinates import JointCoordinate, joints_with
+from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Linkage
 
-if TYPE_CHECKING:
-    from hapticlink.components.linkage.model import LinkageModel
-
-_UNITS = {
-    "revolute": ("N.m/rad", "rad", "N.m.s/rad"),
-    "prismatic": ("N/m", "m", "N.s/m"),
-}
+KEYS = ("stiffness", "rest", "damping")
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
     """The parameters of these terms. Raises ValueError for a term on a free joint, which has three
     coordinates."""
     found = []
-    for j in linkage.joint:
-        fields = ("stiffness", "rest", "damping")
-        given = {f: getattr(j, f) for f in fields if getattr(j, f) is not None}
-        if given and j.type not in _UNITS:
-            raise ValueError(
-                f"joint `{j.name}`: {', '.join(given)} act on one coordinate and a {j.type} joint "
-                "has three; use a spring between points"
-            )
-        for unit, field in zip(_UNITS.get(j.type, ()), fields, strict=False):
-            if field in given:
-                text = f"{field} of {j.name}"
-                found.append(Variable(f"{j.name}.{field}", (), unit, given[field], text))
+    for j in joints_with(linkage, *KEYS):
+        units = (f"{j.effort_unit}/{j.unit}", j.unit, f"{j.effort_unit}.s/{j.unit}")
+        for unit, key in zip(units, KEYS, strict=True):
+            if (value := getattr(j.joint, key)) is not None:
+                found.append(Variable(f"{j.name}.{key}", (), unit, value, f"{key} of {j.name}"))
     return found
 
 
 def energy(model: LinkageModel) -> ca.SX | None:
     stored = [
-        0.5 * model.p[f"{j.name}.stiffness"] * _deflection(model, j.name) ** 2
-        for j in model.linkage.joint
-        if j.stiffness is not None
+        0.5 * model.p[f"{j.name}.stiffness"] * _deflection(model, j) ** 2
+        for j in joints_with(model.linkage, "stiffness")
     ]
     return sum(stored[1:], start=stored[0]) if stored else None
 
 
-def _deflection(model: LinkageModel, joint: str) -> ca.SX:
-    q = model.q[model.coordinate(joint)]
-    return q - model.p[f"{joint}.rest"] if f"{joint}.rest" in model.p else q
+def _deflection(model: LinkageModel, joint: JointCoordinate) -> ca.SX:
+    c = joint.value(model)
+    return c - model.p[f"{joint.name}.rest"] if f"{joint.name}.rest" in model.p else c
 
 
 def efforts(model: LinkageModel) -> ca.SX | None:
-    Q, any_term = ca.SX(model.q.numel(), 1), False
-    for j in model.linkage.joint:
-        k, p = model.coordinate(j.name), model.p
-        if j.stiffness is not None:
-            Q[k] -= p[f"{j.name}.stiffness"] * _deflection(model, j.name)
-            any_term = True
-        if j.damping is not None:
-            Q[k] -= p[f"{j.name}.damping"] * model.qd[k]
-            any_term = True
-    return Q if any_term else None
+    joints = joints_with(model.linkage, "stiffness", "damping")
+    Q = ca.SX(model.q.numel(), 1)
+    for j in joints:
+        c, effort = j.value(model), ca.SX(0)
+        if j.joint.stiffness is not None:
+            effort -= model.p[f"{j.name}.stiffness"] * _deflection(model, j)
+        if j.joint.damping is not None:
+            effort -= model.p[f"{j.name}.damping"] * model.rate(c)
+        Q += ca.jacobian(c, model.q).T * effort
+    return Q if joints else None

@@ -199,10 +199,22 @@ class Loop:
     """Angle of the first body from the second in a prismatic joint; by default 0."""
     name: str | None = None
     """Prefix of its FMU parameters; by default loop1, loop2, ..."""
+    stiffness: JointStiffness | None = None
+    """As of a joint, on the coordinate of a cut one: the angle of the first body from the second (0
+    where their x axes are parallel; full turns count), or the displacement of the first point from
+    the second along `axis`."""
+    rest: Coordinate | None = None
+    """As of a joint."""
+    damping: JointDamping | None = None
+    """As of a joint."""
+    friction: Annotated[float, Quantity("N.m or N", ge=0)] | None = None
+    """As of a joint."""
+    friction_speed: Annotated[float, Quantity("rad/s or m/s", gt=0)] | None = None
+    """As of a joint."""
+    friction_deflection: Annotated[float, Quantity("rad or m", gt=0)] | None = None
+    """As of a joint."""
     limits: Limits | None = None
-    """Ends of the range of a revolute joint's angle, that of the first body from the second (0
-    where their x axes are parallel; full turns count), or of the displacement of the first point
-    from the second along `axis`."""
+    """As of a joint."""
 
 
 @dataclass(frozen=True, kw_only=True)

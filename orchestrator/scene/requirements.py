@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach
 from hapticlink.components.linkage.closures import rows
+from hapticlink.components.specs.linkage import Joint, Loop
 from hapticlink.orchestrator.scene.blocks import graphics_block, impedance, topology
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -55,12 +56,13 @@ def needs(scene: Scene) -> Iterator[Need]:
 def _forces(scene: Scene) -> Iterator[Need]:
     assert scene.linkage is not None
     joints = scene.linkage.joint
+    every: tuple[Joint | Loop, ...] = (*joints, *scene.linkage.loop)
     given = {
         "joint limits": scene.linkage.limited,
         "gravity": scene.linkage.gravity is not None,
         "springs and dampers": bool(scene.linkage.spring)
-        or any(j.stiffness is not None or j.damping is not None for j in joints),
-        "friction": any(j.friction is not None for j in joints),
+        or any(j.stiffness is not None or j.damping is not None for j in every),
+        "friction": any(j.friction is not None for j in every),
         "drives": any(j.drive is not None for j in joints),
         "forces of your own": bool(scene.linkage.force),
     }

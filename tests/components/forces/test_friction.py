@@ -14,6 +14,7 @@ from hapticlink.components.specs.linkage import (
     Body,
     Joint,
     Linkage,
+    Loop,
     Mechanism,
     OperationalPoint,
 )
@@ -229,6 +230,51 @@ def test_a_linkage_with_a_redundant_loop_sticks_in_all_its_joints():
     assert np.abs(deflection).min() > 0
     assert np.abs(steps(held, 60.0).state["q"] - start).max() < 1e-9
     np.testing.assert_allclose(held.state["deflection"], deflection, atol=1e-9)
+
+
+@pytest.mark.parametrize("formulation", ["multipliers", "partitioning", "embedding"])
+def test_a_cut_joint_rubs_as_one_of_the_tree(formulation):
+    """A four-bar with friction in the pivot between coupler and rocker, with this pivot cut, and
+    with the rocker's cut instead."""
+    crank, coupler, rocker = (
+        Body(name=n, mass=m, inertia=i, center=(c, 0.0))
+        for n, m, i, c in (("a", 0.2, 3e-5, 0.02), ("b", 0.6, 7e-4, 0.06), ("c", 0.4, 3e-4, 0.045))
+    )
+    rubs = {"friction": 0.01, "friction_speed": 0.5, "friction_deflection": 2e-3}
+    rubs |= {"damping": 2e-3, "stiffness": 0.3, "rest": 1.5}
+    base = Joint(name="crank", child="a")
+    wrist = Joint(name="wrist", parent="a", child="b", at_parent=(0.04, 0.0))
+    angles = {"crank": 1.05, "wrist": -0.61, "rocker": 1.25}
+    common = {
+        "body": (crank, coupler, rocker),
+        "operational_point": OperationalPoint(body="b"),
+        "gravity": (0.0, -G),
+    }
+    cut = Linkage(
+        joint=(base, wrist, Joint(name="rocker", child="c", at_parent=(0.1, 0.0))),
+        loop=(Loop(bodies=("c", "b"), at=((0.09, 0.0), (0.12, 0.0)), **rubs),),
+        start=angles,
+        start_velocity={"crank": 8.0},
+        **common,
+    )
+    q = running(cut).state["q"]
+    elbow = Joint(
+        name="elbow", parent="b", child="c", at_parent=(0.12, 0.0), at_child=(0.09, 0.0), **rubs
+    )
+    whole = Linkage(
+        joint=(base, wrist, elbow),
+        loop=(Loop(bodies=("c", "ground"), at=((0.0, 0.0), (0.1, 0.0))),),
+        start={"crank": q[0], "wrist": q[1], "elbow": q[2] - q[0] - q[1]},
+        start_velocity={"crank": 8.0},
+        **common,
+    )
+    runs = [running(cut, 5e-4, formulation=formulation), running(whole, 5e-4)]
+    runs[0].put(q=q)
+    for _ in range(20):
+        first, second = (steps(r, 0.05, 2000).y for r in runs)
+        np.testing.assert_allclose(first["x"], second["x"], atol=1e-6)
+        assert first["energy"] == pytest.approx(second["energy"], abs=1e-6)
+    assert runs[0].state["deflection"] == pytest.approx(runs[1].state["deflection"], abs=1e-6)
 
 
 @pytest.mark.parametrize("formulation", ["partitioning", "embedding"])

@@ -1,0 +1,63 @@
+"""The coordinate c(q) of a joint, on which springs, friction and limits act: Q = (dc/dq)' F.
+
+For a joint of the tree it is its own of q. For a cut joint, which closes a loop, it is the angle of
+the first body from the second, or the displacement of the first point from the second along the
+axis of a slot or prismatic joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import COORDINATE_UNITS, loop_name
+from hapticlink.components.specs.linkage import Joint, Linkage, Loop
+
+
+@dataclass(frozen=True)
+class JointCoordinate:
+    """A joint of one coordinate, or a cut joint by its index; unit: of the coordinate."""
+
+    name: str
+    joint: Joint | Loop
+    unit: str
+    cut: int | None = None
+
+    @property
+    def effort_unit(self) -> str:
+        return "N.m" if self.unit == "rad" else "N"
+
+    def value(self, model: LinkageModel) -> ca.SX:
+        """c(q)."""
+        if self.cut is None:
+            return model.q[model.coordinate(self.name)]
+        loop = model.linkage.loop[self.cut]
+        first, second = (model.frames[body] for body in loop.bodies)
+        if loop.type == "revolute":
+            return first.angle - second.angle
+        axis, ends = model.p[f"{self.name}.axis"], [model.p[f"{self.name}.at{k}"] for k in (1, 2)]
+        along = second.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis))
+        return ca.dot(along, first.point(ends[0]) - second.point(ends[1]))
+
+
+def joints_with(linkage: Linkage, *keys: str) -> list[JointCoordinate]:
+    """The joints, then the cut joints, that have one of the keys. Raises ValueError for a free
+    joint that has, whose coordinates are three."""
+    found = []
+    for j in linkage.joint:
+        given = [key for key in keys if getattr(j, key) is not None]
+        units = COORDINATE_UNITS[j.type]
+        if given and len(units) > 1:
+            raise ValueError(
+                f"joint `{j.name}`: {', '.join(given)} act on one coordinate and a {j.type} joint "
+                "has three; use a spring between points"
+            )
+        if given:
+            found.append(JointCoordinate(j.name, j, units[0]))
+    for i, loop in enumerate(linkage.loop):
+        if any(getattr(loop, key) is not None for key in keys):
+            unit = "rad" if loop.type == "revolute" else "m"
+            found.append(JointCoordinate(loop_name(linkage, i), loop, unit, i))
+    return found
