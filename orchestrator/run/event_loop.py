@@ -40,9 +40,9 @@ class Outcome:
     the end, and how. published: whether the folder has rows of this run. wall_time, table_time,
     step_time (s): of the loop, of writing its tables as CSV, of doStep by FMU. calls: counts by FMU
     and call. isolated: why an FMU ran in a process of its own. held: how often outputs of an FMU
-    were held since they were not finite. smaller_steps: number of steps repeated with smaller ones.
-    in_python: the operations that were carried out in Python rather than in C, "everything" if
-    there was no compiled loop, with the reason.
+    were held since they were not finite. smaller_steps: number of steps repeated with smaller
+    ones. in_python: the operations that were carried out in Python rather than in C, "everything"
+    if there was no compiled loop, with the reason.
     """
 
     end_time: float = 0.0
