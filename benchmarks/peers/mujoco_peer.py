@@ -29,8 +29,8 @@ def _xy(point: Point | None) -> str:
 
 def mjcf(linkage: Linkage, method: str, h: float) -> str:
     """The linkage as MJCF. Raises ValueError for what this converter does not know."""
-    if linkage.spring or any(j.stiffness or j.damping or j.drive for j in linkage.joint):
-        raise ValueError("springs, dampers and drives have no counterpart in this converter")
+    if linkage.sprung or linkage.driven or linkage.rubbing or linkage.limited:
+        raise ValueError("forces of joints and springs have no counterpart in this converter")
     sites: dict[str, list[str]] = {}
     points = [("hand", linkage.operational_point.body, linkage.operational_point.at)]
     for i, loop in enumerate(linkage.loop):

@@ -43,8 +43,8 @@ class Terms:
     """D, W, J_h, biases of a linkage at (q, qd), in the order of our coordinates."""
 
     def __init__(self, linkage: Linkage) -> None:
-        if linkage.spring or any(j.stiffness or j.damping or j.drive for j in linkage.joint):
-            raise ValueError("springs, dampers and drives have no counterpart in this converter")
+        if linkage.sprung or linkage.driven or linkage.rubbing or linkage.limited:
+            raise ValueError("forces of joints and springs have no counterpart in this converter")
         self.linkage, self.model = linkage, pin.Model()
         gx, gy = linkage.gravity or (0.0, 0.0)
         self.model.gravity.linear = np.array([gx, gy, 0.0])

@@ -67,9 +67,7 @@ class LinkageModel:
         self.linkage, self.p, self.q, self.qd = linkage, p, q, qd
         self.tabled = ca.SX(0, 1) if tabled is None else tabled
         self.t = ca.SX(math.nan) if t is None else t
-        frictions = [*(j.friction for j in linkage.joint), *(cut.friction for cut in linkage.loop)]
-        rubbing = sum(friction is not None for friction in frictions)
-        self.deflection = ca.SX.nan(rubbing, 1) if deflection is None else deflection
+        self.deflection = ca.SX.nan(linkage.rubbing, 1) if deflection is None else deflection
 
     @cached_property
     def _offsets(self) -> dict[str, int]:

@@ -215,6 +215,8 @@ class Loop:
     """As of a joint."""
     limits: Limits | None = None
     """As of a joint."""
+    drive: Drive | None = None
+    """As of a joint."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,10 +287,29 @@ class Linkage:
         return bool(self.loop or self.gear)
 
     @property
+    def _joints(self) -> tuple[Joint | Loop, ...]:
+        return (*self.joint, *self.loop)
+
+    @property
     def limited(self) -> bool:
         """Whether a joint or a cut joint has limits."""
-        limits = [*(j.limits for j in self.joint), *(cut.limits for cut in self.loop)]
-        return any(limit is not None for limit in limits)
+        return any(j.limits for j in self._joints)
+
+    @property
+    def driven(self) -> bool:
+        """Whether a joint or a cut joint has a drive."""
+        return any(j.drive for j in self._joints)
+
+    @property
+    def rubbing(self) -> int:
+        """The number of joints and cut joints with friction."""
+        return sum(j.friction is not None for j in self._joints)
+
+    @property
+    def sprung(self) -> bool:
+        """Whether there are springs and dampers, between points or on joints."""
+        given = [value for j in self._joints for value in (j.stiffness, j.damping)]
+        return bool(self.spring) or any(value is not None for value in given)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach
 from hapticlink.components.linkage.closures import rows
-from hapticlink.components.specs.linkage import Joint, Loop
 from hapticlink.orchestrator.scene.blocks import graphics_block, impedance, topology
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -55,15 +54,12 @@ def needs(scene: Scene) -> Iterator[Need]:
 
 def _forces(scene: Scene) -> Iterator[Need]:
     assert scene.linkage is not None
-    joints = scene.linkage.joint
-    every: tuple[Joint | Loop, ...] = (*joints, *scene.linkage.loop)
     given = {
         "joint limits": scene.linkage.limited,
         "gravity": scene.linkage.gravity is not None,
-        "springs and dampers": bool(scene.linkage.spring)
-        or any(j.stiffness is not None or j.damping is not None for j in every),
-        "friction": any(j.friction is not None for j in every),
-        "drives": any(j.drive is not None for j in joints),
+        "springs and dampers": scene.linkage.sprung,
+        "friction": scene.linkage.rubbing > 0,
+        "drives": scene.linkage.driven,
         "forces of your own": bool(scene.linkage.force),
     }
     for part, needed in given.items():

@@ -99,7 +99,7 @@ def energy_in_play(scene: Scene) -> float | None:
     linkage = scene.linkage
     replaced = any(f.replaces for f in scene.fmu)
     held = scene.local_model or (scene.contacts and scene.contacts.detection == "graphics")
-    if linkage is None or replaced or held or linkage.force or any(j.drive for j in linkage.joint):
+    if linkage is None or replaced or held or linkage.force or linkage.driven:
         return None
     spans = [p for j in linkage.joint for p in (j.at_parent, j.at_child) if p]
     spans += [b.center for b in linkage.body if b.center]

@@ -17,6 +17,7 @@ from hapticlink.components.specs.linkage import (
     Loop,
     Mechanism,
     OperationalPoint,
+    PDDrive,
 )
 from hapticlink.orchestrator import open_scene
 from tests.blocks import Running
@@ -234,14 +235,16 @@ def test_a_linkage_with_a_redundant_loop_sticks_in_all_its_joints():
 
 @pytest.mark.parametrize("formulation", ["multipliers", "partitioning", "embedding"])
 def test_a_cut_joint_rubs_as_one_of_the_tree(formulation):
-    """A four-bar with friction in the pivot between coupler and rocker, with this pivot cut, and
-    with the rocker's cut instead."""
+    """A four-bar with friction, a spring, a damper and a servo in the pivot between coupler and
+    rocker, with this pivot cut, and with the rocker's cut instead."""
     crank, coupler, rocker = (
         Body(name=n, mass=m, inertia=i, center=(c, 0.0))
         for n, m, i, c in (("a", 0.2, 3e-5, 0.02), ("b", 0.6, 7e-4, 0.06), ("c", 0.4, 3e-4, 0.045))
     )
     rubs = {"friction": 0.01, "friction_speed": 0.5, "friction_deflection": 2e-3}
     rubs |= {"damping": 2e-3, "stiffness": 0.3, "rest": 1.5}
+    table = ((0.0, 0.8), (0.4, 1.2), (1.0, 0.6))
+    rubs["drive"] = PDDrive(table=table, stiffness=0.2, damping=1e-3)
     base = Joint(name="crank", child="a")
     wrist = Joint(name="wrist", parent="a", child="b", at_parent=(0.04, 0.0))
     angles = {"crank": 1.05, "wrist": -0.61, "rocker": 1.25}
