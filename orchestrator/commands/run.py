@@ -46,8 +46,9 @@ def run(
     for line in (*summary.numbers(made), *summary.lines(made)):
         say(f"  {line}")
     wall_time = made.run["timings"]["run"]
-    speed = made.run["end"]["time"] / wall_time
-    say(f"  {wall_time:.2f} s of run time, {speed:.1f} times real time")
+    if wall_time:  # none where a signal came before the first event
+        speed = made.run["end"]["time"] / wall_time
+        say(f"  {wall_time:.2f} s of run time, {speed:.1f} times real time")
     tables = (f"{rate}.csv" for rate in made.run["rates"])
     others = (name for name in made.run["files"] if not name.endswith(".csv"))
     if made.folder:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from hapticlink.orchestrator import api
 from hapticlink.orchestrator.commands.progress import progress
 from hapticlink.orchestrator.results import tables
 from tests.orchestrator.conftest import status
@@ -103,3 +104,18 @@ def test_the_command_imports_no_equations_before_it_needs_them() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_signal_before_the_first_event_has_a_good_end(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The run has taken no time then."""
+    made = api.run(bar, out=tmp_path)
+    made.run["timings"]["run"], made.run["end"] = 0.0, {"reason": "interrupted", "time": 0.0}
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise api.RunInterrupted(made)
+
+    monkeypatch.setattr(api, "run", interrupted)
+    status("run", bar, "--out", tmp_path)
+    assert "interrupted at 0 s" in capsys.readouterr().out
