@@ -33,7 +33,7 @@ def repayment(excess: Vector, motion: Vector, largest: Vector) -> Vector:
     """
     effort = np.zeros_like(excess)
     np.divide(-excess, motion, out=effort, where=motion != 0.0)
-    return np.clip(effort, -largest, largest)
+    return np.where(effort < -largest, -largest, np.where(effort > largest, largest, effort))
 
 
 class Account(Hold):
@@ -50,7 +50,7 @@ class Account(Hold):
 
     def __init__(self, context: HoldContext) -> None:
         assert context.displacement is not None
-        self._displacement, self._velocity = context.displacement, context.velocity
+        self.displacement, self.velocity = context.displacement, context.velocity
         self._seconds = context.seconds
         self._new: list[tuple[int, Vector]] = []
         self._stamp, self._tick = 0, -1
@@ -98,12 +98,12 @@ class Account(Hold):
 
     def _account(self, tick: int) -> None:
         """Adds the held work since the last tick, and the ideal work up to each new stamp."""
-        x = self._displacement().copy()
+        x = self.displacement().copy()
         if self._tick < 0:
             self._x = self._x_stamp = x
             self._stamp, self.sample = self._new[0]
             self._tick = tick
-            self._v = self._velocity().copy() if self._velocity else self._v
+            self._v = self.velocity().copy() if self.velocity else self._v
         self.motion = x - self._x
         self._steps, passed, mean = tick - self._tick, self._stamp, np.zeros_like(x)
         self._work = self._work + self._held * self.motion
@@ -140,10 +140,10 @@ class Account(Hold):
     def _predict(self, step: float) -> None:
         """Predicts the displacement of the coming step, of `step` ticks or the length of the last
         one if that is longer. Without a velocity output, the last displacement is repeated."""
-        if self._velocity is None:
+        if self.velocity is None:
             self.predicted_steady = self.predicted = self.motion
             return
-        v, step = self._velocity().copy(), max(step, self._steps)
+        v, step = self.velocity().copy(), max(step, self._steps)
         if self._steps:
             self._gain = (v - self._v) / self._steps
         self._v = v

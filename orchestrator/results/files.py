@@ -37,7 +37,7 @@ class Recorder:
         columns: Sequence[str],
         view: Vector,
         first: Callable[[], object],
-        at_once: bool = False,
+        at_once: bool = True,
     ) -> None:
         self.path, self.view, self._first, self.at_once = path, view, first, at_once
         self.block = np.zeros((max(ROOM // (8 + view.nbytes), 1), 1 + len(view)))
@@ -61,19 +61,26 @@ class Recorder:
             self.flush()
 
     def flush(self) -> None:
-        """Write the block's rows: all, or as many as the disk has room for, raising OSError."""
+        """Write the rows of the block. Raises OSError, as on a full disk, after those that fit."""
         kept, self.count.value = self.block[: self.count.value], 0
         if not len(kept):
             return
         try:
-            self._append(kept)
+            self._write(self._encoded(kept))
         except OSError:
+            if len(kept) == 1:
+                raise
             for i in range(len(kept)):
-                self._append(kept[i : i + 1])
+                self._write(self._encoded(kept[i : i + 1]))
+                self._written(kept[i])
+        else:
+            self._written(kept[-1])
 
-    def _append(self, kept: Vector) -> None:
-        self._write(rows.text(kept) if self.at_once else kept.tobytes())
-        before, self.last = self.last, float(kept[-1, 0])
+    def _encoded(self, kept: Vector) -> bytes:
+        return rows.text(kept) if self.at_once else kept.tobytes()
+
+    def _written(self, row: Vector) -> None:
+        before, self.last = self.last, float(row[0])
         if before is None:
             self._first()
 
@@ -108,7 +115,7 @@ class Recorder:
 
     def _write(self, content: bytes) -> None:
         """Write all of `content`; or nothing, raising OSError, where the disk is full."""
-        whole = self._file.tell()
+        whole = os.fstat(self._file.fileno()).st_size
         try:
             left = memoryview(content)
             while left:

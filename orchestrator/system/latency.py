@@ -42,11 +42,6 @@ class Link:
             return -1
         return math.ceil((self._low + self._spread * Fraction(share)) / self._base)
 
-    @property
-    def most(self) -> int:
-        """The longest latency (ticks)."""
-        return math.ceil((self._low + self._spread) / self._base)
-
     def send(self, stamp: int, item: Any = None) -> None:
         late = self.draw()
         self.sent += 1

@@ -170,6 +170,7 @@ static void take(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     case PASSIVE_SET_POSITION:
         memcpy(h->tank->newest + h->row * h->n, y, h->n * sizeof *y);
         return;
+    case OBSERVED: account_push(h->account, y, stamp, arrival); return;
     }
     keep(h, y, stamp);
 }
@@ -197,7 +198,7 @@ static void push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
 /* Link.send, kept in the order of (arrival, stamp). */
 static int send(Link *k, const double *y, int64_t width, int64_t stamp) {
     if (k->at_late == k->n_late) return DRAW;
-    if (k->n == k->room) return OVERFLOW_;
+    if (k->n == k->room) return GROW;
     const int64_t late = k->late[k->at_late++];
     k->sent++;
     if (late < 0) {
@@ -238,23 +239,14 @@ static void receive(Hold *h, int64_t tick) {
 
 int hold_push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     if (h->link && h->link->started) return send(h->link, y, h->width, stamp);
+    if (h->account && !account_has_room(h->account, 1)) return GROW;
     push(h, y, stamp, arrival);
     if (h->link) h->link->started = 1;
     return 0;
 }
 
-void hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
+static void extrapolate(const Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
     const int64_t n = h->n;
-    if (h->link) receive(h, tick);
-    if (h->kind == MEAN) {
-        mean_value(h, value);
-        return;
-    }
-    if (h->kind == PASSIVE_SET_POSITION) {
-        tank_modulate(h->tank, l, tick);
-        memcpy(value, h->tank->modulated + h->row * n, n * sizeof *value);
-        return;
-    }
     const int64_t last = h->count - 1;
     const double *y = sample(h, last), *first = sample(h, 0);
     const double s = (double)(tick - h->stamps[last]) + ahead;
@@ -295,4 +287,20 @@ void hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *valu
     case DELAYED: delayed(h, tick, ahead, value); return;
     case SMOOTH: curve(h, (double)tick + ahead, value, NULL); return;
     }
+}
+
+/* The value at `tick`, or GROW. */
+int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
+    if (h->account && !account_has_room(h->account, h->link ? h->link->n : 0)) return GROW;
+    if (h->link) receive(h, tick);
+    switch (h->kind) {
+    case MEAN: mean_value(h, value); break;
+    case PASSIVE_SET_POSITION:
+        tank_modulate(h->tank, l, tick);
+        memcpy(value, h->tank->modulated + h->row * h->n, h->n * sizeof *value);
+        break;
+    case OBSERVED: account_value(h->account, l, tick, ahead, value); break;
+    default: extrapolate(h, l, tick, ahead, value);
+    }
+    return 0;
 }

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.delayed import Delayed
+from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.first_order import FirstOrder
 from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDerivative
@@ -18,6 +19,8 @@ from hapticlink.orchestrator.holds.hold import Hold, Vector
 from hapticlink.orchestrator.holds.lead import Lead
 from hapticlink.orchestrator.holds.manifolds import Unwrapped
 from hapticlink.orchestrator.holds.mean import Mean
+from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
+from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.holds.second_order import SecondOrder
@@ -33,13 +36,13 @@ KINDS: Mapping[type[Hold], tuple[int, int]] = {
     for code, depth, *kinds in (
         (0, 1, ZeroOrder, Latest), (1, 2, Lead), (2, 2, FirstOrder), (3, 1, FirstOrderDerivative),
         (4, 3, SecondOrder), (5, 2, Hermite), (6, 2, Delayed), (7, 2, Smooth), (8, 1, Mean),
-        (9, 1, PassiveSetPosition),
+        (9, 1, PassiveSetPosition), (10, 1, Passive, NearlyEnergyPreserving),
     )
     for kind in kinds
 }  # fmt: skip
 """By class: its code in loop.h, and the number of samples that it keeps."""
-DRAWN = 256
-"""Latencies that are drawn at a time."""
+DRAWN, FEW = 256, 16
+"""Latencies that are drawn at a time, and samples that there is room for at first."""
 
 
 class Parts(NamedTuple):
@@ -66,10 +69,11 @@ def parts(hold: Hold) -> Parts:
 
 
 def can(hold: Hold, rolls_back: bool) -> bool:
-    """Whether there is C for a hold: not for classes of plugins, and not for samples in transit
-    that a rollback takes back."""
+    """Whether there is C for a hold: not for classes of plugins, and not for samples in transit or
+    an energy account that a rollback takes back."""
     found = parts(hold)
-    return type(found.own) in KINDS and not (found.link and rolls_back)
+    grows = found.link or isinstance(found.own, Account)
+    return type(found.own) in KINDS and not (grows and rolls_back)
 
 
 class State(Restorable):
@@ -117,9 +121,55 @@ class CompiledTank(State):
         c.newest, c.modulated, c.x, c.at = (self.place(k * n) for k in (2, 2, 1, 1))
 
 
+class Grown:
+    """Arrays of a structure that grow with a run: fields of vectors, with a row's length."""
+
+    def __init__(self, c: ctypes.Structure, fields: Mapping[str, int]) -> None:
+        self._c, self._fields = c, fields
+        self._arrays = {name: np.zeros((0, width)) for name, width in fields.items()}
+
+    def to(self, room: int) -> None:
+        """Give them room for `room` rows."""
+        for name, width in self._fields.items():
+            array = np.zeros((room, width))
+            array[: len(self._arrays[name])] = self._arrays[name]
+            self._arrays[name] = array
+            setattr(self._c, name, array.ctypes.data)
+
+
+class CompiledAccount:
+    """The energy account of a hold in C."""
+
+    def __init__(self, hold: Account) -> None:
+        n = len(hold.sample)
+        self.c = c = structures.Account(n=n, tick=-1, passive=isinstance(hold, Passive))
+        self._vectors = np.zeros((18, n))
+        self._vectors[16] = 1.0 if c.passive else 0.0  # beta, or no correction
+        c.vectors = self._vectors.ctypes.data
+        self._readers = hold.displacement, hold.velocity
+        for reader, of in zip(self._readers, (c.displacement, c.velocity), strict=True):
+            if reader:
+                assert isinstance(reader, Reader)
+                fill_reader(of, reader)
+        # Ticks and doubles have 8 bytes both.
+        self._queues = [Grown(q, {"ticks": 1, "values": n}) for q in (c.path, c.until, c.fresh)]
+
+    def to(self, room: int) -> None:
+        for queue in self._queues:
+            queue.to(room)
+        self.c.room = room
+
+
+def fill_reader(c: structures.Reader, reader: Reader) -> None:
+    """Fills the structure of a reader."""
+    c.where, c.n = reader.where.ctypes.data, len(reader.where)
+    if reader.factor is not None and reader.offset is not None:
+        c.factor, c.offset = reader.factor.ctypes.data, reader.offset.ctypes.data
+
+
 class CompiledHold(Hold, State):
     """A hold in C. sources: the indices of its samples in the signal vector; held: where `evaluate`
-    puts its value. room: for samples in transit. loop: the address of the Loop that it runs in."""
+    puts its value. loop: the address of the Loop that it runs in."""
 
     def __init__(
         self,
@@ -128,16 +178,13 @@ class CompiledHold(Hold, State):
         hold: Hold,
         sources: Sequence[int],
         held: Vector,
-        room: int = 0,
         tank: CompiledTank | None = None,
     ) -> None:
         own, angles, link, derivative = parts(hold)
         n, (code, depth) = len(held), KINDS[type(own)]
         places = [*sources, *(derivative.where if derivative else ())]
         width, turned = len(places), len(angles.angles) if angles else 0
-        words = depth * width + 6 * n + turned + _words(structures.Hold)
-        words += _words(structures.Link) + room * (2 + width) if link else 0
-        State.__init__(self, words)
+        State.__init__(self, depth * width + 6 * n + turned + _words(structures.Hold))
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
         self._sources, self._derivative = np.array(places, np.intp), derivative
         self._held, self._tank = held, tank
@@ -152,11 +199,15 @@ class CompiledHold(Hold, State):
         self.link = None
         if link:
             self._link, self._late = link, np.zeros(DRAWN, np.int64)
-            self.link = k = self.structure(structures.Link)
-            k.late, k.n_late, k.at_late, k.room = self._late.ctypes.data, DRAWN, DRAWN, room
-            k.arrivals, k.stamps = self.place(room), self.place(room)
-            k.samples = self.place(room * width)
-            c.link = ctypes.addressof(k)
+            self.link = k = structures.Link(n_late=DRAWN, at_late=DRAWN)
+            k.late, c.link = self._late.ctypes.data, ctypes.addressof(k)
+            self._transit = Grown(k, {"arrivals": 1, "stamps": 1, "samples": width})
+        self._account = None
+        if isinstance(own, Account):
+            self._account = CompiledAccount(own)
+            c.account = ctypes.addressof(self._account.c)
+        self._room = 0
+        self.grow()
         if tank and isinstance(own, PassiveSetPosition):
             c.tank, c.row = tank.words.ctypes.data, own.row
         self.address: int = ctypes.addressof(c)
@@ -167,19 +218,35 @@ class CompiledHold(Hold, State):
         self._late[:] = [self._link.draw() for _ in range(DRAWN)]
         self.link.at_late = 0
 
+    def grow(self) -> None:
+        """Make room for more samples."""
+        self._room = 2 * self._room or FEW
+        if self.link is not None:
+            self._transit.to(self._room)
+            self.link.room = self._room
+        if self._account:
+            self._account.to(self._room)
+
+    def serve(self, code: int) -> None:
+        """Do what `push` or `value` in C have returned for."""
+        if code == structures.DRAW:
+            self.draw()
+        else:
+            assert code == structures.GROW
+            self.grow()
+
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         if self._derivative:
             sample = np.concatenate([sample, self._derivative()])
         own = np.ascontiguousarray(sample, np.float64)
         assert len(own) == len(self._sources)
         while code := self._push(self.address, own.ctypes.data, stamp, arrival):
-            if code != structures.DRAW:
-                raise RuntimeError("more samples in transit than there is room for")
-            self.draw()
+            self.serve(code)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         found = np.zeros(self._n)
-        self._value(self.address, self._loop, tick, ahead, found.ctypes.data)
+        while code := self._value(self.address, self._loop, tick, ahead, found.ctypes.data):
+            self.serve(code)
         return found
 
 

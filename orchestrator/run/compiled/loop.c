@@ -272,15 +272,21 @@ static int compares(double value, int64_t comparison, double limit) {
     return 0;
 }
 
-static void blend(const Loop *l, const Op *op, int64_t tick) {
+static int evaluate(const Loop *l, Hold *h, int64_t tick, double ahead) {
+    return hold_value(h, l, tick, ahead, h->held);
+}
+
+static int blend(const Loop *l, const Op *op, int64_t tick) {
     Hold *h = l->holds[op->a];
     double value[h->n], sum[h->n];
     for (int64_t k = 0; k < h->n; k++) sum[k] = 0.0;
     for (int64_t i = op->b; i < op->c; i++) {
-        hold_value(h, l, tick, l->points[i][1], value);
+        const int code = hold_value(h, l, tick, l->points[i][1], value);
+        if (code) return code;
         for (int64_t k = 0; k < h->n; k++) sum[k] += l->points[i][0] * value[k];
     }
     memcpy(h->held, sum, h->n * sizeof *sum);
+    return 0;
 }
 
 static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
@@ -317,8 +323,8 @@ static int carry_out(Loop *l, int64_t tick, At *at) {
             break;
         }
         case PUSH: code = push(l, l->holds[op->a], tick + op->b, tick); break;
-        case EVALUATE: hold_value(l->holds[op->a], l, tick, op->x, l->holds[op->a]->held); break;
-        case BLEND: blend(l, op, tick); break;
+        case EVALUATE: code = evaluate(l, l->holds[op->a], tick, op->x); break;
+        case BLEND: code = blend(l, op, tick); break;
         case SAMPLE: code = meter_sample(l->meters[op->a], l->values, tick + op->b); break;
         case MOVE: code = meter_move(l->meters[op->a], l->values, tick + op->b); break;
         case FEED: meter_feed(l->meters[op->a], l->values, op->x); break;
@@ -399,15 +405,15 @@ EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t
     return hold_push(h, sample, stamp, arrival);
 }
 
-EXPORT void hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
-    hold_value(h, l, tick, ahead, value);
+EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
+    return hold_value(h, l, tick, ahead, value);
 }
 
 /* The sizes of the structures, in the order of `structures.py`. */
 EXPORT void hapticlink_sizes(int64_t *sizes) {
     const int64_t found[] = {sizeof(Place), sizeof(Transfer), sizeof(Fmu), sizeof(Setter),
-                             sizeof(Link), sizeof(Tank), sizeof(Hold), sizeof(Reader),
-                             sizeof(Meter), sizeof(Table), sizeof(Op), sizeof(Clock),
+                             sizeof(Link), sizeof(Tank), sizeof(Reader), sizeof(Queue),
+                             sizeof(Account), sizeof(Hold), sizeof(Meter), sizeof(Table), sizeof(Op), sizeof(Clock),
                              sizeof(Block), sizeof(Loop), sizeof(At), sizeof(Events)};
     memcpy(sizes, found, sizeof found);
 }

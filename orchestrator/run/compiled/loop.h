@@ -79,6 +79,29 @@ typedef struct {
     double *newest, *modulated, *x, *at;   /* (2, n), (2, n), (n,), (n,) */
 } Tank;
 
+/* factor board[where] + offset; factor is NULL where it is 1 and offset 0. */
+typedef struct {
+    const int64_t *where;
+    const double *factor, *offset;
+    int64_t n;
+} Reader;
+
+/* Vectors with their ticks, oldest first. */
+typedef struct {
+    int64_t count, *ticks;
+    double *values;
+} Queue;
+
+/* Of a hold that observes its energy: energy_account.py. `passive` or `nepce`. path: of the target,
+ * until: samples and until when they were held, fresh: samples that are not accounted for; each has
+ * `room`. vectors: (18, n). velocity has n = 0 where the target does not have it. */
+typedef struct {
+    int64_t n, passive, tick, stamp, steps, delayed, room;
+    Reader displacement, velocity;
+    double *vectors;
+    Queue path, until, fresh;
+} Account;
+
 /* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
  * followed by its derivative. `vectors`: (6, n), what else the kind remembers. */
 typedef struct {
@@ -96,21 +119,15 @@ typedef struct {
     Link *link;
     Tank *tank;
     int64_t row;
+    Account *account;
 } Hold;
 
 enum {
     ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
-    MEAN, PASSIVE_SET_POSITION
+    MEAN, PASSIVE_SET_POSITION, OBSERVED
 };
 
 /* --- meters, tables --------------------------------------------------------------------------- */
-
-/* factor board[where] + offset; factor is NULL where it is 1 and offset 0. */
-typedef struct {
-    const int64_t *where;
-    const double *factor, *offset;
-    int64_t n;
-} Reader;
 
 /* The rows that meter.py adds up; counts: of stamps, ticks, efforts. */
 typedef struct {
@@ -201,10 +218,13 @@ enum {
     KIND,        /* an event of a kind that is new */
     STARTS,      /* of clock `what`: its next window */
     PAUSE,
-    OVERFLOW_,   /* more samples in transit than there is room for */
+    GROW,        /* a hold has no room for a sample */
 };
 
 int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
-void hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+int account_has_room(const Account *a, int64_t samples);
+void account_push(Account *a, const double *sample, int64_t stamp, int64_t arrival);
+void account_value(Account *a, const Loop *l, int64_t tick, double ahead, double *value);
 
 #endif

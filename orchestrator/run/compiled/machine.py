@@ -23,9 +23,8 @@ from hapticlink.orchestrator.plan.operations import (
 )
 from hapticlink.orchestrator.run.bind import Bound, Instruction, Stop
 from hapticlink.orchestrator.run.compiled import fmus, structures
-from hapticlink.orchestrator.run.compiled.holds import CompiledHold, can, parts, tanks
+from hapticlink.orchestrator.run.compiled.holds import CompiledHold, can, fill_reader, parts, tanks
 from hapticlink.orchestrator.run.compiled.structures import Op
-from hapticlink.orchestrator.run.energy.bonds import Reader
 from hapticlink.orchestrator.run.energy.meter import Meter
 from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
 from hapticlink.orchestrator.run.simulation import Call, Simulation
@@ -88,17 +87,10 @@ class Machine:
             tank = shared.get(id(getattr(own, "tank", None)))
             if not can(hold, rolls_back) or (hasattr(own, "tank") and tank is None):
                 continue
-            link, clock = (
-                parts(hold).link,
-                system.timeline.clock(system.fmu[connection.source].clock),
-            )
-            room = 2 * (link.most // clock.shortest + 2) if link else 0
             values = signals.values[signals.hold(name)]
             sources = signals.sources(connection)
             loop = ctypes.addressof(self.loop)
-            simulation.holds[name] = CompiledHold(
-                self.library, loop, hold, sources, values, room, tank
-            )
+            simulation.holds[name] = CompiledHold(self.library, loop, hold, sources, values, tank)
         simulation.springs[:] = [shared.get(id(tank), tank) for tank in simulation.springs]
 
     # --- records --------------------------------------------------------------------------
@@ -216,7 +208,7 @@ class Machine:
         def make(at: int) -> object:
             self._meters[at] = ctypes.addressof(c)
             for kind in ("source", "held", "x"):
-                _fill_reader(getattr(c, kind), getattr(meter, kind))
+                fill_reader(getattr(c, kind), getattr(meter, kind))
             c.counts = meter.counts.ctypes.data
             meter.changed = partial(_fill_meter, c, meter)
             meter.changed()
@@ -250,11 +242,11 @@ class Machine:
             assert isinstance(instruction, Record)
             simulation.recorders[instruction.clock].flush()
             return
-        elif code == structures.DRAW:
-            assert isinstance(instruction, Push)
+        elif code in (structures.DRAW, structures.GROW):
+            assert isinstance(instruction, Push | Evaluate | Blend)
             hold = simulation.holds[instruction.connection]
             assert isinstance(hold, CompiledHold)
-            hold.draw()
+            hold.serve(code)
             return
         else:
             assert isinstance(instruction, Get | Read | Set | Step)
@@ -281,12 +273,6 @@ class Machine:
             assert isinstance(setter, Setter)
             transfers = [*setter.transfers]
         return transfers[number].name
-
-
-def _fill_reader(c: structures.Reader, reader: Reader) -> None:
-    c.where, c.n = reader.where.ctypes.data, len(reader.where)
-    if reader.factor is not None and reader.offset is not None:
-        c.factor, c.offset = reader.factor.ctypes.data, reader.offset.ctypes.data
 
 
 def _fill_meter(c: structures.Meter, meter: Meter) -> None:

@@ -62,6 +62,23 @@ class Tank(ctypes.Structure):
     )
 
 
+class Reader(ctypes.Structure):
+    _fields_ = (*_all(_POINTER, "where factor offset"), ("n", _INT))
+
+
+class Queue(ctypes.Structure):
+    _fields_ = (("count", _INT), *_all(_POINTER, "ticks values"))
+
+
+class Account(ctypes.Structure):
+    _fields_ = (
+        *_all(_INT, "n passive tick stamp steps delayed room"),
+        *_all(Reader, "displacement velocity"),
+        ("vectors", _POINTER),
+        *_all(Queue, "path until fresh"),
+    )
+
+
 class Hold(ctypes.Structure):
     _fields_ = (
         *_all(_INT, "kind n width depth count"),
@@ -74,11 +91,8 @@ class Hold(ctypes.Structure):
         ("unwrapped", _INT),
         *_all(_POINTER, "link tank"),
         ("row", _INT),
+        ("account", _POINTER),
     )
-
-
-class Reader(ctypes.Structure):
-    _fields_ = (*_all(_POINTER, "where factor offset"), ("n", _INT))
 
 
 class Meter(ctypes.Structure):
@@ -127,7 +141,7 @@ class Events(ctypes.Structure):
 
 
 ALL = (
-    Place, Transfer, Fmu, Setter, Link, Tank, Hold, Reader,
+    Place, Transfer, Fmu, Setter, Link, Tank, Reader, Queue, Account, Hold,
     Meter, Table, Op, Clock, Block, Loop, At, Events,
 )  # fmt: skip
 
@@ -137,6 +151,6 @@ ALL = (
 """Codes of operations."""
 
 (
-    DONE, CALL, JUDGE, FAILED, STEPPED, UNSAVED, FULL, DRAW, STOP, KIND, STARTS, PAUSE, OVERFLOW,
+    DONE, CALL, JUDGE, FAILED, STEPPED, UNSAVED, FULL, DRAW, STOP, KIND, STARTS, PAUSE, GROW,
 ) = range(13)  # fmt: skip
 """Why the loop returns."""
