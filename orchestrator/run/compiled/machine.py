@@ -27,6 +27,7 @@ from hapticlink.orchestrator.run.compiled.holds import CompiledHold, can, fill_r
 from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.meter import Meter
 from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
+from hapticlink.orchestrator.run.parallel_steps import Finish
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 
@@ -121,7 +122,7 @@ class Machine:
     def _record(self, instruction: Instruction) -> tuple[float, ...]:
         record = self._found(instruction)
         if record is None:
-            self.in_python[_named(instruction)] = "it has no C"
+            self.in_python[_named(instruction)] = self._why(instruction)
             return (structures.PYTHON, 0, 0, 0, 0, 0.0)
         return (*record, *(0,) * (5 - len(record)), 0.0) if len(record) < 6 else record
 
@@ -162,6 +163,24 @@ class Machine:
                 comparison = [*COMPARISONS].index(condition.comparison)
                 return structures.STOP_WHEN, place, comparison, 0, 0, condition.value
         return None
+
+    def _why(self, instruction: Instruction) -> str:
+        """Why an operation is carried out in Python."""
+        match instruction:
+            case Record():
+                return "each row is written at once, since an FMU of others may crash or hang"
+            case Evaluate(_, _, order) if order:
+                return "the FMU takes derivatives of its inputs"
+            case Set(_, _, True):
+                return "the FMU takes derivatives of its inputs"
+            case Push(connection) | Evaluate(connection) | Blend(connection):
+                kind = type(parts(self._simulation.holds[connection]).own).__name__
+                return f"there is no C for {kind}, or none that takes samples back"
+            case Get(fmu) | Read(fmu) | Set(fmu) | Step(fmu) if fmu in self._simulation.isolated:
+                return "the FMU runs in a process of its own"
+            case Finish():
+                return "the FMU runs in a process of its own"
+        return "Python repeats steps, whose operations are in C"
 
     def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
         """The index of an object of `kind`, made at its first use."""

@@ -67,6 +67,7 @@ def test_every_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str) 
     "options",
     [
         ["coupling=jacobi"],
+        ["hold=foh"],
         ["coupling=gauss-seidel-plants"],
         ["graphics.rate={ min = 20, max = 60, seed = 2 }"],
         ["graphics.align=tick", "graphics.rate=29.97", "graphics.phase=0.01"],
