@@ -11,64 +11,9 @@
 #include <string.h>
 
 #ifdef _WIN32
-#include <windows.h>
 #define EXPORT __declspec(dllexport)
-
-static int64_t now(void) {
-    static int64_t frequency;
-    LARGE_INTEGER found;
-    if (!frequency) {
-        QueryPerformanceFrequency(&found);
-        frequency = found.QuadPart;
-    }
-    QueryPerformanceCounter(&found);
-    return found.QuadPart / frequency * 1000000000 + found.QuadPart % frequency * 1000000000 / frequency;
-}
 #else
-#include <time.h>
 #define EXPORT __attribute__((visibility("default")))
-
-static int64_t now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
-}
-#endif
-
-/* --- signals ---------------------------------------------------------------------------------- */
-
-#ifdef _WIN32
-static int came;
-
-EXPORT void hapticlink_watch(int on) { (void)on; } /* Python notices them when it has its turn */
-#else
-#include <signal.h>
-
-static const int SIGNALS[] = {SIGINT, SIGTERM};
-static struct sigaction before[2];
-static volatile sig_atomic_t came;
-
-static void take(int number) {
-    const struct sigaction *python = before + (number == SIGTERM);
-    came = 1;
-    if (python->sa_handler != SIG_DFL && python->sa_handler != SIG_IGN) python->sa_handler(number);
-}
-
-/* Notices signals beside Python, whose handlers run only when it has its turn: the loop then gives
- * it one after the event. */
-EXPORT void hapticlink_watch(int on) {
-    for (int i = 0; i < 2; i++) {
-        struct sigaction now, ours = {.sa_handler = take};
-        sigaction(SIGNALS[i], NULL, &now);
-        if (!on && now.sa_handler == take) sigaction(SIGNALS[i], before + i, NULL);
-        if (!on || now.sa_handler == take || now.sa_flags & SA_SIGINFO) continue;
-        if (now.sa_handler == SIG_DFL || now.sa_handler == SIG_IGN) continue;
-        before[i] = now;
-        ours.sa_mask = now.sa_mask;
-        ours.sa_flags = now.sa_flags;
-        sigaction(SIGNALS[i], &ours, NULL);
-    }
-}
 #endif
 
 enum { WARNING = 1 };
@@ -390,13 +335,15 @@ EXPORT int hapticlink_events(Loop *l, Events *e) {
         if (code != DONE) return code;
         complete(e);
         const int64_t time = now();
-        if (time - e->since >= e->patience || came) {
+        if (time - e->since >= e->patience || signal_came()) {
             e->since = time;
-            came = 0;
             return PAUSE;
         }
     }
 }
+
+/* Whether to notice signals; Windows has none that Python would not notice. */
+EXPORT void hapticlink_watch(int on) { watch_signals(on); }
 
 /* Runs one sequence of operations at a tick, within an operation that Python carries out. */
 EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick) { return carry_out(l, tick, at); }

@@ -221,6 +221,9 @@ enum {
     GROW,        /* a hold has no room for a sample */
 };
 
+int64_t now(void);
+void watch_signals(int on);
+int signal_came(void);
 int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
 int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
 int account_has_room(const Account *a, int64_t samples);
