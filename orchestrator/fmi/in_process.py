@@ -249,11 +249,15 @@ class InProcess(Instance):
         """Nothing to wait for: `step` returns after doStep."""
 
     def save(self, slot: int = 0) -> None:
-        if slot not in self._saved:
-            self._saved[slot] = Saved(self.slave, self.description.fmi)
-        if (status := self._saved[slot].save()) > WARNING:
+        if (status := self.slot(slot).save()) > WARNING:
             raise self.failed(f"fmi{self.description.fmi}GetFMUstate", status)
         self._saved_time[slot] = self.time
+
+    def slot(self, slot: int) -> Saved:
+        """The storage of a slot, which may not have been saved to."""
+        if slot not in self._saved:
+            self._saved[slot] = Saved(self.slave, self.description.fmi)
+        return self._saved[slot]
 
     def rollback(self, slot: int = 0) -> None:
         if (status := self._saved[slot].restore()) > WARNING:

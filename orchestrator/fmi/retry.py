@@ -24,13 +24,13 @@ class Saved:
         state = "state" if fmi == "2" else "State"
         self._instance, self.state = ctypes.c_void_p(slave.component), ctypes.c_void_p()
         calls = (slave.dll[f"fmi{fmi}{verb}FMU{state}"] for verb in ("Get", "Set", "Free"))
-        self.get, self._set, self._free = calls
+        self.get, self.set, self._free = calls
 
     def save(self) -> int:
         return self.get(self._instance, ctypes.byref(self.state))
 
     def restore(self) -> int:
-        return self._set(self._instance, self.state)
+        return self.set(self._instance, self.state)
 
     def free(self) -> None:
         if self.state:

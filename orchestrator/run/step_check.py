@@ -25,7 +25,7 @@ from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 
-EVERY = 67
+EVERY = 97
 """One step in so many is checked: two half steps, a saved state and two reads cost below 5 %. A
 prime, so that checks fall on all phases between two rates."""
 FIRST = 13
@@ -34,7 +34,8 @@ SLOT = 2
 AT_REST = 1e-6
 """Rate (1/s), relative to the magnitude of the output itself, below which it is at rest."""
 
-Call = Callable[[int], object]
+ROOM = 256
+"""Checks for which there is room at first."""
 
 
 @dataclass(frozen=True)
@@ -57,16 +58,16 @@ class StepCheck:
         self._instance = instance
         names = [s.name for s in instance.description.outputs]
         pairs = _first_derivatives(instance.description)
-        self._bases = np.array([names.index(base) for base, _ in pairs], dtype=np.intp)
-        self._rates = np.array([names.index(rate) for _, rate in pairs], dtype=np.intp)
         ports = [_port(rate) for _, rate in pairs]
         self._ports = sorted(set(ports))
-        self._port = np.array([self._ports.index(p) for p in ports], dtype=np.intp)
-        self._scales = np.zeros(len(self._ports))
-        self.steps = ctypes.c_int64()  # which the compiled loop shares
-        self._errors: list[Vector] = []
-        self._times: list[float] = []
-        self._size = 0.0
+        # What follows is shared with the compiled loop; `changed` tells it of new arrays.
+        self.bases = np.array([names.index(base) for base, _ in pairs], dtype=np.int64)
+        self.rates = np.array([names.index(rate) for _, rate in pairs], dtype=np.int64)
+        self.port = np.array([self._ports.index(p) for p in ports], dtype=np.int64)
+        self.scales = np.zeros(len(self._ports))
+        self.steps, self.count, self.size = ctypes.c_int64(), ctypes.c_int64(), ctypes.c_double()
+        self.found, self.times = np.zeros((ROOM, len(self._ports))), np.zeros(ROOM)
+        self.changed: Callable[[], object] = lambda: None
 
     @staticmethod
     def possible(description: Description) -> bool:
@@ -108,28 +109,33 @@ class StepCheck:
         return instance.outputs.copy()
 
     def _compare(self, whole: Vector, halves: Vector, time: float, end: float) -> None:
-        rates, found = whole[self._rates], np.zeros(len(self._ports))
-        size = np.maximum(np.abs(rates), AT_REST * np.abs(whole[self._bases]))
-        np.maximum.at(self._scales, self._port, size)
-        np.maximum.at(found, self._port, np.abs(rates - halves[self._rates]))
-        if np.all(np.isfinite(found)):
-            self._errors.append(found)
-            self._times.append(time)
-            self._size = max(self._size, end - time)
+        rates, found = whole[self.rates], np.zeros(len(self._ports))
+        np.maximum.at(found, self.port, np.abs(rates - halves[self.rates]))
+        if not np.all(np.isfinite(found)):
+            return
+        size = np.maximum(np.abs(rates), AT_REST * np.abs(whole[self.bases]))
+        np.maximum.at(self.scales, self.port, size)
+        if (k := self.count.value) == len(self.times):
+            self.found = np.concatenate([self.found, np.zeros_like(self.found)])
+            self.times = np.concatenate([self.times, np.zeros_like(self.times)])
+            self.changed()
+        self.found[k], self.times[k] = found, time
+        self.count.value, self.size.value = k + 1, max(self.size.value, end - time)
 
     def errors(self) -> StepErrors | None:
         """What was found; None before the first check."""
-        if not self._errors:
+        if not self.count.value:
             return None
-        share = np.array(self._errors) / np.where(self._scales > 0, self._scales, 1.0)
+        found = self.found[: self.count.value]
+        share = found / np.where(self.scales > 0, self.scales, 1.0)
         k, port = np.unravel_index(int(share.argmax()), share.shape)
         return StepErrors(
             checked=len(share),
             median=float(np.median(share.max(axis=1))),
             largest=float(share[k, port]),
             output=self._ports[port],
-            time=self._times[k],
-            size=self._size,
+            time=float(self.times[k]),
+            size=self.size.value,
         )
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.fmi.in_process3 import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.transfer import Transfer
+from hapticlink.orchestrator.run import step_check
 from hapticlink.orchestrator.run.compiled import structures
-from hapticlink.orchestrator.run.step_check import EVERY, FIRST, StepCheck
+from hapticlink.orchestrator.run.step_check import SLOT, StepCheck
 
 _TYPES = {
     "Real": 0, "Float64": 0, "Float32": 1, "Int64": 2, "Integer": 3, "Int32": 3, "Int16": 4,
@@ -53,9 +57,29 @@ def of_instance(instance: InProcess, check: StepCheck | None, c: structures.Fmu)
     c.outputs, c.n_outputs = instance.outputs.ctypes.data, len(instance.outputs)
     c.inverse = instance.bounds.inverse.ctypes.data
     c.good = None if instance.good is None else instance.good.ctypes.data
-    if check:
-        c.checked, c.every, c.first = ctypes.addressof(check.steps), EVERY, FIRST
-    return gets
+    if check is None:
+        return gets
+    made = structures.Check()
+    c.check = ctypes.addressof(made)
+    saved = instance.slot(SLOT)
+    made.get_state, made.set_state = address(saved.get), address(saved.set)
+    made.state = ctypes.addressof(saved.state)
+    made.steps, made.count = ctypes.addressof(check.steps), ctypes.addressof(check.count)
+    made.every, made.first, made.at_rest = step_check.EVERY, step_check.FIRST, step_check.AT_REST
+    made.bases, made.rates, made.ports = (
+        places.ctypes.data for places in (check.bases, check.rates, check.port)
+    )
+    made.n, made.n_ports = len(check.port), len(check.scales)
+    made.scales, made.size = check.scales.ctypes.data, ctypes.addressof(check.size)
+    scratch = np.zeros((2, len(instance.outputs)))
+    made.before, made.halves = scratch[0].ctypes.data, scratch[1].ctypes.data
+    check.changed = partial(_fill_check, made, check)
+    check.changed()
+    return gets, made, scratch
+
+
+def _fill_check(c: structures.Check, check: StepCheck) -> None:
+    c.errors, c.times, c.room = check.found.ctypes.data, check.times.ctypes.data, len(check.times)
 
 
 def of_setter(setter: Setter, instance: InProcess, c: structures.Setter) -> object:

@@ -32,6 +32,7 @@ typedef int (*Transfer3)(void *, const uint32_t *, size_t, void *, size_t);
 typedef int (*DoStep2)(void *, double, double, int);
 typedef int (*DoStep3)(void *, double, double, _Bool, uint8_t *, uint8_t *, uint8_t *, double *);
 typedef int (*GetState)(void *, void *);
+typedef int (*SetState)(void *, void *);
 
 static int transferred(const Transfer *t) {
     if (t->fmi == 2)
@@ -134,6 +135,12 @@ static int set(const Setter *s, const double *board, At *at) {
     return 0;
 }
 
+static int do_step(const Fmu *f, double time, double size) {
+    if (f->fmi == 2) return ((DoStep2)f->do_step)(f->fmu, time, size, (int)f->forward);
+    return ((DoStep3)f->do_step)(f->fmu, time, size, f->forward != 0, f->event, f->terminate,
+                                 f->early, f->reached);
+}
+
 static int step(Fmu *f, double time, double end, double size, At *at) {
     Place *p = f->place;
     p->time = p->begin = time;
@@ -144,11 +151,7 @@ static int step(Fmu *f, double time, double end, double size, At *at) {
         return UNSAVED;
     const int timed = !f->sparse || f->n_steps % EACH == 0;
     const int64_t begin = timed ? now() : 0;
-    if (f->fmi == 2)
-        at->status = ((DoStep2)f->do_step)(f->fmu, time, size, (int)f->forward);
-    else
-        at->status = ((DoStep3)f->do_step)(f->fmu, time, size, f->forward != 0, f->event,
-                                           f->terminate, f->early, f->reached);
+    at->status = do_step(f, time, size);
     if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
     if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
     if (at->status > WARNING || (f->fmi == 3 && *f->terminate)) return STEPPED;
@@ -156,12 +159,46 @@ static int step(Fmu *f, double time, double end, double size, At *at) {
     return 0;
 }
 
-/* Whether step_check.py takes the next step; otherwise it is counted here. */
-static int is_checked(const Fmu *f) {
-    if (!f->checked) return 0;
-    if ((*f->checked + 1) % f->every == f->first) return 1;
-    ++*f->checked;
-    return 0;
+/* The largest differences of the outputs from `halves`, by port, unless one is not finite. */
+static void compare(Check *c, const double *outputs, double time, double end) {
+    double *found = c->errors + *c->count * c->n_ports;
+    for (int64_t k = 0; k < c->n_ports; k++) found[k] = 0.0;
+    for (int64_t i = 0; i < c->n; i++) {
+        const double apart = fabs(outputs[c->rates[i]] - c->halves[c->rates[i]]);
+        if (!isfinite(apart)) return;
+        if (apart > found[c->ports[i]]) found[c->ports[i]] = apart;
+    }
+    for (int64_t i = 0; i < c->n; i++) {
+        const double rest = c->at_rest * fabs(outputs[c->bases[i]]);
+        const double rate = fabs(outputs[c->rates[i]]), size = rate > rest ? rate : rest;
+        if (size > c->scales[c->ports[i]]) c->scales[c->ports[i]] = size;
+    }
+    c->times[(*c->count)++] = time;
+    if (end - time > *c->size) *c->size = end - time;
+}
+
+/* A step, and before it, where it is due, the same in two halves: step_check.py, which does it
+ * where there is no room left, or the FMU can be asked to repeat a step. */
+static int checked_step(Fmu *f, double time, double end, double size, At *at) {
+    Check *c = f->check;
+    if ((*c->steps + 1) % c->every != c->first) {
+        ++*c->steps;
+        return step(f, time, end, size, at);
+    }
+    if (f->get_state || f->place->ended || *c->count == c->room) return CALL;
+    const size_t bytes = f->n_outputs * sizeof(double);
+    const double half = (end - time) / 2;
+    memcpy(c->before, f->outputs, bytes);
+    if (((GetState)c->get_state)(f->fmu, c->state) > WARNING) return CALL;
+    ++*c->steps;
+    const int halved = do_step(f, time, half) <= WARNING
+                       && do_step(f, time + half, half) <= WARNING && !get(f, 0, at);
+    if (halved) memcpy(c->halves, f->outputs, bytes);
+    at->status = ((SetState)c->set_state)(f->fmu, *(void **)c->state);
+    int code = at->status > WARNING ? UNRESTORED : step(f, time, end, size, at);
+    if (!code && !(code = get(f, 0, at)) && halved) compare(c, f->outputs, time, end);
+    memcpy(f->outputs, c->before, bytes);
+    return code;
 }
 
 /* --- meters ----------------------------------------------------------------------------------- */
@@ -262,9 +299,10 @@ static int carry_out(Loop *l, int64_t tick, At *at) {
         case STEP: {
             const int64_t start = tick * op->c + op->b, end = start + op->d;
             const double whole = l->denominator * (double)op->c;
-            if (op->c == 1 && is_checked(l->fmus + op->a)) return CALL;
-            code = step(l->fmus + op->a, (double)start * l->numerator / whole,
-                        (double)end * l->numerator / whole, op->x, at);
+            Fmu *f = l->fmus + op->a;
+            code = (op->c == 1 && f->check ? checked_step : step)(
+                f, (double)start * l->numerator / whole, (double)end * l->numerator / whole, op->x,
+                at);
             break;
         }
         case PUSH: code = push(l, l->holds[op->a], tick + op->b, tick); break;
@@ -358,7 +396,7 @@ EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, 
 
 /* The sizes of the structures, in the order of `structures.py`. */
 EXPORT void hapticlink_sizes(int64_t *sizes) {
-    const int64_t found[] = {sizeof(Place), sizeof(Transfer), sizeof(Fmu), sizeof(Setter),
+    const int64_t found[] = {sizeof(Place), sizeof(Transfer), sizeof(Check), sizeof(Fmu), sizeof(Setter),
                              sizeof(Link), sizeof(Tank), sizeof(Reader), sizeof(Queue),
                              sizeof(Account), sizeof(Hold), sizeof(Meter), sizeof(Table), sizeof(Op), sizeof(Clock),
                              sizeof(Block), sizeof(Loop), sizeof(At), sizeof(Events)};

@@ -30,6 +30,17 @@ typedef struct {
 
 enum { DOUBLE, FLOAT, INT64, INT32, INT16, INT8, UINT64, UINT32, UINT16, UINT8, BOOL2, BOOL3 };
 
+/* Of an FMU whose steps are checked: step_check.py. `count` of `steps` steps were, with `errors`
+ * (room, n_ports) at `times`; `bases`, `rates` and `ports` are of n outputs. */
+typedef struct {
+    void *get_state, *set_state, *state;
+    int64_t *steps, *count;
+    const int64_t *bases, *rates, *ports;
+    double *scales, *errors, *times, *size, *before, *halves;
+    int64_t every, first, n, n_ports, room;
+    double at_rest;
+} Check;
+
 typedef struct {
     Place *place;
     void *fmu, *do_step;
@@ -41,7 +52,7 @@ typedef struct {
     int64_t n_gets;
     double *outputs, *inverse, *good;     /* 1/bound; the last finite outputs, or NULL */
     int64_t n_outputs, n_steps, sparse;   /* sparse: steps so short that few of them are timed */
-    int64_t *checked, every, first;       /* steps so far, of which step_check.py takes some */
+    Check *check;                         /* NULL if there is none */
 } Fmu;
 
 /* Sets the inputs of an FMU: values[i] = factors[i] board[where[i]] + offsets[i]. `into`: where
@@ -212,6 +223,7 @@ enum {
     FAILED,      /* call number `what` of a get or set returned `status` */
     STEPPED,     /* doStep returned `status`, or asks to end */
     UNSAVED,     /* the state before a step could not be saved */
+    UNRESTORED,  /* the state before a step that was checked could not be restored */
     FULL,        /* a table's block */
     DRAW,        /* latencies */
     STOP,        /* the condition to stop holds */

@@ -273,6 +273,9 @@ class Machine:
             assert isinstance(instance, InProcess)
             if code == structures.FAILED:
                 raise instance.failed(self._called(instruction, at.what, instance), at.status)
+            if code == structures.UNRESTORED:
+                called = f"fmi{instance.description.fmi}SetFMUstate"
+                raise instance.failed(called, at.status)
             if code == structures.JUDGE:
                 instance.judge()
             elif code == structures.STEPPED:

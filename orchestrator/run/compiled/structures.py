@@ -23,6 +23,15 @@ class Transfer(ctypes.Structure):
     )
 
 
+class Check(ctypes.Structure):
+    _fields_ = (
+        *_all(_POINTER, "get_state set_state state steps count bases rates ports"),
+        *_all(_POINTER, "scales errors times size before halves"),
+        *_all(_INT, "every first n n_ports room"),
+        ("at_rest", _DOUBLE),
+    )
+
+
 class Fmu(ctypes.Structure):
     _fields_ = (
         *_all(_POINTER, "place fmu do_step get_state state"),
@@ -31,8 +40,7 @@ class Fmu(ctypes.Structure):
         ("n_gets", _INT),
         *_all(_POINTER, "outputs inverse good"),
         *_all(_INT, "n_outputs n_steps sparse"),
-        ("checked", _POINTER),
-        *_all(_INT, "every first"),
+        ("check", _POINTER),
     )
 
 
@@ -141,7 +149,7 @@ class Events(ctypes.Structure):
 
 
 ALL = (
-    Place, Transfer, Fmu, Setter, Link, Tank, Reader, Queue, Account, Hold,
+    Place, Transfer, Check, Fmu, Setter, Link, Tank, Reader, Queue, Account, Hold,
     Meter, Table, Op, Clock, Block, Loop, At, Events,
 )  # fmt: skip
 
@@ -151,6 +159,7 @@ ALL = (
 """Codes of operations."""
 
 (
-    DONE, CALL, JUDGE, FAILED, STEPPED, UNSAVED, FULL, DRAW, STOP, KIND, STARTS, PAUSE, GROW,
-) = range(13)  # fmt: skip
+    DONE, CALL, JUDGE, FAILED, STEPPED, UNSAVED, UNRESTORED, FULL, DRAW, STOP, KIND, STARTS, PAUSE,
+    GROW,
+) = range(14)  # fmt: skip
 """Why the loop returns."""

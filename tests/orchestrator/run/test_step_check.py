@@ -8,6 +8,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.run import step_check
+from hapticlink.orchestrator.run.compiled.library import CHOICE
 
 SLIDER = """
 title = "A slider in oil"
@@ -84,3 +85,16 @@ def test_results_do_not_depend_on_the_check(
             (tmp_path / folder / f"{rate}.csv").read_bytes() for folder in ("checked", "plain")
         ]
         assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("loop", ["python", "compiled"])
+def test_what_is_found_does_not_depend_on_loop_and_room(
+    loop: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = hl.run("obstacles", {"duration": 1.0}).run["step_errors"]
+    monkeypatch.setenv(CHOICE, loop)
+    monkeypatch.setattr(step_check, "ROOM", 1)  # as many checks as grow the arrays three times
+    found = hl.run("obstacles", {"duration": 1.0})
+    assert (found.run["in_python"] == {}) == (loop == "compiled")
+    assert found.run["step_errors"] == expected
+    assert expected["virtual_mechanism"]["checked"] > 4
