@@ -36,7 +36,7 @@ def counted(made: Iterable[Made]) -> dict[str, Counter[str]]:
     with suppress(KeyboardInterrupt):
         for i, each in enumerate(made):
             counts.setdefault(each.kind, Counter())[each.outcome] += 1
-            if each.wrong:
+            if each.outcome in BAD:
                 line = f"case {i}, {each.kind}: {each.case}: {each.outcome}: {each.wrong}"
                 print(line, file=sys.stderr, flush=True)
     return counts

@@ -27,6 +27,8 @@ from hapticlink.orchestrator.base import internal_error
 
 ENOUGH = 0.5
 """Seconds from a run's first row on after which it is ended."""
+WORK = 5.0
+"""Seconds after which a sweep is ended, whose runs may be 100,000 or long."""
 PROCESSOR_TIME = 30
 """Seconds of a processor after which a command is hung."""
 PATIENCE = 120.0
@@ -101,19 +103,23 @@ class Place:
             _child(lambda: commands.main(arguments), told, self._temporary)
         status = None
         try:
-            status = self._ended(process, rows, earlier)
+            patience = WORK if arguments[:1] == ["sweep"] else math.inf
+            status = self._ended(process, rows, earlier, patience)
         finally:
             if status is None:
                 os.killpg(process, signal.SIGKILL)
                 os.waitpid(process, 0)
         return status, told.read_text("utf-8", errors="replace")
 
-    def _ended(self, process: int, rows: Path, earlier: int | None) -> int | None:
-        """Its status, None where it takes longer than PATIENCE."""
+    def _ended(self, process: int, rows: Path, earlier: int | None, patience: float) -> int | None:
+        """Its status, None where it takes longer than PATIENCE; it is interrupted after `patience`
+        (s), or when it has rows and goes on."""
         begin, began = time.monotonic(), None
         while not (found := os.waitpid(process, os.WNOHANG))[0]:
             now = time.monotonic()
             if began is None and earlier and rows.exists() and rows.stat().st_ino != earlier:
+                began = now
+            if began is None and now > begin + patience:
                 began = now
             if began is not None and now > began + ENOUGH:
                 os.kill(process, signal.SIGINT)
