@@ -21,6 +21,7 @@ SCENES: list[tuple[str, Mapping[str, Any]]] = [
     ("enclosure", {"controller.contact": True}),
     ("local-model", {}),
     ("two-hands", {"mechanism.directions": True}),
+    ("virtual-wall", {"fmu.wall.settings.damping": 1.0, "fmu.wall.settings.velocity": "measured"}),
     ("two-hands", {"linkage.joint.0.ports": ("effort", "position", "velocity")}),
 ]
 """Scenes that have every port among them; n = 4 joint coordinates and one loop, m = 2, in each."""
