@@ -6,6 +6,7 @@
     r["virtual_mechanism.x"], r.time("virtual_mechanism.x")
 
 Scenes: `shipped`, `scene`, `explain`. Runs: `run`, `sweep`, `load`. Files: `build`, `export`.
+Before a hand is on the device: `stability`.
 Raised: `InputFault` for bad input, with all findings of a scene `SceneFault`; each is a `Fault`.
 """
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
         RunInterrupted,
         Scene,
         SceneFault,
+        Stability,
         Sweep,
         Table,
         build,
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
         run,
         scene,
         shipped,
+        stability,
         sweep,
     )
 
@@ -58,6 +61,7 @@ __all__ = [
     "RunInterrupted",
     "Scene",
     "SceneFault",
+    "Stability",
     "Sweep",
     "Table",
     "__version__",
@@ -68,6 +72,7 @@ __all__ = [
     "run",
     "scene",
     "shipped",
+    "stability",
     "sweep",
 ]
 

@@ -93,6 +93,8 @@ def _annotation(root: ET.Element, component: Component) -> None:
             ET.SubElement(block, "Port", name=v.name, kind=v.kind)
     for spring in component.springs:
         ET.SubElement(block, "Spring", _attributes(spring))
+    states = (name for v in component.states for name in v.names)
+    ET.SubElement(block, "States", names=" ".join(states))
 
 
 def _attributes(record: Power | Spring) -> dict[str, str]:

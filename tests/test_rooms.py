@@ -40,6 +40,7 @@ ROOMS = {
         "run",
         "ssp",
         ".",
+        "stability",
         "sweep",
         "report",
         "study",

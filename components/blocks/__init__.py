@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from hapticlink.components.registry import Registry, no_function
 from hapticlink.components.specs.contacts import Contacts
@@ -17,6 +17,12 @@ from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
+from hapticlink.components.specs.quantities import (
+    LinearDamping,
+    LinearStiffness,
+    Position,
+    Quantity,
+)
 
 if TYPE_CHECKING:
     from hapticlink.components.component import Component
@@ -90,6 +96,28 @@ def _discrete_equivalent(step_s: float, rule: str) -> Component:
     return discrete_equivalent(rule)
 
 
+def _virtual_wall(
+    step_s: float,
+    stiffness: LinearStiffness,
+    damping: LinearDamping | None = None,
+    position: Position = 0.0,
+    quantum: Annotated[float, Quantity("m", ge=0)] | None = None,
+    unilateral: bool = True,
+    velocity: Literal["difference", "measured"] = "difference",
+) -> Component:
+    from hapticlink.components.blocks.virtual_wall import virtual_wall
+
+    return virtual_wall(
+        step_s,
+        stiffness,
+        damping,
+        position=position,
+        quantum=quantum,
+        unilateral=unilateral,
+        measured_velocity=velocity == "measured",
+    )
+
+
 def _misfit(part: Any) -> str:
     """Why a part is no block, "" if it is one."""
     if why := no_function(part):
@@ -112,6 +140,7 @@ BLOCKS: Registry[Callable[..., Component]] = Registry(
         "controller": _controller,
         "hand": _hand,
         "discrete_equivalent": _discrete_equivalent,
+        "virtual_wall": _virtual_wall,
     },
     _misfit,
 )

@@ -16,3 +16,5 @@ from hapticlink.orchestrator.base.faults import InputFault as InputFault
 from hapticlink.orchestrator.base.faults import SceneFault as SceneFault
 from hapticlink.orchestrator.results.tables import Table as Table
 from hapticlink.orchestrator.scene.scene import Scene as Scene
+from hapticlink.orchestrator.stability.analysis import Stability as Stability
+from hapticlink.orchestrator.stability.analysis import stability as stability

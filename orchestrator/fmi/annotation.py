@@ -5,11 +5,14 @@
         <Port name="F" displacement="x" sign="-1.0"/>
         <Port name="P" kind="projector"/>
         <Spring set_position="x_S" position="x_D" stiffness="K" damping="B" set_velocity="v_S"/>
+        <States names="q[1] q[2]"/>
       </Block>
     </Tool>
 
-The attributes are those of the records in `components.ports`. An FMU without this annotation
-declares none of it, whatever its ports are called; any FMU may carry it.
+The attributes of ports and springs are those of the records in `components.ports`. States declares
+the layout of the serialised FMU state: it ends with doubles in the machine's byte order, the values
+of all variables by value reference, and then these states. An FMU without this annotation declares
+none of it, whatever its ports are called; any FMU may carry it.
 """
 
 from __future__ import annotations
@@ -34,12 +37,14 @@ TIMINGS = ("continuous", "sampled")
 @dataclass(frozen=True)
 class Annotation:
     """What an FMU declares: kinds by output port, power by input port; timing None if
+    undeclared. states: names of the states that a serialised FMU state ends with, None if
     undeclared."""
 
     timing: Timing | None = None
     kinds: Mapping[str, Kind] = field(default_factory=dict)
     power: Mapping[str, Power] = field(default_factory=dict)
     springs: tuple[Spring, ...] = ()
+    states: tuple[str, ...] | None = None
 
 
 def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> Annotation:
@@ -55,16 +60,19 @@ def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) ->
     kinds: dict[str, Kind] = {}
     power: dict[str, Power] = {}
     springs: list[Spring] = []
+    states: tuple[str, ...] | None = None
     for element in block:
-        _one_of(element.tag, "element", ("Port", "Spring"))
+        _one_of(element.tag, "element", ("Port", "Spring", "States"))
         name = element.get("name", "")
-        if element.tag == "Spring":
+        if element.tag == "States":
+            states = tuple(_attributes(element, "names")["names"].split())
+        elif element.tag == "Spring":
             springs.append(ports.spring(element))
         elif "kind" in element.attrib:
             kinds[name] = ports.kind(element)
         else:
             power[name] = ports.power(element)
-    return Annotation(timing, kinds, power, tuple(springs))
+    return Annotation(timing, kinds, power, tuple(springs), states)
 
 
 class _Ports:

@@ -63,6 +63,8 @@ class Description:
     power: Mapping[str, Power] = field(default_factory=dict)
     springs: tuple[Spring, ...] = ()
     """What the FMU declares of its ports, by port (`annotation`)."""
+    states: tuple[str, ...] | None = None
+    """The states that its serialised FMU state ends with; None where that is not declared."""
     declares_timing: bool = False
     """Whether the FMU itself says its timing."""
     block: str | None = None
@@ -166,6 +168,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         kinds=declared.kinds,
         power=declared.power,
         springs=declared.springs,
+        states=declared.states,
         declares_timing=declared.timing is not None,
         block=None if block is None else model.modelName,
     )

@@ -265,6 +265,29 @@ class InProcess(Instance):
         self.time = self._saved_time[slot]
         self._status, self.ended = 0, False
 
+    def serialized(self) -> bytes:
+        state = self._state("Get", "getFMUState")
+        try:
+            found: bytes = self._state("Serialize", "serializeFMUState", state)
+            return found
+        finally:
+            self.slave.freeFMUState(state)
+
+    def deserialize(self, state: bytes) -> None:
+        restored = self._state("DeSerialize", "deserializeFMUState", state)
+        try:
+            self._state("Set", "setFMUState", restored)
+        finally:
+            self.slave.freeFMUState(restored)
+
+    def _state(self, verb: str, method: str, *arguments: Any) -> Any:
+        """The result of FMPy's `method`, which raises an exception for a status of error."""
+        try:
+            return getattr(self.slave, method)(*arguments)
+        except Exception as error:
+            call = f"fmi{self.description.fmi}{verb}FMUstate"
+            raise self.failed(call, getattr(error, "status", ERROR)) from error
+
     # --- ends -----------------------------------------------------------------------------
 
     def failed(self, call: str, status: int, passing: bool = False) -> FmuFault:

@@ -152,6 +152,14 @@ class Instance(ABC):
         """Restore the FMU state of a slot."""
 
     @abstractmethod
+    def serialized(self) -> bytes:
+        """The FMU state in bytes (fmi2SerializeFMUstate)."""
+
+    @abstractmethod
+    def deserialize(self, state: bytes) -> None:
+        """Restore an FMU state from bytes that `serialized` gave, or that were made of them."""
+
+    @abstractmethod
     def dismiss(self) -> None:
         """Start closing without waiting for it."""
 

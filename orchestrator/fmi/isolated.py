@@ -149,6 +149,14 @@ class Isolated(Instance):
         self._ask("rollback", slot)
         self.time, self.ended = self._saved_time[slot], False
 
+    def serialized(self) -> bytes:
+        state: bytes = self._ask("serialized")
+        return state
+
+    def deserialize(self, state: bytes) -> None:
+        self._pending = []  # inputs are part of the state
+        self._ask("deserialize", state)
+
     def dismiss(self) -> None:
         """`close` waits for the worker; dismissing all first lets them close concurrently."""
         process = self._process

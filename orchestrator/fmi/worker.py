@@ -86,6 +86,12 @@ class Worker:
     def rollback(self, slot: int) -> None:
         self.instance.rollback(slot)
 
+    def serialized(self) -> bytes:
+        return self.instance.serialized()
+
+    def deserialize(self, state: bytes) -> None:
+        self.instance.deserialize(state)
+
     def close(self) -> None:
         instance, self._instance = self._instance, None
         if instance is not None and (fault := instance.close()):

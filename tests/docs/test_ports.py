@@ -14,6 +14,11 @@ from hapticlink.orchestrator.system.fmu_files import settled
 from hapticlink.orchestrator.system.timeline import timeline
 from tests.docs.pages import ROOT
 
+WALL = {
+    "name": "wall",
+    "block": "virtual_wall",
+    "settings": {"stiffness": 1.0, "damping": 1.0, "velocity": "measured"},
+}
 SCENES: list[tuple[str, Mapping[str, Any]]] = [
     ("closed-loop", {"sensing": "encoders", "controller.bias": "full"}),
     ("closed-loop", {"mechanism.directions": True, "mechanism.diagnostics": True}),
@@ -21,6 +26,7 @@ SCENES: list[tuple[str, Mapping[str, Any]]] = [
     ("enclosure", {"controller.contact": True}),
     ("local-model", {}),
     ("two-hands", {"mechanism.directions": True}),
+    ("two-hands", {"fmu": [WALL]}),
     ("two-hands", {"linkage.joint.0.ports": ("effort", "position", "velocity")}),
 ]
 """Scenes that have every port among them; n = 4 joint coordinates and one loop, m = 2, in each."""

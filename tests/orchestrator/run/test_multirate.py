@@ -20,12 +20,16 @@ from numpy.typing import NDArray
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
+from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.stability.equilibrium import equilibrium
+from hapticlink.orchestrator.stability.lifted_map import opened
+from hapticlink.orchestrator.stability.modes import modes
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator.oscillator import driven
 from tests.orchestrator.systems import connected
@@ -45,6 +49,21 @@ ROWS = {
     "linkage": [("spring.F_l", "linkage.F")],
     "sprung": [("device.x", "linkage.x_d"), ("device.v", "linkage.v_d")],
 }
+
+LIMITS = [
+    ("linkage", 10, "tick", 152),
+    ("linkage", 20, "tick", 561),
+    ("linkage", 30, "tick", 1186),
+    ("linkage", 60, "tick", 1199),
+    ("linkage", 512, "tick", 2487),
+    ("sprung", 10, "tick", 181),
+    ("sprung", 20, "tick", 528),
+    ("sprung", 30, "tick", 1071),
+    ("sprung", 60, "tick", 1122),
+    ("sprung", 512, "tick", 2559),
+    ("sprung", 60, "exact", 1004),
+]
+"""Linkage, graphics rate (Hz), alignment of its frames, and the limit (N/m)."""
 
 
 def mass(name: str, m: float, b: float, start: float) -> Component:
@@ -110,7 +129,14 @@ def forces(
     ground: float = 0.0,
 ) -> NDArray[np.float64]:
     """|F| of the sampled spring at every tick."""
+    outcome = run(Plan(system(fmus, linkage, timeline, gain, ground)), RunFolder(folder))
+    assert outcome.fault is None
+    return np.abs(read_table(folder / "haptics.csv")["spring.F"])
 
+
+def system(
+    fmus: dict[str, Description], linkage: str, timeline: Timeline, gain: float, ground: float = 0.0
+) -> System:
     def unit(name: str, fmu: str, clock: str) -> Fmu:
         values = [(s, gain) for s in fmus[fmu].port("K", "parameter")]
         values += [(s, ground) for s in fmus[fmu].port("K_g", "parameter")]
@@ -122,26 +148,12 @@ def forces(
         unit("linkage", linkage, "graphics"),
     )
     connections = connected(units, [*FAST, *ROWS[linkage]], timeline)[0]
-    outcome = run(Plan(System(units, connections, timeline, "gauss-seidel")), RunFolder(folder))
-    assert outcome.fault is None
-    return np.abs(read_table(folder / "haptics.csv")["spring.F"])
+    return System(units, connections, timeline, "gauss-seidel")
 
 
 @pytest.mark.parametrize(
     ("linkage", "rate", "align", "limit"),
-    [
-        ("linkage", 10, "tick", 152),
-        ("linkage", 20, "tick", 561),
-        ("linkage", 30, "tick", 1186),
-        ("linkage", 60, "tick", 1199),
-        ("linkage", 512, "tick", 2487),
-        ("sprung", 10, "tick", 181),
-        ("sprung", 20, "tick", 528),
-        ("sprung", 30, "tick", 1071),
-        ("sprung", 60, "tick", 1122),
-        ("sprung", 512, "tick", 2559),
-        ("sprung", 60, "exact", 1004),
-    ],
+    LIMITS,
 )
 def test_limit_of_the_coupling_to_one_percent(
     fmus: dict[str, Description],
@@ -159,6 +171,42 @@ def test_limit_of_the_coupling_to_one_percent(
         return float(last.max() / third.max())
 
     assert growth(0.99 * limit) < 1 < growth(1.01 * limit)
+
+
+def radius(made: System) -> float:
+    """The spectral radius of the lifted map, over a hyperperiod."""
+    with opened(made) as map_:
+        found = modes(equilibrium(map_, 10.0), map_.period)
+    return max(abs(mode.z) for mode in found if not mode.neutral)
+
+
+@pytest.mark.parametrize(
+    ("linkage", "rate", "align", "limit"),
+    LIMITS,
+)
+def test_the_lifted_map_has_the_same_limits(
+    fmus: dict[str, Description], linkage: str, rate: int, align: str, limit: float
+) -> None:
+    timeline = fixed(Fraction(512), Fraction(rate), 512 * 16, align)
+    below, above = (radius(system(fmus, linkage, timeline, k * limit)) for k in (0.995, 1.005))
+    assert below < 1.0 < above
+
+
+@pytest.mark.parametrize(
+    ("frames", "growth"), [((17, 17), None), ((51, 51), None), ((17, 51), 1.86)], ids=str
+)
+def test_the_lifted_map_of_alternating_frames(
+    fmus: dict[str, Description], frames: tuple[int, int], growth: float | None
+) -> None:
+    whole = sum(frames)
+    starts = Frames(lambda i: i // 2 * whole + i % 2 * frames[0], 100, 2)
+    clocks = (Clock("haptics", range(starts[98])), Clock("graphics", starts))
+    made = system(fmus, "sprung", Timeline(Fraction(1, 512), starts[90], clocks), 1050.0, 20.0)
+    a_frame = radius(made) ** (1 / 2)
+    if growth is None:
+        assert a_frame < 0.9865
+    else:
+        assert a_frame == pytest.approx(growth, rel=0.005)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,145 @@
+"""The stability of a scene: equilibrium, map, modes and verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.stability import frozen
+from hapticlink.orchestrator.stability.equilibrium import equilibrium
+from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
+from hapticlink.orchestrator.stability.linearise import Linear
+from hapticlink.orchestrator.stability.modes import Mode, leading, modes
+from hapticlink.orchestrator.stability.oscillation import traced
+from hapticlink.orchestrator.system.built import built
+
+SHOWN = 6
+"""Modes that are reported."""
+KINK = 1e-3
+"""Difference of the slopes to both sides, relative, above which a map has none."""
+LOST = 1e-6
+"""Modes with a smaller |z| have vanished within a period."""
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The result of an analysis. period: the hyperperiod (s). radius: the spectral radius over it,
+    without neutral modes, and its uncertainty. growth: ln(radius)/period (1/s). modes: the leading
+    ones. neutral: those with z = 1. frozen: lines of text. kinks: coordinates in which the map has
+    no slope. equilibrium: by coordinate. participants: by mode, names and shares."""
+
+    title: str
+    period: float
+    radius: float
+    uncertainty: float
+    modes: tuple[Mode, ...]
+    neutral: tuple[Mode, ...]
+    names: tuple[str, ...]
+    equilibrium: dict[str, float]
+    frozen: tuple[str, ...]
+    kinks: tuple[str, ...]
+
+    @property
+    def growth(self) -> float:
+        return float(np.log(self.radius)) / self.period if self.radius else -np.inf
+
+    @property
+    def verdict(self) -> str:
+        """stable, unstable, or marginal where the radius is 1 within its uncertainty."""
+        if abs(self.radius - 1.0) <= self.uncertainty:
+            return "marginal"
+        return "unstable" if self.radius > 1.0 else "stable"
+
+    def record(self) -> dict[str, Any]:
+        """The content of stability.json."""
+        return {
+            "title": self.title,
+            "verdict": self.verdict,
+            "spectral_radius": self.radius,
+            "uncertainty": self.uncertainty,
+            "growth_rate": self.growth,
+            "margin": -self.growth,
+            "hyperperiod": self.period,
+            "modes": [self._mode(mode) for mode in self.modes],
+            "neutral_modes": [self._mode(mode) for mode in self.neutral],
+            "frozen": list(self.frozen),
+            "not_differentiable": list(self.kinks),
+            "equilibrium": self.equilibrium,
+        }
+
+    def _mode(self, mode: Mode) -> dict[str, Any]:
+        return {
+            "eigenvalue": [mode.z.real, mode.z.imag],
+            "uncertainty": mode.uncertainty,
+            "growth_rate": mode.growth,
+            "frequency": mode.omega / (2 * np.pi),
+            "damping_ratio": mode.damping,
+            "participation": dict(leading(mode, self.names, 6)),
+        }
+
+    def lines(self) -> Iterator[str]:
+        """The result as text."""
+        yield (
+            f"spectral radius {self.radius:.8g} +- {self.uncertainty:.1g} over "
+            f"{self.period:.6g} s, growth rate {self.growth:.5g} 1/s"
+        )
+        for title, found in (("modes", self.modes), ("neutral modes", self.neutral)):
+            if found:
+                yield f"{title}: growth rate (1/s), frequency (Hz), damping ratio, participation"
+            for mode in found:
+                who = ", ".join(f"{n} {share:.2f}" for n, share in leading(mode, self.names))
+                hertz = mode.omega / (2 * np.pi)
+                yield f"  {mode.growth:10.4g} {hertz:9.4g} {mode.damping:7.3f}  {who}"
+        if self.frozen:
+            yield "frozen:"
+            yield from (f"  {line}" for line in self.frozen)
+        if self.kinks:
+            yield "the map has two slopes at the equilibrium, so that the verdict is only of their"
+            yield f"mean, in: {', '.join(self.kinks)}"
+
+
+def stability(scene: str | Path | Scene, options: Options = (), *, at: float = 0.0) -> Stability:
+    """The stability of a scene, changed by `options` (see `scene`), around its equilibrium.
+
+    The scene is run up to the time `at` (s) before, from which on no target, drive or wrench may
+    change with time.
+
+    Raises InputFault for a scene without an equilibrium, and for one whose co-simulation has no map
+    of a period: rates, latencies or steps that vary, an FMU that does not declare its state.
+    """
+    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
+        read = open_scene.load(scene, options)
+        with built(read) as whole:
+            system, removed = frozen.without(whole)
+            with opened(long_enough(read, system, at), at) as map_:
+                found = equilibrium(map_, read.duration)
+                return _result(read.title, map_, found, [*removed, *frozen.kept(system)])
+
+
+def _result(title: str, map_: LiftedMap, at: Linear, lines: list[str]) -> Stability:
+    found = [mode for mode in modes(at, map_.period) if abs(mode.z) > LOST]
+    neutral = [mode for mode in found if mode.neutral]
+    others = [mode for mode in found if not mode.neutral]
+    names = tuple(str(map_.coordinates[i]) for i in at.taken)
+    kinks = tuple(n for n, kink in zip(names, at.kink, strict=True) if kink > KINK)
+    first = others[0] if others else None
+    return Stability(
+        title=title,
+        period=map_.period,
+        radius=abs(first.z) if first else 0.0,
+        uncertainty=first.uncertainty if first else 0.0,
+        modes=tuple(traced(map_, at, mode) for mode in others[:SHOWN]),
+        neutral=tuple(neutral),
+        names=names,
+        equilibrium={n: float(at.point[i]) for n, i in zip(names, at.taken, strict=True)},
+        frozen=tuple(lines),
+        kinks=kinks,
+    )

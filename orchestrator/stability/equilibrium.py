@@ -1,0 +1,111 @@
+"""The equilibrium of the lifted map: a state z with F(z) = z, by Newton's method.
+
+    (I - A) d = F(z) - z,   z <- z + d
+
+A of `linearise`; d is the one of least norm, in balanced coordinates, so that a free motion (an
+eigenvalue of 1) stays where it is. A unilateral contact makes F piecewise smooth: from a state on
+the wrong piece there may be no equilibrium to find, so the search starts again from states that the
+simulation passes through.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
+from hapticlink.orchestrator.stability.linearise import Linear, linearised
+
+TOLERANCE = 1e-9
+"""Of each coordinate z, relative to max(1, |z|)."""
+ITERATIONS = 20
+PATIENCE = 3
+"""Steps of Newton in a row without halving the smallest residual that end a search."""
+NEUTRAL = 1e-7
+"""Singular values of the balanced I - A, relative to the largest, that count as 0."""
+
+
+def equilibrium(map_: LiftedMap, seconds: float) -> Linear:
+    """The map linearised at its equilibrium; the search starts from the start of the scene, and
+    then from states that are passed within `seconds`.
+
+    Raises InputFault where none is found, naming what does not come to rest.
+    """
+    state, passed, ahead = map_.start, 0, 1
+    nearest: Linear | None = None
+    while passed * map_.period <= seconds:
+        try:
+            found = _newton(map_, state)
+            if rests(found):
+                _require_rest(map_, found)
+                return found
+            if nearest is None or _unrest(found).max() < _unrest(nearest).max():
+                nearest = found
+            for _ in range(ahead):
+                state = map_.image(state)
+        except FmuFault:  # diverges from here on
+            break
+        passed, ahead = passed + ahead, 1 + passed // 2
+    raise InputFault(_why_none(map_, nearest))
+
+
+def _require_rest(map_: LiftedMap, at: Linear) -> None:
+    """Raises InputFault where the equilibrium moves with time, as under a target that does."""
+    once, again = at.image[at.taken], map_.second(at.point)[at.taken]
+    moved = np.abs(again - once) / np.maximum(1.0, np.abs(once))
+    if moved.max() > 10 * TOLERANCE:
+        raise InputFault(
+            f"the equilibrium moves with time, as under a drive or target that does: by "
+            f"{moved.max():.1e} in {map_.period:.4g} s, seen in "
+            f"{map_.coordinates[at.taken[int(np.argmax(moved))]]}; give `at`, a time from which "
+            "on nothing changes"
+        )
+
+
+def rests(at: Linear) -> bool:
+    return bool((_unrest(at) <= TOLERANCE).all())
+
+
+def _unrest(at: Linear) -> Vector:
+    """By coordinate taken, its change over a period, relative."""
+    z = at.point[at.taken]
+    found: Vector = np.abs(at.image[at.taken] - z) / np.maximum(1.0, np.abs(z))
+    return found
+
+
+def _newton(map_: LiftedMap, state: Vector) -> Linear:
+    """Newton's method from `state`: the last point where the FMUs can be evaluated."""
+    at, least, idle = linearised(map_, state), np.inf, 0
+    for _ in range(ITERATIONS):
+        left = _unrest(at).max()
+        idle = idle + 1 if left > least / 2 else 0
+        if left <= TOLERANCE or idle == PATIENCE:
+            break
+        least = min(least, left)
+        step = at.image[at.taken] - at.point[at.taken]
+        d = at.scales
+        balanced = np.eye(len(step)) - at.A * d / d[:, None]
+        step = d * np.linalg.lstsq(balanced, step / d, rcond=NEUTRAL)[0]
+        point = at.image.copy()  # what is not taken is overwritten
+        point[at.taken] = at.point[at.taken] + step
+        try:
+            at = linearised(map_, point)
+        except FmuFault:  # far from where it is linear
+            break
+    return at
+
+
+def _why_none(map_: LiftedMap, nearest: Linear | None) -> str:
+    remedy = (
+        "the map is linearised around a state of rest: take a hand that holds the mechanism, "
+        "such as an arm or a spring, and no wrench, drive or target that changes with time"
+    )
+    if nearest is None:
+        return f"no equilibrium: the run diverges before one is found; {remedy}"
+    i = int(np.argmax(_unrest(nearest)))
+    j = nearest.taken[i]
+    change = nearest.image[j] - nearest.point[j]
+    return (
+        f"no equilibrium found: {map_.coordinates[j]} still changes by {change:.3g} in "
+        f"{map_.period:.4g} s; {remedy}"
+    )

@@ -1,0 +1,173 @@
+"""The lifted map of a co-simulation: its state after one hyperperiod of all clocks as a function of
+the state before, z_{k+1} = F(z_k), carried out by the FMUs, holds and operations that really run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from itertools import takewhile
+
+import numpy as np
+
+from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.frames import Frames
+from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.plan.operations import Event, Operation, Part, Record, StopWhen
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.run.bind import Binder
+from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.stability.frozen import discrete
+from hapticlink.orchestrator.stability.state_vector import Coordinate, StateVector, Vector
+from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import timeline
+
+Watch = Callable[[int, Vector], bool]
+
+
+def hyperperiod(time: Timeline) -> int:
+    """The ticks after which the events of all clocks repeat. Raises InputFault for a clock whose
+    period varies at random or follows a trace."""
+    return math.lcm(*(_round(clock) for clock in time.clocks))
+
+
+def _round(clock: Clock) -> int:
+    starts = clock.starts
+    if isinstance(starts, Frames):
+        return starts[starts.round + 1] - starts[1]
+    if clock.period is None or clock.first != clock.period:
+        raise InputFault(
+            f"the period of {clock.name} varies: no period after which all repeats, and so no map; "
+            "take a fixed rate"
+        )
+    return clock.period
+
+
+class LiftedMap:
+    """F of a system, from the first multiple of the hyperperiod on that is behind its start and not
+    before the time `at` (s).
+
+    period: the hyperperiod (s), of a number of `events`. coordinates: of the state, in order.
+    start: the state there. free: indices of the coordinates that are no switches.
+    """
+
+    def __init__(self, plan: Plan, simulation: Simulation, at: float = 0.0) -> None:
+        self._simulation, time = simulation, plan.system.timeline
+        self._bound: dict[Event | Part, list[Call]] = {}
+        self._plan = plan
+        self._binder = Binder(simulation, self._calls)
+        self._state = StateVector(simulation)
+        length = hyperperiod(time)
+        self.period, self.seconds = time.seconds(length), time.seconds
+        first = length * math.ceil(behind_start(plan.system, at) / length)
+        moments = list(takewhile(lambda moment: moment.tick < first + 2 * length, plan))
+        for tick, event in moments:
+            if tick < first:
+                self._run(tick, event)
+        self._moments = [m for m in moments if first <= m.tick < first + length]
+        self._later = [m for m in moments if m.tick >= first + length]
+        self.events = len(self._moments)
+        self._template = self._state.save()
+        self.coordinates: Sequence[Coordinate] = self._state.coordinates(self._template)
+        self.start = self._state.numbers(self._template)
+        free = [i for i, c in enumerate(self.coordinates) if not discrete(c)]
+        self.free = np.array(free, dtype=np.intp)
+
+    def __call__(
+        self, state: Vector, watch: Watch = lambda count, state: False, always: bool = False
+    ) -> Vector | None:
+        """F(state). watch: called after 1, 2, 4, 8, ... events, or `always`, with their number and
+        the state; where it returns True, the evaluation ends without a result."""
+        self._state.restore(self._state.put(self._template, state))
+        for count, (tick, event) in enumerate(self._moments, start=1):
+            self._run(tick, event)
+            if (always or count & (count - 1) == 0) and watch(count, self._numbers()):
+                return None
+        interrupt.check()
+        return self._numbers()
+
+    def image(self, state: Vector) -> Vector:
+        """F(state)."""
+        found = self(state)
+        assert found is not None
+        return found
+
+    def second(self, state: Vector) -> Vector:
+        """The state after two periods, of which the second one is run at its own time: F(F(state))
+        if nothing in the system changes with time."""
+        self._state.restore(self._state.put(self._template, state))
+        for tick, event in (*self._moments, *self._later):
+            self._run(tick, event)
+        return self._numbers()
+
+    def _numbers(self) -> Vector:
+        found = self._state.numbers(self._state.save())
+        if len(found) != len(self.start):
+            raise InputFault(
+                "the number of samples that holds keep changes from period to period: the map "
+                "needs constant latencies"
+            )
+        return found
+
+    def _run(self, tick: int, event: Event) -> None:
+        for call in self._calls(event):
+            call(tick)
+
+    def _calls(self, kind: Event | Part) -> list[Call]:
+        """The calls of a kind of event, without those that write rows or end a run."""
+        if kind not in self._bound:
+            operations: list[Operation] = [
+                operation
+                for operation in self._plan.block(kind)
+                if not isinstance(operation, Record | StopWhen)
+            ]
+            self._bound[kind] = self._binder.bind_all(operations)
+        return self._bound[kind]
+
+
+def behind_start(system: System, at: float = 0.0) -> int:
+    """Ticks, at least up to the time `at` (s), after which holds have all the samples that they
+    keep: four steps of the slowest clock, and the longest latency."""
+    time = system.timeline
+    late = max((c.latency.max or c.latency.min for c in system.connections if c.latency), default=0)
+    kept = 4 * max(clock.longest for clock in time.clocks) + math.ceil(late / time.base)
+    return max(kept, math.ceil(at / time.base))
+
+
+def long_enough(scene: Scene, system: System, at: float = 0.0) -> System:
+    """`system` with the timeline of a scene that lasts as long as its map from `at` (s) needs."""
+    needed = (behind_start(system, at) + 4 * hyperperiod(system.timeline)) * system.timeline.base
+    duration = float(max(scene.duration, math.ceil(needed)))
+    return replace(system, timeline=timeline(replace(scene, duration=duration)))
+
+
+@contextmanager
+def opened(system: System, at: float = 0.0) -> Iterator[LiftedMap]:
+    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded.
+
+    Raises InputFault where there is none: adaptive step sizes, rates and latencies that vary, an
+    FMU whose state cannot be read.
+    """
+    if system.step_control:
+        raise InputFault("step_control adapts the steps to the state: the map needs fixed ones")
+    for c in system.connections:
+        if c.latency and (c.latency.loss or c.latency.max not in (None, c.latency.min)):
+            raise InputFault(
+                f"delays of {c.name}: latency and loss are random, so that no two periods are "
+                "alike; the map needs a constant latency"
+            )
+    with (
+        temporary_folders.room() as room,
+        RunFolder(room) as results,
+        ExitStack() as stack,
+        np.errstate(invalid="ignore", over="ignore"),
+    ):
+        simulation = Simulation(system, results, stack)
+        simulation.step_checks.clear()
+        simulation.start()
+        yield LiftedMap(Plan(system), simulation, at)

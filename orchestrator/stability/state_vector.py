@@ -1,0 +1,192 @@
+"""The state of a co-simulation as one vector of numbers, and back.
+
+Between two events it consists of the states of all FMUs with the inputs that they hold, the signal
+vector, and the samples and accounts that holds and energy tanks keep. Times, counts and whatever
+else is no floating-point number stay those of a template, an instant of the simulation itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from copy import copy, deepcopy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.capabilities import restores_state
+from hapticlink.orchestrator.holds import Hold
+from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.system.latency import Link
+from hapticlink.orchestrator.system.system import Fmu
+
+Vector = NDArray[np.float64]
+Visit = Callable[[str, Vector], Vector]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """An entry of the state: of an FMU, of the signals ("signal") or of a connection's hold
+    ("hold"); `variable` is its name there."""
+
+    owner: str
+    variable: str
+    kind: str
+
+    def __str__(self) -> str:
+        joint = ": " if self.kind == "hold" else "."
+        return f"{self.owner}{joint}{self.variable}"
+
+
+@dataclass(frozen=True)
+class Template:
+    """A saved state: of the FMUs in bytes, by name; the signals; the attributes of holds and
+    tanks."""
+
+    fmus: dict[str, bytes]
+    signals: Vector
+    holds: list[Any]
+
+
+class StateVector:
+    """Reads and writes the state of `simulation`. Raises InputFault for an FMU whose serialised
+    state does not say where its numbers are."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._holds = {**simulation.holds}
+        for i, tank in enumerate(simulation.springs):
+            self._holds[f"energy tank {i + 1}"] = tank  # type: ignore[assignment]
+        self._taken: dict[str, NDArray[np.intp]] = {}
+        for fmu in simulation.system.fmus:
+            require_layout(fmu)
+            self._taken[fmu.name] = np.array([i for i, _ in _entries(fmu)], dtype=np.intp)
+
+    def save(self) -> Template:
+        simulation = self._simulation
+        return Template(
+            {name: instance.serialized() for name, instance in simulation.instances.items()},
+            simulation.signals.values.copy(),
+            [_mapped(vars(hold), name, _copied) for name, hold in self._holds.items()],
+        )
+
+    def restore(self, template: Template) -> None:
+        simulation = self._simulation
+        for name, instance in simulation.instances.items():
+            instance.deserialize(template.fmus[name])
+        simulation.signals.values[:] = template.signals
+        for (name, hold), kept in zip(self._holds.items(), template.holds, strict=True):
+            vars(hold).update(_mapped(kept, name, _copied))
+
+    def numbers(self, template: Template) -> Vector:
+        """The numbers of a saved state, in the order of `coordinates`."""
+        parts = [_doubles(template.fmus[name])[taken] for name, taken in self._taken.items()]
+        parts.append(template.signals)
+
+        def visit(path: str, value: Vector) -> Vector:
+            parts.append(value.ravel())
+            return value
+
+        for name, kept in zip(self._holds, template.holds, strict=True):
+            _mapped(kept, name, visit)
+        return np.concatenate(parts)
+
+    def put(self, template: Template, numbers: Vector) -> Template:
+        """`template` with other numbers."""
+        at = 0
+        fmus = {}
+        for name, taken in self._taken.items():
+            head, doubles = template.fmus[name], _doubles(template.fmus[name]).copy()
+            doubles[taken] = numbers[at : at + len(taken)]
+            fmus[name] = head[: len(head) - doubles.nbytes] + doubles.tobytes()
+            at += len(taken)
+        signals = numbers[at : at + len(template.signals)].copy()
+        at += len(signals)
+
+        def visit(path: str, value: Vector) -> Vector:
+            nonlocal at
+            at += value.size
+            return numbers[at - value.size : at].reshape(value.shape).copy()
+
+        pairs = zip(self._holds, template.holds, strict=True)
+        return Template(fmus, signals, [_mapped(kept, name, visit) for name, kept in pairs])
+
+    def coordinates(self, template: Template) -> list[Coordinate]:
+        simulation = self._simulation
+        system, signals = simulation.system, simulation.signals
+        found = [Coordinate(u.name, name, "fmu") for u in system.fmus for _, name in _entries(u)]
+        columns = [n for clock in system.timeline.clocks for n in signals.columns(clock.name)]
+        outputs = [_signal(name) for name in columns]
+        further = range(len(outputs), len(template.signals))
+        found += outputs + [Coordinate("held values", f"[{i}]", "signal") for i in further]
+
+        def visit(path: str, value: Vector) -> Vector:
+            owner, _, attribute = path.partition("\0")
+            entries = [f"[{i + 1}]" for i in range(value.size)] if value.ndim else [""]
+            found.extend(Coordinate(owner, attribute.strip(".") + e, "hold") for e in entries)
+            return value
+
+        for name, kept in zip(self._holds, template.holds, strict=True):
+            _mapped(kept, name + "\0", visit)
+        return found
+
+
+def _signal(column: str) -> Coordinate:
+    fmu, _, variable = column.partition(".")
+    return Coordinate(fmu, variable, "signal")
+
+
+def require_layout(fmu: Fmu) -> None:
+    """Raises InputFault unless the FMU declares the layout of its serialised state."""
+    if fmu.description.states is None or not restores_state(fmu.description):
+        raise InputFault(
+            f"{fmu.name}: its FMU does not declare the layout of its serialised state, which the "
+            "map needs (`States` in its annotation: docs/fmus.md); an FMU that replaces a block "
+            "can be left out"
+        )
+
+
+def _entries(fmu: Fmu) -> Iterator[tuple[int, str]]:
+    """Index, from the first variable on, and name of each number of an FMU that is no parameter."""
+    assert fmu.description.states is not None
+    scalars = sorted(fmu.description.scalars, key=lambda s: s.reference)
+    for i, scalar in enumerate(scalars):
+        if scalar.causality in ("input", "output"):
+            yield i - len(scalars) - len(fmu.description.states), scalar.name
+    for i, name in enumerate(fmu.description.states):
+        yield i - len(fmu.description.states), name
+
+
+def _doubles(state: bytes) -> Vector:
+    """The doubles that a serialised state ends with, as many as fit."""
+    return np.frombuffer(state, offset=len(state) % 8)
+
+
+def _copied(path: str, value: Vector) -> Vector:
+    return value.copy()
+
+
+def _mapped(value: Any, path: str, visit: Visit) -> Any:
+    """A copy of nested containers and of the parts of holds, with `visit` applied to every number
+    that is a float; functions and shared tanks stay as they are."""
+    match value:
+        case np.ndarray() if value.dtype.kind == "f":
+            return visit(path, value)
+        case float():
+            return float(visit(path, np.array(value)))
+        case dict():
+            return {k: _mapped(v, f"{path}.{k}", visit) for k, v in value.items()}
+        case list() | tuple():
+            return type(value)(_mapped(v, f"{path}[{i + 1}]", visit) for i, v in enumerate(value))
+        case deque():
+            each = (_mapped(v, f"{path}[{i + 1}]", visit) for i, v in enumerate(value))
+            return deque(each, value.maxlen)
+        case Hold() | History() | Link():
+            made = copy(value)
+            vars(made).update(_mapped(vars(value), path, visit))
+            return made
+    return value if callable(value) else deepcopy(value)

@@ -1,0 +1,172 @@
+"""The stability of scenes, against closed forms and against runs."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.commands import main
+
+T = 1 / 512
+HELD: dict[str, Any] = {
+    "hand": {
+        "type": "spring",
+        "stiffness": [300.0, 300.0, 1.0],
+        "damping": [5.0, 5.0, 0.01],
+        "target": [[0.0, 0.0445, 0.0148, -0.7878]],
+    }
+}
+
+
+def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
+    """m = 1, K = 100, T = 0.05: z^2 - (2 - alpha/2) z + 1 + alpha/2 with alpha = K T^2/m."""
+    found = hl.stability("sampled-spring")
+    alpha = 0.25
+    z = max(np.roots([1.0, -(2 - alpha / 2), 1 + alpha / 2]), key=lambda root: root.imag)
+    (mode,) = found.modes
+    assert mode.z == pytest.approx(z, rel=1e-8)
+    assert found.growth == pytest.approx(math.log(abs(z)) / 0.05, rel=1e-8)
+    assert mode.omega == pytest.approx(np.angle(z) / 0.05, rel=1e-8)
+    assert found.verdict == "unstable"
+    shares = found.record()["modes"][0]["participation"]
+    assert shares == pytest.approx(
+        {"virtual_mechanism.q[1]": 0.5, "virtual_mechanism.qd[1]": 0.5}, abs=1e-6
+    )
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.995, "stable"), (1.005, "unstable")])
+def test_semi_implicit_euler_is_stable_up_to_alpha_4_minus_2_beta(
+    share: float, verdict: str
+) -> None:
+    beta = 0.5
+    spring = {"stiffness": share * (4 - 2 * beta) / T**2, "damping": beta / T}
+    options = {"haptics.rate": 512, "mechanism.integrator": "semi-implicit-euler"}
+    options |= {f"linkage.joint.rail.{name}": value for name, value in spring.items()}
+    found = hl.stability("sampled-spring", options | {"hand.stiffness": [0.0, 0.0, 0.0]})
+    assert found.verdict == verdict
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.995, "stable"), (1.005, "unstable")])
+def test_baumgarte_is_stable_up_to_its_limit_off_the_closures(share: float, verdict: str) -> None:
+    """alpha T < 2 (sqrt(1 + beta^2) - beta) under semi-implicit Euler: the map is perturbed off
+    the closures, too, and knows the modes of the stabilisation."""
+    alpha = share * 2 * (math.sqrt(2) - 1) / T
+    options = {
+        "mechanism.integrator": "semi-implicit-euler",
+        "mechanism.stabilization": "baumgarte",
+        "mechanism.alpha": alpha,
+        "mechanism.beta": 1.0,
+        "hand.wrench": [0.0, 0.0, 0.0],
+    }
+    found = hl.stability("five-bar", options)
+    assert found.verdict == verdict
+    assert len(found.neutral) >= 2  # it moves freely
+
+
+def test_growth_and_frequency_are_those_of_a_run_across_rates() -> None:
+    """closed-loop-direct in a hand that is a spring: unstable at 30 Hz, with a period of half a
+    second that has more than one turn of its mode."""
+    found = hl.stability("closed-loop-direct", HELD)
+    assert found.period == 0.5
+    assert found.verdict == "unstable"
+    first = found.modes[0]
+    rest = found.equilibrium
+    start = {f"shoulder{i}": rest[f"virtual_mechanism.q[{k}]"] for i, k in ((1, 1), (2, 3))}
+    start |= {f"elbow{i}": rest[f"virtual_mechanism.q[{k}]"] for i, k in ((1, 2), (2, 4))}
+    run = hl.run("closed-loop-direct", HELD | {"linkage.start": start, "duration": 6.0})
+    x = run["virtual_mechanism.x"]
+    moved = (x - x[0])[75::15]  # once in a hyperperiod, since the faster mode prevails
+    # x_{k+1} = 2 Re(z) x_k - |z|^2 x_{k-1}, in the coordinate that moves most
+    before, now, after = (moved[i : len(moved) - 2 + i, 2] for i in range(3))
+    scale = np.abs(after)
+    rows = np.stack([now / scale, before / scale], axis=1)
+    (twice, minus), *_ = np.linalg.lstsq(rows, after / scale, rcond=None)
+    assert math.sqrt(-minus) == pytest.approx(abs(first.z), rel=1e-3)
+    assert twice == pytest.approx(2 * first.z.real, rel=1e-2)
+    crossings = np.count_nonzero(np.diff(np.sign((x - x[0])[75:, 2])))
+    hertz = crossings / 2 / (run.time("virtual_mechanism.x")[-1] - 2.5)
+    assert first.omega / (2 * np.pi) == pytest.approx(hertz, abs=0.15)
+
+
+def test_a_moving_target_and_a_push_into_the_free_have_no_equilibrium() -> None:
+    with pytest.raises(hl.InputFault, match="moves with time"):
+        hl.stability("two-hands")
+    with pytest.raises(hl.InputFault, match=r"no equilibrium found: virtual_mechanism\.qd?\["):
+        hl.stability("sampled-spring", {"hand": {"type": "constant", "wrench": [1.0, 0.0, 0.0]}})
+
+
+def test_what_has_no_map_is_refused() -> None:
+    rates = {"min": 20.0, "max": 60.0, "seed": 1}
+    with pytest.raises(hl.InputFault, match=r"the period of \w+ varies"):
+        hl.stability("closed-loop-direct", HELD | {"graphics.rate": rates})
+    with pytest.raises(hl.InputFault, match="latency and loss are random"):
+        hl.stability("virtual-wall", {"delays": {"wall.F": {"min": 0.001, "loss": 0.5}}})
+
+
+@pytest.mark.parametrize("options", [{"packaging": "native"}, {"isolate": True}])
+def test_every_kind_of_fmu_has_the_same_map(options: dict[str, Any]) -> None:
+    found = hl.stability("virtual-wall", options)
+    assert found.radius == pytest.approx(hl.stability("virtual-wall").radius, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("hold", "weights"),
+    [
+        ("zoh", (1.0,)),
+        ("foh", (1.5, -0.5)),
+        ("lead", (1.5, -0.5)),
+        ("second-order", (15 / 8, -10 / 8, 3 / 8)),
+        ("mean", (0.5, 0.5)),
+    ],
+)
+def test_the_memory_of_a_hold_is_part_of_the_state(hold: str, weights: tuple[float, ...]) -> None:
+    """The mass takes the mean over its step of the force that is extrapolated from samples."""
+    found = hl.stability("sampled-spring", {"holds": {"hand.F": hold}})
+    h, A = 0.05, np.eye(4, k=-1)  # of x_k, x_{k-1}, x_{k-2} and, in the last row, v
+    A[0] = A[3] = 0.0
+    A[0, 0], A[0, 3], A[3, 3] = 1.0, h, 1.0
+    for i, weight in enumerate(weights):
+        A[0, i] -= 100.0 * weight * h**2 / 2
+        A[3, i] -= 100.0 * weight * h
+    assert found.radius == pytest.approx(np.abs(np.linalg.eigvals(A)).max(), rel=1e-8)
+
+
+def test_friction_and_quanta_are_taken_out_and_told() -> None:
+    plain = hl.stability("virtual-wall")
+    rough = hl.stability(
+        "virtual-wall",
+        {"fmu.wall.settings.quantum": 1e-4, "linkage.joint.rail.friction": 0.1},
+    )
+    assert rough.radius == pytest.approx(plain.radius, rel=1e-8)
+    told = "\n".join(rough.frozen)
+    assert "virtual_mechanism.rail.friction: Coulomb friction, taken out" in told
+    assert "wall.quantum: quantisation of the encoder, taken out" in told
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(
+            [
+                "stability",
+                "virtual-wall",
+                "--set",
+                "fmu.wall.start.stiffness=6000",
+                "--out",
+                str(tmp_path),
+            ]
+        )
+    assert ended.value.code == 0
+    out = capsys.readouterr().out
+    assert out.startswith("virtual-wall: unstable\n  spectral radius 1.0")
+    record = json.loads((tmp_path / "stability.json").read_text())
+    assert record["verdict"] == "unstable"
+    assert record["margin"] == -record["growth_rate"] < 0
+    assert record["modes"][0]["participation"].keys() == {
+        "virtual_mechanism.q[1]", "virtual_mechanism.qd[1]"
+    }  # fmt: skip

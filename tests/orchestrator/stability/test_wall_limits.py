@@ -1,0 +1,129 @@
+"""Limits of stability of a virtual wall: closed forms, the lifted map within 0.5 %, and runs of the
+FMUs within 2 %."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.stability import wall_limits
+
+M, D, T = 0.3, 5.0, 1 / 512
+"""Mass (kg), damping (N.s/m) and period (s) of the scene."""
+STIFFNESS, DAMPING = "fmu.wall.start.stiffness", "fmu.wall.start.damping"
+BILATERAL = {"fmu.wall.settings.unilateral": False, "hand.wrench": [0.0, 0.0, 0.0]}
+UNDAMPED = BILATERAL | {"linkage.joint.rail.damping": 0.0, "fmu.wall.settings.damping": 5.0}
+MEASURED = UNDAMPED | {
+    "fmu.wall.settings.velocity": "measured",
+    "connection.+": {"from": "virtual_mechanism.rail.velocity", "to": "wall.v"},
+}
+LATE = BILATERAL | {"delays": {"wall.F": T}}
+LATER = BILATERAL | {"delays": {"wall.F": 2 * T}}
+Options = dict[str, Any]
+
+
+def test_closed_forms_give_the_reference_numbers() -> None:
+    stable = [wall_limits.stable(M, D, T, periods) for periods in (0, 1, 2)]
+    assert stable == pytest.approx([5147.9288, 1721.95, 1038.20], rel=1e-5)
+    largest = [wall_limits.undamped(1.0, 1.0, n / 10) for n in range(1, 10)]
+    table = [0.1810, 0.3273, 0.4435, 0.5333, 0.6000, 0.6462, 0.6741, 0.6857, 0.6828]
+    assert largest == pytest.approx(table, abs=5e-5)
+    assert wall_limits.passive(D, T) == pytest.approx(5120)
+    assert wall_limits.passive(D, T, B=-1.0) == pytest.approx(4096)
+    assert wall_limits.undamped_measured(T, 5.0) == pytest.approx(5120)
+    assert wall_limits.damper(M, T) == pytest.approx(307.2)
+    assert wall_limits.quantised(D, T, 0.1, 0.18e-3) == pytest.approx(1111, abs=0.2)
+
+
+@pytest.mark.parametrize("periods", [0, 1, 2, 5])
+@pytest.mark.parametrize("B", [0.0, 2.0])
+def test_the_limit_is_where_the_characteristic_polynomial_leaves_the_unit_circle(
+    periods: int, B: float
+) -> None:
+    def radius(K: float) -> float:
+        tau, e = M / D, np.exp(-D * T / M)
+        G = np.array([T - tau * (1 - e), tau * (1 - e) - T * e]) / D
+        open_loop = np.poly([1.0, e, *np.zeros(periods + 1)])
+        closed = np.polyadd(open_loop, np.polymul(G, [K + B / T, -B / T]))
+        return float(np.abs(np.roots(closed)).max())
+
+    limit = wall_limits.stable(M, D, T, periods, B)
+    assert radius(limit * (1 - 1e-6)) < 1 < radius(limit * (1 + 1e-6))
+
+
+def test_small_gains_with_a_delay_come_to_the_rule_of_gil() -> None:
+    """Where b T/m is small the exact limit and the rule agree."""
+    exact = wall_limits.stable(M, 0.05, T, 2)
+    assert wall_limits.delayed(0.05, T, 2 * T) == pytest.approx(exact, rel=1e-3)
+
+
+def test_a_limit_needs_damping() -> None:
+    with pytest.raises(ValueError, match="b = 0"):
+        wall_limits.stable(M, 0.0, T)
+
+
+CASES = [
+    pytest.param(BILATERAL, STIFFNESS, wall_limits.stable(M, D, T), id="spring"),
+    pytest.param(LATE, STIFFNESS, wall_limits.stable(M, D, T, 1), id="a sample late"),
+    pytest.param(LATER, STIFFNESS, wall_limits.stable(M, D, T, 2), id="two samples late"),
+    pytest.param(UNDAMPED, STIFFNESS, wall_limits.undamped(M, T, 5.0), id="sampled damper"),
+    pytest.param(
+        UNDAMPED | {DAMPING: 122.88}, STIFFNESS, wall_limits.undamped(M, T, 122.88), id="beta 0.8"
+    ),
+    pytest.param(MEASURED, STIFFNESS, wall_limits.undamped_measured(T, 5.0), id="velocity read"),
+    pytest.param(MEASURED | {STIFFNESS: 0.0}, DAMPING, wall_limits.damper(M, T), id="damper alone"),
+]
+
+
+@pytest.mark.parametrize(("options", "key", "limit"), CASES)
+def test_the_lifted_map_has_the_limit(options: Options, key: str, limit: float) -> None:
+    found = [hl.stability("virtual-wall", options | {key: k * limit}) for k in (0.995, 1.005)]
+    assert [f.verdict for f in found] == ["stable", "unstable"]
+
+
+@pytest.mark.parametrize(("options", "key", "limit"), CASES)
+def test_runs_grow_beyond_the_limit(options: Options, key: str, limit: float) -> None:
+    """Growth between two parts of a run, of the velocity, which the damper alone acts on."""
+
+    def growth(gain: float) -> float:
+        given = options | {key: gain, "duration": 2.0, "stop_when": "wall.F > 1e6"}
+        if key == DAMPING:
+            given["linkage.start_velocity"] = {"rail": 0.01}
+        run = hl.run("virtual-wall", given)
+        assert run.fault is None
+        _, early, _, late = np.array_split(np.abs(run["virtual_mechanism.rail.velocity"]), 4)
+        return float(late.max() / early.max())
+
+    assert growth(0.98 * limit) < 1 < growth(1.02 * limit)
+
+
+def test_a_unilateral_wall_has_the_same_limit_in_contact() -> None:
+    """The scene as it is: the equilibrium lies within the wall, the start outside of it."""
+    limit = wall_limits.stable(M, D, T)
+    for share, verdict in ((0.995, "stable"), (1.005, "unstable")):
+        found = hl.stability("virtual-wall", {STIFFNESS: share * limit})
+        assert found.verdict == verdict
+        assert found.equilibrium["virtual_mechanism.q[1]"] == pytest.approx(2 / (share * limit))
+
+
+def test_a_quantised_wall_chatters_beyond_its_limit() -> None:
+    """The hand pushes with a force midway between those of two quanta: from rest, friction holds
+    the handle up to K quantum = 2 f_c."""
+    friction, quantum = 0.1, 0.18e-3
+    limit = wall_limits.quantised(D, T, friction, quantum)
+
+    def speed(K: float) -> float:
+        options = {
+            STIFFNESS: K,
+            "fmu.wall.settings.quantum": quantum,
+            "linkage.joint.rail.friction": friction,
+            "linkage.start": {"rail": 10.5 * quantum},
+            "hand.wrench": [K * quantum * 10.5, 0.0, 0.0],
+        }
+        return float(np.abs(hl.run("virtual-wall", options)["virtual_mechanism.v"][-100:]).max())
+
+    assert speed(0.98 * limit) < 1e-9
+    assert speed(1.02 * limit) > 1e-5
