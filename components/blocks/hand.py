@@ -1,6 +1,7 @@
 """The user's hand: a constant wrench, a wrench over time, an arm behind a grip, or a spring.
 
-Sampled: F(t_k) from the handle's x and v at t_k; F acts with + on the handle.
+Sampled: F(t_k) from the handle's x and v at t_k. An arm or spring may be continuous instead, a
+plant with F(t_{k+1}) at the end of its step. F acts with + on the handle.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def _arm(spec: specs.ArmHand) -> Component:
     return block.component(
         "hand",
         "Hand: an arm behind a grip",
-        "sampled",
+        spec.timing,
         initial={"x_arm": u["x"], "v_arm": u["v"]},
         step=integrators.step("rk4", ode, x.vector, given, p.vector, t, block.h, [0, 1, 2]),
         output={"F": F},
@@ -106,7 +107,7 @@ def _spring(spec: specs.SpringHand) -> Component:
     return block.component(
         "hand",
         "Hand: a spring to a target path",
-        "sampled",
+        spec.timing,
         initial={},
         step={},
         output={"F": F},

@@ -67,6 +67,9 @@ class ArmHand:
     """Rows of time and pose, sorted by time, the ends held; or a sine."""
     interpolation: Interpolation = "linear"
     """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    timing: Literal["sampled", "continuous"] = "sampled"
+    """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
+    that at the end of its step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +86,9 @@ class SpringHand:
     """Rows of time and pose, sorted by time, the ends held; or a sine."""
     interpolation: Interpolation = "linear"
     """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    timing: Literal["sampled", "continuous"] = "sampled"
+    """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
+    that at the end of its step."""
 
 
 Hand = ConstantHand | ProfileHand | ArmHand | SpringHand

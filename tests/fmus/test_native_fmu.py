@@ -11,6 +11,7 @@ import zipfile
 from array import array
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -65,19 +66,23 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
     }
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"}, H)
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
-    made |= {"splined": arm(300, "spline"), "swung": driven_slider(SINE)}
+    made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
     return {n: (build(c, folder / "p"), build_native(c, folder / "n")) for n, c in made.items()}
 
 
 SINE = CoordinateSine(mean=0.1, amplitude=0.2, frequency=3.0, phase=0.3)
 
 
-def arm(rows: int, interpolation: Interpolation = "linear") -> Component:
+def arm(
+    rows: int,
+    interpolation: Interpolation = "linear",
+    timing: Literal["sampled", "continuous"] = "sampled",
+) -> Component:
     """An arm on a path through so many rows, 300 of them within the run of `driven`."""
     draw = np.random.default_rng(2)
     path = np.column_stack([np.cumsum(draw.uniform(1e-5, 2e-4, rows)), draw.normal(size=(rows, 3))])
     target = tuple(map(tuple, path.tolist()))
-    return hand(specs.ArmHand(target=target, interpolation=interpolation))
+    return hand(specs.ArmHand(target=target, interpolation=interpolation, timing=timing))
 
 
 def driven_slider(sine: CoordinateSine | None = None) -> Component:
