@@ -21,7 +21,7 @@ from typing import Literal
 import casadi as ca
 
 from hapticlink.components.ports import Kind, Power, Spring
-from hapticlink.components.time_tables import TimeTable
+from hapticlink.components.time_signals import LookUp, TimeSignal
 
 Timing = Literal["continuous", "sampled"]
 Variability = Literal["fixed", "tunable"]
@@ -146,8 +146,8 @@ def pack(variables: Iterable[Variable], values: Mapping[str, ca.SX]) -> ca.SX:
 @dataclass(frozen=True)
 class Component:
     """A complete block. `step` is called `substeps` times for each communication step. springs:
-    spring-dampers whose set positions are inputs. tables: the time tables that the functions look
-    up. state_notes: by the name of a state, the cause to report if it is not finite."""
+    spring-dampers whose set positions are inputs. look_ups: those that the functions
+    call. state_notes: by the name of a state, the cause to report if it is not finite."""
 
     name: str
     description: str
@@ -162,7 +162,7 @@ class Component:
     substeps: int = 1
     documentation: str = ""
     springs: tuple[Spring, ...] = ()
-    tables: tuple[TimeTable, ...] = ()
+    look_ups: tuple[LookUp, ...] = ()
     state_notes: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
@@ -222,10 +222,10 @@ class Block:
         state_notes: Mapping[str, str] | None = None,
         springs: Iterable[Spring] = (),
         shared: bool = False,
-        tables: Iterable[TimeTable] = (),
+        signals: Iterable[TimeSignal] = (),
     ) -> Component:
         """The component with the given expressions: step and output in this block's symbols,
-        initial in u and p only; tables are those that they look up.
+        initial in u and p only; signals are those over time that they read.
 
         shared: common subexpressions of step and initial have been eliminated already; doing so
         again would take most of the time to build a large graph. Raises ValueError where names or
@@ -260,5 +260,5 @@ class Block:
             documentation=documentation,
             state_notes=state_notes or {},
             springs=tuple(springs),
-            tables=tuple(tables),
+            look_ups=tuple(look_up for s in signals for look_up in s.look_ups),
         )

@@ -59,7 +59,7 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
         "documentation/index.html": documentation(component),
         "model.png": icon(component.timing),
         "resources/functions.casadi.json": json.dumps(texts).encode(),
-        "resources/functions.txt": program(functions, component.tables).encode(),
+        "resources/functions.txt": program(functions, component.look_ups).encode(),
     }
     for path in sorted(PYTHONFMU.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()

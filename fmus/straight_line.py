@@ -9,7 +9,7 @@ writes its results in place:
 
     def step(a0, a1, r0):        # r0[i] = ...
 
-A time table is looked up by a function of its own, with its rows written once in the text.
+A look-up in rows over time is a function of its own, with its rows written once in the text.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import casadi as ca
 
-from hapticlink.components.time_tables import TimeTable
+from hapticlink.components.time_signals import LookUp
 from hapticlink.fmus import ieee
 from hapticlink.fmus.errors import UnknownOperation
 
@@ -61,8 +61,8 @@ _NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
 def straight_line(function: ca.Function) -> str:
     """The text of a Python function with the same name.
 
-    Raises UnknownOperation for an instruction that is neither scalar arithmetic nor the look-up of
-    a table (such as an external call or a solver), and for a free variable.
+    Raises UnknownOperation for an instruction that is neither scalar arithmetic nor a look-up
+    (such as an external call or a solver), and for a free variable.
     """
     if not function.is_a("SXFunction"):
         function = function.expand()
@@ -101,7 +101,7 @@ def _called(function: ca.Function, k: int) -> str:
     called = function.instructions_sx()[k].which_function()
     if called.class_name() not in ("LinearInterpolant", "LinearInterpolantJac"):
         raise UnknownOperation(
-            f"`{function.name()}`, instruction {k}: {called.name()} is no time table, and nothing "
+            f"`{function.name()}`, instruction {k}: {called.name()} is no look-up, and nothing "
             "else can be called in straight-line Python"
         )
     return str(called.name())
@@ -112,13 +112,12 @@ def _literal(value: float) -> str:
     return repr(float(value)) if math.isfinite(value) else f"float({str(value)!r})"
 
 
-def program(functions: Iterable[ca.Function], tables: Iterable[TimeTable] = ()) -> str:
-    """A text that defines all `functions` and the `tables` that they look up; it is to be executed
+def program(functions: Iterable[ca.Function], look_ups: Iterable[LookUp] = ()) -> str:
+    """A text that defines all `functions` and the `look_ups` that they call; it is to be executed
     in an empty namespace."""
     helpers = Path(ieee.__file__).read_text(encoding="utf-8")
     data = (
-        f"{t.called}, jac_{t.called} = look_up({[r[0] for r in t.rows]}, "
-        f"{[list(r[1:]) for r in t.rows]})\n"
-        for t in tables
+        f"{of.called}, jac_{of.called} = look_up({of.grid.tolist()}, {of.values.tolist()})\n"
+        for of in look_ups
     )
     return "\n\n".join([helpers, *data, *(straight_line(f) for f in functions)])

@@ -19,6 +19,7 @@ ROOMS = {
         ".",
         "integrators",
         "specs",
+        "paths",
         "linkage",
         "forces",
         "dynamics",

@@ -1,13 +1,14 @@
-"""The user's hand: a constant wrench, a wrench from a table, an arm behind a grip, or a spring.
+"""The user's hand: a constant wrench, a wrench over time, an arm behind a grip, or a spring.
 
-Sampled: F(t_k) from the handle's x and v at t_k; F acts with + on the handle.
+Sampled: F(t_k) from the handle's x and v at t_k. An arm or spring may be continuous instead, a
+plant with F(t_{k+1}) at the end of its step. F acts with + on the handle.
 """
 
 from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components import integrators, specs, time_tables
+from hapticlink.components import integrators, specs, time_signals
 from hapticlink.components.component import (
     DAMPING,
     POSE,
@@ -18,7 +19,7 @@ from hapticlink.components.component import (
     Component,
     Variable,
 )
-from hapticlink.components.time_tables import TimeTable
+from hapticlink.components.paths import signal
 
 _F = Variable("F", (3,), WRENCH, description="wrench of the hand on the handle")
 _X = Variable("x", (3,), POSE, description="pose of the handle")
@@ -33,12 +34,12 @@ def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
     if spec.damping is not None:
         inputs += [_V]
         parameters += [Variable("damping", (3,), DAMPING, spec.damping, "damping to ground")]
-    block, tables = Block(inputs=inputs, parameters=parameters, outputs=[_F]), []
+    block, signals = Block(inputs=inputs, parameters=parameters, outputs=[_F]), []
     if isinstance(spec, specs.ConstantHand):
         F, kind = block.p["wrench"], "a constant wrench"
     else:
-        tables = [TimeTable(spec.table, "hand.table")]
-        F, kind = tables[0].value(block.t), "a wrench from a table"
+        signals = [signal(spec.table, spec.interpolation, "hand.table")]
+        F, kind = signals[0].value(block.t), "a wrench over time"
     if spec.damping is not None:
         F = F - block.p["damping"] * block.u["v"]
     return block.component(
@@ -49,7 +50,7 @@ def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
         step={},
         output={"F": F},
         documentation=hand.__doc__ or "",
-        tables=tables,
+        signals=signals,
     )
 
 
@@ -72,22 +73,22 @@ def _arm(spec: specs.ArmHand) -> Component:
         outputs=[_F],
     )
     x, u, p, t = block.x, block.u, block.p, block.t
-    tables = [TimeTable(spec.target, "hand.target")]
-    over = ca.SX.sym("over", time_tables.size_over(tables))
-    target, target_rate = ca.vertsplit(time_tables.within(tables, over, t), 3)
+    signals = [signal(spec.target, spec.interpolation, "hand.target")]
+    over = ca.SX.sym("over", time_signals.size_over(signals))
+    target, target_rate = ca.vertsplit(time_signals.within(signals, over, t), 3)
     F = p["grip_stiffness"] * (x["x_arm"] - u["x"]) + p["grip_damping"] * (x["v_arm"] - u["v"])
     pull = p["stiffness"] * (target - x["x_arm"]) + p["damping"] * (target_rate - x["v_arm"])
     ode = block.ode({"x_arm": x["v_arm"], "v_arm": (pull - F) / p["mass"]}, over)
-    given = ca.vertcat(u.vector, time_tables.over(tables, t, block.h))
+    given = ca.vertcat(u.vector, time_signals.over(signals, t, block.h))
     return block.component(
         "hand",
         "Hand: an arm behind a grip",
-        "sampled",
+        spec.timing,
         initial={"x_arm": u["x"], "v_arm": u["v"]},
         step=integrators.step("rk4", ode, x.vector, given, p.vector, t, block.h, [0, 1, 2]),
         output={"F": F},
         documentation=hand.__doc__ or "",
-        tables=tables,
+        signals=signals,
     )
 
 
@@ -98,20 +99,20 @@ def _spring(spec: specs.SpringHand) -> Component:
     if spec.damping is not None:
         parameters.append(Variable("damping", (3,), DAMPING, spec.damping, "to target path"))
     block = Block(inputs=[_X, _V] if damped else [_X], parameters=parameters, outputs=[_F])
-    table = TimeTable(spec.target, "hand.target")
-    target, rate = ca.vertsplit(table.at(block.t), 3)
+    path = signal(spec.target, spec.interpolation, "hand.target")
+    target, rate = ca.vertsplit(path.at(block.t), 3)
     F = block.p["stiffness"] * (target - block.u["x"])
     if damped:
         F += block.p["damping"] * (rate - block.u["v"])
     return block.component(
         "hand",
         "Hand: a spring to a target path",
-        "sampled",
+        spec.timing,
         initial={},
         step={},
         output={"F": F},
         documentation=hand.__doc__ or "",
-        tables=[table],
+        signals=[path],
     )
 
 

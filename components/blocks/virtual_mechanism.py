@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from hapticlink.components import forces, integrators, time_tables
+from hapticlink.components import forces, integrators, time_signals
 from hapticlink.components.component import WRENCH, Block, Component, Variable
 from hapticlink.components.contact import contact_forces, joint_limits, located_events
 from hapticlink.components.contact.contact_forces import ContactForces
@@ -57,7 +57,7 @@ from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
-from hapticlink.components.time_tables import TimeTable
+from hapticlink.components.time_signals import TimeSignal
 
 DEFLECTIONS = ("deflection", "contact_deflection")
 """The states of friction: of joints, and of contacts."""
@@ -87,8 +87,8 @@ def virtual_mechanism(
         contacts = None
     parts = _Parts(linkage, mechanism, directions, contacts, frame_s)
     block = _block(parts, step_s / mechanism.substeps, length_scale)
-    tables = drives.tables(linkage)
-    tabled = ca.SX.sym("tabled", 2 * len(tables))
+    signals = drives.signals(linkage)
+    tabled = ca.SX.sym("tabled", 2 * len(signals))
     at = block.x["q"], block.x["qd"]
     model = LinkageModel(linkage, block.p, *at, tabled, block.t, block.x.get("deflection"))
     space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
@@ -116,8 +116,8 @@ def virtual_mechanism(
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
-    initial |= _deflections(block, space, applied + pushed, initial, tables)
-    after, n = _step(block, model, mechanism, applied, touching, space, tables), model.q.numel()
+    initial |= _deflections(block, space, applied + pushed, initial, signals)
+    after, n = _step(block, model, mechanism, applied, touching, space, signals), model.q.numel()
     q1, qd1 = after[:n], after[n : 2 * n]
     if k := model.deflection.numel():
         after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
@@ -127,8 +127,8 @@ def virtual_mechanism(
         initial["n_constrained"] = constrained.first
         stepped = ca.vertcat(stepped, constrained.after)
         output |= {"Lambda_inv": space.Lambda_inv, **constrained.output}
-    if tables:
-        now = ca.densify(time_tables.at(tables, block.t))
+    if signals:
+        now = ca.densify(time_signals.at(signals, block.t))
         output = {name: ca.substitute(value, tabled, now) for name, value in output.items()}
     component = block.component(
         "virtual_mechanism",
@@ -141,7 +141,7 @@ def virtual_mechanism(
         state_notes=notes(model),
         documentation=__doc__ or "",
         shared=not frame_s and not touching,
-        tables=tables,
+        signals=signals,
     )
     require_assembled(component, model)
     require_inertia(component, model)
@@ -214,7 +214,7 @@ def _deflections(
     space: OperationalSpace,
     Q: ca.SX,
     start: Mapping[str, ca.SX],
-    tables: list[TimeTable],
+    signals: list[TimeSignal],
 ) -> dict[str, ca.SX]:
     """The deflections of friction at the start pose and rates: contacts have none."""
     joints, contacts = DEFLECTIONS
@@ -223,7 +223,7 @@ def _deflections(
         z = starting_friction.start(space, Q, start["q"], start["qd"], block.t)
         none = block.x.get(contacts, ca.SX(0, 1))
         symbols = ca.vertcat(space.model.tabled, none)
-        known = ca.vertcat(time_tables.at(tables, ca.SX(0)), ca.SX(*none.shape))
+        known = ca.vertcat(time_signals.at(signals, ca.SX(0)), ca.SX(*none.shape))
         found[joints] = ca.substitute(z, symbols, ca.densify(known))
     return found
 
@@ -263,7 +263,7 @@ def _step(
     applied: ca.SX,
     touching: OneSidedForces | None,
     space: OperationalSpace,
-    tables: list[TimeTable],
+    signals: list[TimeSignal],
 ) -> ca.SX:
     """(q, qd, deflections) after h: integration of the stabilised equations, followed by projection
     if chosen; or integration in independent coordinates."""
@@ -272,10 +272,10 @@ def _step(
     further = [block.x[name] for name in DEFLECTIONS if name in block.x]
     x, u, p, t = ca.vertcat(model.q, model.qd, *further), block.u.vector, block.p.vector, block.t
     given = u
-    if tables:
-        over = ca.SX.sym("over", time_tables.size_over(tables))
-        efforts = ca.substitute(efforts, model.tabled, time_tables.within(tables, over, t))
-        u, given = ca.vertcat(u, over), ca.vertcat(u, time_tables.over(tables, t, block.h))
+    if signals:
+        over = ca.SX.sym("over", time_signals.size_over(signals))
+        efforts = ca.substitute(efforts, model.tabled, time_signals.within(signals, over, t))
+        u, given = ca.vertcat(u, over), ca.vertcat(u, time_signals.over(signals, t, block.h))
     integrator = integrators.METHODS[mechanism.integrator]
     rates = friction.deflection_rates(model)
     if touching:

@@ -1,7 +1,7 @@
 """Joint drives, for active linkages (future work in the report's chapter 7):
 
 constant  Q = effort
-profile   Q = effort(t), from a table (time_tables.py)
+profile   Q = effort(t), from a table, spline or sine (components/paths)
 pd        Q = k (target(t) - c) + b (target'(t) - c')
 
 on the coordinate c of a joint (joint_coordinates.py).
@@ -17,8 +17,9 @@ import casadi as ca
 from hapticlink.components.component import Variable
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate, joints_with
 from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.paths import signal
 from hapticlink.components.specs.linkage import ConstantDrive, Linkage, PDDrive, ProfileDrive
-from hapticlink.components.time_tables import TimeTable
+from hapticlink.components.time_signals import TimeSignal
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
@@ -51,19 +52,19 @@ def efforts(model: LinkageModel) -> ca.SX | None:
     return Q if driven else None
 
 
-def tables(linkage: Linkage) -> list[TimeTable]:
-    """The time tables of the drives, in the order of the joints."""
+def signals(linkage: Linkage) -> list[TimeSignal]:
+    """The signals of the drives over time, in the order of the joints."""
     return [
-        TimeTable(j.joint.drive.table, f"{j.name}.drive.table")
+        signal(drive.table, drive.interpolation, f"{j.name}.drive.table")
         for j in joints_with(linkage, "drive")
-        if isinstance(j.joint.drive, ProfileDrive | PDDrive)
+        if isinstance(drive := j.joint.drive, ProfileDrive | PDDrive)
     ]
 
 
 def _effort(
     model: LinkageModel, joint: JointCoordinate, c: ca.SX, tabled: Iterator[ca.SX]
 ) -> ca.SX:
-    """The effort of a joint's drive at its coordinate c; `tabled` yields (y, y') of the tables in
+    """The effort of a joint's drive at its coordinate c; `tabled` yields (y, y') of the signals in
     turn, which are NaN in a model without an instant t."""
     drive, p = joint.joint.drive, model.p
     if isinstance(drive, ConstantDrive):

@@ -50,7 +50,7 @@ class LinkageModel:
     """The terms of (2.3) at q and qd, each built when it is first used.
 
     q, qd: n x 1. p: the parameters by name. D is n x n, W is m x n, J_h is 3 x n. tabled: (y, y')
-    of the drives' tables at the instant t (s), deflection: those of the joints with friction, both
+    of the drives' signals at the instant t (s), deflection: those of the joints with friction, both
     NaN by default. Raises ValueError for bodies that no chain of joints connects to the ground.
     """
 

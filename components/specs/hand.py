@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from hapticlink.components.specs.paths import Interpolation, PoseSine, WrenchSine
 from hapticlink.components.specs.quantities import (
     Angle,
     Damping,
@@ -34,12 +35,14 @@ class ConstantHand:
 
 @dataclass(frozen=True, kw_only=True)
 class ProfileHand:
-    """A wrench on the handle from a table, with an optional damping to ground."""
+    """A wrench on the handle over time, with an optional damping to ground."""
 
     type: Literal["profile"] = "profile"
-    """A wrench from a table."""
-    table: tuple[tuple[Time, Force, Force, Torque], ...]
-    """Rows of time, force and moment, sorted by time; linear between rows, the ends held."""
+    """A wrench over time."""
+    table: tuple[tuple[Time, Force, Force, Torque], ...] | WrenchSine
+    """Rows of time, force and moment, sorted by time, the ends held; or a sine."""
+    interpolation: Interpolation = "linear"
+    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
     damping: Damping | None = None
     """Damping of the handle to ground."""
 
@@ -60,8 +63,13 @@ class ArmHand:
     """K_gr, arm to handle."""
     grip_damping: Damping = (20.0, 20.0, 0.05)
     """B_gr, arm to handle."""
-    target: Path
-    """Rows of time and pose, sorted by time; linear between rows, the ends held."""
+    target: Path | PoseSine
+    """Rows of time and pose, sorted by time, the ends held; or a sine."""
+    interpolation: Interpolation = "linear"
+    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    timing: Literal["sampled", "continuous"] = "sampled"
+    """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
+    that at the end of its step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +82,13 @@ class SpringHand:
     """Stiffness, handle to target."""
     damping: Damping | None = None
     """Damping, handle to target; by default none."""
-    target: Path = ((0.0, 0.0, 0.0, 0.0),)
-    """Rows of time and pose, sorted by time; linear between rows, the ends held."""
+    target: Path | PoseSine = ((0.0, 0.0, 0.0, 0.0),)
+    """Rows of time and pose, sorted by time, the ends held; or a sine."""
+    interpolation: Interpolation = "linear"
+    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    timing: Literal["sampled", "continuous"] = "sampled"
+    """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
+    that at the end of its step."""
 
 
 Hand = ConstantHand | ProfileHand | ArmHand | SpringHand

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from hapticlink.components.integrators import METHODS
+from hapticlink.components.specs.paths import CoordinateSine, EffortSine, Interpolation
 from hapticlink.components.specs.quantities import (
     Angle,
     Coordinate,
@@ -68,12 +69,14 @@ class ConstantDrive:
 
 @dataclass(frozen=True, kw_only=True)
 class ProfileDrive:
-    """An effort from a table."""
+    """An effort over time."""
 
     type: Literal["profile"] = "profile"
-    """An effort from a table."""
-    table: tuple[tuple[Time, Effort], ...]
-    """Rows of time and effort, sorted by time; linear between rows, the ends held."""
+    """An effort over time."""
+    table: tuple[tuple[Time, Effort], ...] | EffortSine
+    """Rows of time and effort, sorted by time, the ends held; or a sine."""
+    interpolation: Interpolation = "linear"
+    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +85,10 @@ class PDDrive:
 
     type: Literal["pd"] = "pd"
     """A servo that follows a target."""
-    table: tuple[tuple[Time, Coordinate], ...]
-    """Rows of time and target, sorted by time; linear between rows, the ends held."""
+    table: tuple[tuple[Time, Coordinate], ...] | CoordinateSine
+    """Rows of time and target, sorted by time, the ends held; or a sine."""
+    interpolation: Interpolation = "linear"
+    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
     stiffness: JointStiffness
     """Gain on the position error."""
     damping: JointDamping

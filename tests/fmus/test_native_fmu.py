@@ -11,6 +11,7 @@ import zipfile
 from array import array
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ from hapticlink.components.specs.linkage import (
     OperationalPoint,
     PDDrive,
 )
+from hapticlink.components.specs.paths import CoordinateSine, Interpolation
 from hapticlink.fmus import FmuError, build_native, check_fmu
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.build import build
@@ -64,19 +66,28 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
     }
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"}, H)
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
+    made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
     return {n: (build(c, folder / "p"), build_native(c, folder / "n")) for n, c in made.items()}
 
 
-def arm(rows: int) -> Component:
-    """An arm on a path of so many rows, 300 of them within the run of `driven`."""
+SINE = CoordinateSine(mean=0.1, amplitude=0.2, frequency=3.0, phase=0.3)
+
+
+def arm(
+    rows: int,
+    interpolation: Interpolation = "linear",
+    timing: Literal["sampled", "continuous"] = "sampled",
+) -> Component:
+    """An arm on a path through so many rows, 300 of them within the run of `driven`."""
     draw = np.random.default_rng(2)
     path = np.column_stack([np.cumsum(draw.uniform(1e-5, 2e-4, rows)), draw.normal(size=(rows, 3))])
-    return hand(specs.ArmHand(target=tuple(map(tuple, path.tolist()))))
+    target = tuple(map(tuple, path.tolist()))
+    return hand(specs.ArmHand(target=target, interpolation=interpolation, timing=timing))
 
 
-def driven_slider() -> Component:
+def driven_slider(sine: CoordinateSine | None = None) -> Component:
     """A joint on a path whose rows stand within steps, at their ends and at the end of the run."""
-    table = ((0.005, 0.1), (8 * H, 0.3), (0.03, 0.2), (40 * H, 0.1))
+    table = sine or ((0.005, 0.1), (8 * H, 0.3), (0.03, 0.2), (40 * H, 0.1))
     joint = Joint(
         name="rail",
         type="prismatic",
@@ -147,7 +158,9 @@ def driven(path: Path) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("name", [*NAMES, "discrete_equivalent", "arm", "driven", "rubbing"])
+@pytest.mark.parametrize(
+    "name", [*NAMES, "discrete_equivalent", "arm", "driven", "rubbing", "splined", "swung"]
+)
 def test_every_block_gives_the_bits_of_its_python_fmu(both, name):
     by_python, by_c = map(driven, both[name])
     assert np.isfinite(by_c).all()
@@ -182,7 +195,7 @@ def test_contract_of_forces_with_tables_and_states(both, name):
         assert check_fmu(path) == []
 
 
-@pytest.mark.parametrize("name", ["arm", "driven", "rubbing"])
+@pytest.mark.parametrize("name", ["arm", "driven", "rubbing", "splined", "swung"])
 def test_plain_python_gives_the_same_bits(both, name, monkeypatch):
     by_c = driven(both[name][1])
     monkeypatch.setenv("HAPTICLINK_PURE_PYTHON", "1")

@@ -2,6 +2,8 @@
 
 import pytest
 
+from hapticlink.components import specs
+from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.scene import find, load
@@ -50,6 +52,22 @@ def test_a_good_scene_is_read() -> None:
     assert scene.hand is not None
     assert scene.hand.type == "constant"
     assert scene.ends_when == "haptic_device.workspace_margin < 0"
+
+
+def test_a_path_is_rows_or_a_sine_which_replaces_them_in_a_scene_that_extends(tmp_path) -> None:
+    hand = '[hand]\ntype = "spring"\nstiffness = [1.0, 1.0, 1.0]\n'
+    rows = hand + "target = [[0.0, 0.0, 0.0, 0.0], [1.0, 0.1, 0.0, 0.0]]\n"
+    (tmp_path / "base.toml").write_text(GOOD[: GOOD.index("[hand]")] + rows)
+    sine = "target = { amplitude = [0.1, 0.0, 0.0], frequency = [2.0, 1.0, 0.0] }\n"
+    text = 'title = "t"\nextends = "base.toml"\n[hand]\n'
+    scene = load.read(text + sine, folder=tmp_path)
+    assert isinstance(scene.hand, specs.SpringHand)
+    assert scene.hand.target == PoseSine(amplitude=(0.1, 0.0, 0.0), frequency=(2.0, 1.0, 0.0))
+    scene = load.read(text + 'interpolation = "spline"\n', folder=tmp_path)
+    assert isinstance(scene.hand, specs.SpringHand)
+    assert scene.hand.interpolation == "spline"
+    found = findings(GOOD[: GOOD.index("[hand]")] + hand + sine.replace("2.0", "-2.0"))
+    assert "give a number >= 0 (Hz)" in found["hand.target.frequency[0]"][1]
 
 
 def test_all_faults_at_once_with_line_and_remedy() -> None:
