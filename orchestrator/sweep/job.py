@@ -17,7 +17,7 @@ import hapticlink.components
 import hapticlink.fmus
 import hapticlink.orchestrator
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import plugins
+from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.run_json import PACKAGES
 from hapticlink.orchestrator.scene.scene import Scene
@@ -43,9 +43,13 @@ def jobs(
 ) -> list[Job]:
     """The jobs of `points`, each of `scene` with the common `options` and those of its point.
 
-    A point without a valid scene is a refused job. Raises InputFault if all points are refused.
+    A point without a valid scene is a refused job. Raises InputFault if all points are refused,
+    Interrupted for a signal.
     """
-    made = [job(scene, [*options, *(f"{k}={v}" for k, v in p.items())], p) for p in points]
+    made = []
+    for point in points:
+        interrupt.check()  # 100,000 points take minutes
+        made.append(job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point))
     if made and all(each.scene is None for each in made):
         raise InputFault(made[0].refusal)
     return made

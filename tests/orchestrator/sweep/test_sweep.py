@@ -18,12 +18,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.builder import FmuBuilder
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import InputFault, Interrupted
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.sweep import figure, grid, pool, row, table
 from hapticlink.orchestrator.sweep.grid import Axis, listed, parse
-from hapticlink.orchestrator.sweep.job import Job
+from hapticlink.orchestrator.sweep.job import Job, jobs
 from tests.orchestrator.conftest import status
 
 # --- what is varied ---------------------------------------------------------------------------
@@ -475,3 +476,19 @@ def test_a_cluster_makes_the_same_table(bar: Path, tmp_path: Path, in_this_proce
     )
     assert there == here
     assert [r["end"] for r in there] == ["stop_when", "stop_when", "refused"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_ctrl_c_ends_a_sweep_while_its_points_are_read() -> None:
+    read = []
+
+    def points() -> Iterator[dict[str, str]]:
+        for k in range(1, 100):
+            read.append(k)
+            if k == 3:
+                os.kill(os.getpid(), signal.SIGINT)
+            yield {"duration": str(k)}
+
+    with interrupt.held(), pytest.raises(Interrupted):
+        jobs("pendulum", [], points())
+    assert len(read) <= 4
