@@ -23,8 +23,9 @@ from hapticlink.orchestrator.base.faults import InputFault, Interrupted
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.sweep import figure, grid, pool, row, table
+from hapticlink.orchestrator.sweep import job as points_of
 from hapticlink.orchestrator.sweep.grid import Axis, listed, parse
-from hapticlink.orchestrator.sweep.job import Job, jobs
+from hapticlink.orchestrator.sweep.job import Job
 from tests.orchestrator.conftest import status
 
 # --- what is varied ---------------------------------------------------------------------------
@@ -490,5 +491,5 @@ def test_ctrl_c_ends_a_sweep_while_its_points_are_read() -> None:
             yield {"duration": str(k)}
 
     with interrupt.held(), pytest.raises(Interrupted):
-        jobs("pendulum", [], points())
+        points_of.jobs("pendulum", [], points())
     assert len(read) <= 4
