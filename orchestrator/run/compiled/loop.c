@@ -99,16 +99,18 @@ static int to_buffer(const Transfer *t) {
     return 1;
 }
 
-static int failed(At *at, int64_t what, int status) {
-    at->what = what;
-    at->status = status;
-    return FAILED;
+/* Call number i of a get or a set. */
+static int call(const Transfer *t, int64_t i, At *at) {
+    at->what = i;
+    at->status = transferred(t);
+    if (t->python && exception_left()) return RAISED;
+    return at->status > WARNING ? FAILED : 0;
 }
 
 static int get(const Fmu *f, int64_t judged, At *at) {
     for (int64_t i = 0; i < f->n_gets; i++) {
-        const int status = transferred(f->gets + i);
-        if (status > WARNING) return failed(at, i, status);
+        const int code = call(f->gets + i, i, at);
+        if (code) return code;
         if (!from_buffer(f->gets + i)) return CALL;
     }
     if (!judged) return 0;
@@ -129,8 +131,8 @@ static int set(const Setter *s, const double *board, At *at) {
         for (int64_t i = 0; i < s->n; i++) s->whole[s->into[i]] = s->values[i];
     for (int64_t i = 0; i < s->n_sets; i++) {
         if (!to_buffer(s->sets + i)) return CALL;
-        const int status = transferred(s->sets + i);
-        if (status > WARNING) return failed(at, i, status);
+        const int code = call(s->sets + i, i, at);
+        if (code) return code;
     }
     return 0;
 }
@@ -151,8 +153,10 @@ static int step(Fmu *f, double time, double end, double size, At *at) {
         return UNSAVED;
     const int timed = !f->sparse || f->n_steps % EACH == 0;
     const int64_t begin = timed ? now() : 0;
+    at->what = -1;
     at->status = do_step(f, time, size);
     if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
+    if (f->python && exception_left()) return RAISED;
     if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
     if (at->status > WARNING || (f->fmi == 3 && *f->terminate)) return STEPPED;
     p->time = end;
@@ -382,6 +386,11 @@ EXPORT int hapticlink_events(Loop *l, Events *e) {
 
 /* Whether to notice signals; Windows has none that Python would not notice. */
 EXPORT void hapticlink_watch(int on) { watch_signals(on); }
+
+/* PyGILState_Ensure, PyErr_Occurred and PyGILState_Release. */
+EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int)) {
+    use_python(ensure, occurred, release);
+}
 
 /* Runs one sequence of operations at a tick, within an operation that Python carries out. */
 EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick) { return carry_out(l, tick, at); }
