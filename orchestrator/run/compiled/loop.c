@@ -207,9 +207,13 @@ static int checked_step(Fmu *f, double time, double end, double size, At *at) {
 
 /* --- meters ----------------------------------------------------------------------------------- */
 
+static double entry(const Reader *r, const double *board, int64_t i) {
+    const double value = board[r->where[i]];
+    return r->factor ? r->factor[i] * value + r->offset[i] : value;
+}
+
 static void reading(const Reader *r, const double *board, double *into) {
-    for (int64_t i = 0; i < r->n; i++)
-        into[i] = r->factor ? r->factor[i] * board[r->where[i]] + r->offset[i] : board[r->where[i]];
+    for (int64_t i = 0; i < r->n; i++) into[i] = entry(r, board, i);
 }
 
 /* Meter.sample; CALL where there is no room, which Python then makes. */
@@ -237,10 +241,10 @@ static void meter_feed(Meter *m, const double *board, double share) {
     const int64_t n = m->held.n, moves = m->counts[1];
     int64_t *count = m->counts + 2;
     const int fresh = *count < moves;
-    double effort[n], *row = m->efforts + (fresh ? *count : *count - 1) * n;
-    reading(&m->held, board, effort);
+    double *row = m->efforts + (fresh ? *count : *count - 1) * n;
     for (int64_t i = 0; i < n; i++) {
-        const double part = share == 1.0 ? effort[i] : effort[i] * share;
+        const double effort = entry(&m->held, board, i);
+        const double part = share == 1.0 ? effort : effort * share;
         row[i] = fresh ? part : row[i] + part;
     }
     *count += fresh;
@@ -264,19 +268,18 @@ static int evaluate(const Loop *l, Hold *h, int64_t tick, double ahead) {
 
 static int blend(const Loop *l, const Op *op, int64_t tick) {
     Hold *h = l->holds[op->a];
-    double value[h->n], sum[h->n];
+    double *value = hold_scratch(h), *sum = h->held;
     for (int64_t k = 0; k < h->n; k++) sum[k] = 0.0;
     for (int64_t i = op->b; i < op->c; i++) {
         const int code = hold_value(h, l, tick, l->points[i][1], value);
         if (code) return code;
         for (int64_t k = 0; k < h->n; k++) sum[k] += l->points[i][0] * value[k];
     }
-    memcpy(h->held, sum, h->n * sizeof *sum);
     return 0;
 }
 
 static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
-    double sample[h->width];
+    double *sample = hold_scratch(h);
     for (int64_t k = 0; k < h->width; k++) sample[k] = l->values[h->sources[k]];
     return hold_push(h, sample, stamp, arrival);
 }

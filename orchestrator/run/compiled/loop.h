@@ -115,7 +115,8 @@ typedef struct {
 } Account;
 
 /* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
- * followed by its derivative. `vectors`: (6, n), what else the kind remembers. */
+ * followed by its derivative. `vectors`: (8, n), what else the kind remembers, and
+ * `hold_scratch`: arrays of any size are no place for the stack. */
 typedef struct {
     int64_t kind, n, width, depth, count;
     int64_t stamps[3];
@@ -240,6 +241,7 @@ void watch_signals(int on);
 int signal_came(void);
 void use_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
 int exception_left(void);
+double *hold_scratch(const Hold *h); /* (2, n) */
 int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
 int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
 int account_has_room(const Account *a, int64_t samples);
