@@ -51,6 +51,7 @@ class InProcess(Instance):
         self._initialized = False
         self._status = 0
         self.slave: Any = None
+        self.holds_python = False
         self._key = messages.opened()
 
     def _load(self) -> None:
@@ -58,6 +59,7 @@ class InProcess(Instance):
         try:
             extract(str(self.description.path), self._folder)
             self.slave = self._instantiate()
+            self.holds_python = hasattr(self.slave.dll, "finalizePythonInterpreter")
         except Exception as error:  # FMPy raises bare Exception
             said = str(error)
             if said.startswith("Failed to instantiate"):
@@ -69,7 +71,11 @@ class InProcess(Instance):
         do_step = self._stepper()
 
         def advance(time: float, size: float) -> int:
-            return self._settled(do_step(time, size), time)
+            try:
+                status = do_step(time, size)
+            except SystemError as error:
+                raise self.raised(self.do_step, error) from error
+            return self._settled(status, time)
 
         self._advance: Callable[[float, float], int] = advance
         if self.policy.discard == "retry" and Retry.possible(self.description):
@@ -95,6 +101,11 @@ class InProcess(Instance):
         self._ended = ended_in_discard(self.slave)
         forward = int(self.forward)
         return lambda time, size: do_step(component, time, size, forward)
+
+    @property
+    def do_step(self) -> str:
+        """The name of its step function."""
+        return f"fmi{self.description.fmi}DoStep"
 
     @property
     def forward(self) -> bool:
@@ -150,6 +161,8 @@ class InProcess(Instance):
             for transfer in transfers:
                 if (status := transfer.call()) > WARNING:
                     raise self.failed(transfer.name, status)
+        except SystemError as error:
+            raise self.raised(transfer.name, error) from error
         except Unfit as why:
             raise self._fault(str(why), self.time, passing, repeatable=True) from None
 
@@ -232,8 +245,7 @@ class InProcess(Instance):
     def stepped(self, status: int) -> None:
         """Ends a step that returned `status`."""
         if status > WARNING:
-            do_step = f"fmi{self.description.fmi}DoStep"
-            raise self.failed(do_step, status, passing=status in (DISCARD, ERROR))
+            raise self.failed(self.do_step, status, passing=status in (DISCARD, ERROR))
         self.time = self.place.end
 
     def after_step(self, status: int) -> None:
@@ -298,6 +310,14 @@ class InProcess(Instance):
             named += f" ({why})"
         what = f"{call} returned {named}"
         return self._fault(what, self.time, passing, repeatable=status == DISCARD)
+
+    def raised(self, call: str, error: SystemError) -> FmuFault:
+        """The fault of a Python FMU whose library went on after an exception, which ctypes finds
+        when the call returns."""
+        self._status = max(self._status, ERROR)
+        cause = error.__cause__ or error
+        what = f"{call} left {type(cause).__name__} behind: {cause}"
+        return self._fault(what, self.time)
 
     def dismiss(self) -> None:
         """Nothing to do in advance: `close` is quick."""

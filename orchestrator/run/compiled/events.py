@@ -51,8 +51,8 @@ class Events:
     def run(self, turn: Callable[[int], object]) -> None:
         """Run all events; `turn` is called from time to time, and at the end, with the tick."""
         c, machine = self._c, self._machine
-        run = machine.library.events
-        while code := run(ctypes.addressof(machine.loop), ctypes.addressof(c)):
+        loop, here = ctypes.addressof(machine.loop), ctypes.addressof(c)
+        while code := machine.code(c.at, machine.library.events, loop, here):
             if code == structures.KIND:
                 self._new_kind()
             elif code == structures.STARTS:

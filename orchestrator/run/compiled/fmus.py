@@ -29,13 +29,16 @@ def address(function: Any) -> int | None:
     return ctypes.cast(function, ctypes.c_void_p).value
 
 
-def of_transfers(transfers: Sequence[Transfer]) -> ctypes.Array[structures.Transfer]:
+def of_transfers(
+    transfers: Sequence[Transfer], instance: InProcess
+) -> ctypes.Array[structures.Transfer]:
     """The calls of a get or a set."""
     made = (structures.Transfer * len(transfers))()
     for c, t in zip(made, transfers, strict=True):
         c.call, c.fmu = address(t.function), t.component
         c.references, c.n_references = ctypes.addressof(t.references), len(t.references)
         c.buffer, c.values, c.n = t.buffer.ctypes.data, t.values.ctypes.data, len(t.values)
+        c.python = instance.holds_python
         c.type, c.fmi = _TYPES.get(t.type, _BOOLEAN[t.fmi]), int(t.fmi)
     return made
 
@@ -43,10 +46,10 @@ def of_transfers(transfers: Sequence[Transfer]) -> ctypes.Array[structures.Trans
 def of_instance(instance: InProcess, check: StepCheck | None, c: structures.Fmu) -> object:
     """Fills `c`; what is returned has to be kept."""
     fmi, slave = instance.description.fmi, instance.slave
-    gets = of_transfers(instance.gets)
+    gets = of_transfers(instance.gets, instance)
     c.place, c.fmu = ctypes.addressof(instance.place), slave.component
     c.do_step = address(slave.dll[f"fmi{fmi}DoStep"])
-    c.fmi, c.forward = int(fmi), instance.forward
+    c.fmi, c.forward, c.python = int(fmi), instance.forward, instance.holds_python
     if instance.retry:
         saved = instance.retry.saved[0]
         c.get_state, c.state = address(saved.get), ctypes.addressof(saved.state)
@@ -84,7 +87,7 @@ def _fill_check(c: structures.Check, check: StepCheck) -> None:
 
 def of_setter(setter: Setter, instance: InProcess, c: structures.Setter) -> object:
     """Fills `c`; what is returned has to be kept."""
-    sets = of_transfers(setter.transfers)
+    sets = of_transfers(setter.transfers, instance)
     c.place, c.n = ctypes.addressof(instance.place), len(setter.where)
     c.where, c.values = setter.where.ctypes.data, setter.values.ctypes.data
     if setter.factors is not None and setter.offsets is not None:

@@ -14,6 +14,8 @@ static double *sample(const Hold *h, int64_t i) { return h->samples + i * h->wid
 
 static double *vector(const Hold *h, int64_t i) { return h->vectors + i * h->n; }
 
+double *hold_scratch(const Hold *h) { return vector(h, 6); }
+
 /* History.push: a second sample with the same stamp replaces the first. */
 static void keep(Hold *h, const double *y, int64_t stamp) {
     if (h->count && h->stamps[h->count - 1] == stamp) h->count--;

@@ -184,13 +184,13 @@ class CompiledHold(Hold, State):
         n, (code, depth) = len(held), KINDS[type(own)]
         places = [*sources, *(derivative.where if derivative else ())]
         width, turned = len(places), len(angles.angles) if angles else 0
-        State.__init__(self, depth * width + 6 * n + turned + _words(structures.Hold))
+        State.__init__(self, depth * width + 8 * n + turned + _words(structures.Hold))
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
         self._sources, self._derivative = np.array(places, np.intp), derivative
         self._held, self._tank = held, tank
         c = self.structure(structures.Hold)
         c.kind, c.n, c.width, c.depth = code, n, width, depth
-        c.samples, c.vectors = self.place(depth * width), self.place(6 * n)
+        c.samples, c.vectors = self.place(depth * width), self.place(8 * n)
         c.sources, c.held = self._sources.ctypes.data, held.ctypes.data
         if angles:
             self._angles = np.array(angles.angles, np.int64), np.array(angles.turn, np.float64)

@@ -39,6 +39,7 @@ def _loaded() -> ctypes.CDLL:
         "value": (pointer, pointer, integer, number, pointer),
         "sizes": (pointer,),
         "watch": (ctypes.c_int,),
+        "python": (pointer,) * 3,
     }.items():
         function = found[f"hapticlink_{name}"]
         function.argtypes = arguments
@@ -46,6 +47,9 @@ def _loaded() -> ctypes.CDLL:
     sizes = (ctypes.c_int64 * len(structures.ALL))()
     found.sizes(sizes)
     assert [*sizes] == [ctypes.sizeof(kind) for kind in structures.ALL]
+    api = ctypes.pythonapi
+    calls = (api.PyGILState_Ensure, api.PyErr_Occurred, api.PyGILState_Release)
+    found.python(*(ctypes.cast(call, pointer) for call in calls))
     return found
 
 

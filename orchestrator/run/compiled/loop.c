@@ -99,16 +99,18 @@ static int to_buffer(const Transfer *t) {
     return 1;
 }
 
-static int failed(At *at, int64_t what, int status) {
-    at->what = what;
-    at->status = status;
-    return FAILED;
+/* Call number i of a get or a set. */
+static int call(const Transfer *t, int64_t i, At *at) {
+    at->what = i;
+    at->status = transferred(t);
+    if (t->python && exception_left()) return RAISED;
+    return at->status > WARNING ? FAILED : 0;
 }
 
 static int get(const Fmu *f, int64_t judged, At *at) {
     for (int64_t i = 0; i < f->n_gets; i++) {
-        const int status = transferred(f->gets + i);
-        if (status > WARNING) return failed(at, i, status);
+        const int code = call(f->gets + i, i, at);
+        if (code) return code;
         if (!from_buffer(f->gets + i)) return CALL;
     }
     if (!judged) return 0;
@@ -129,8 +131,8 @@ static int set(const Setter *s, const double *board, At *at) {
         for (int64_t i = 0; i < s->n; i++) s->whole[s->into[i]] = s->values[i];
     for (int64_t i = 0; i < s->n_sets; i++) {
         if (!to_buffer(s->sets + i)) return CALL;
-        const int status = transferred(s->sets + i);
-        if (status > WARNING) return failed(at, i, status);
+        const int code = call(s->sets + i, i, at);
+        if (code) return code;
     }
     return 0;
 }
@@ -151,8 +153,10 @@ static int step(Fmu *f, double time, double end, double size, At *at) {
         return UNSAVED;
     const int timed = !f->sparse || f->n_steps % EACH == 0;
     const int64_t begin = timed ? now() : 0;
+    at->what = -1;
     at->status = do_step(f, time, size);
     if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
+    if (f->python && exception_left()) return RAISED;
     if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
     if (at->status > WARNING || (f->fmi == 3 && *f->terminate)) return STEPPED;
     p->time = end;
@@ -203,9 +207,13 @@ static int checked_step(Fmu *f, double time, double end, double size, At *at) {
 
 /* --- meters ----------------------------------------------------------------------------------- */
 
+static double entry(const Reader *r, const double *board, int64_t i) {
+    const double value = board[r->where[i]];
+    return r->factor ? r->factor[i] * value + r->offset[i] : value;
+}
+
 static void reading(const Reader *r, const double *board, double *into) {
-    for (int64_t i = 0; i < r->n; i++)
-        into[i] = r->factor ? r->factor[i] * board[r->where[i]] + r->offset[i] : board[r->where[i]];
+    for (int64_t i = 0; i < r->n; i++) into[i] = entry(r, board, i);
 }
 
 /* Meter.sample; CALL where there is no room, which Python then makes. */
@@ -233,10 +241,10 @@ static void meter_feed(Meter *m, const double *board, double share) {
     const int64_t n = m->held.n, moves = m->counts[1];
     int64_t *count = m->counts + 2;
     const int fresh = *count < moves;
-    double effort[n], *row = m->efforts + (fresh ? *count : *count - 1) * n;
-    reading(&m->held, board, effort);
+    double *row = m->efforts + (fresh ? *count : *count - 1) * n;
     for (int64_t i = 0; i < n; i++) {
-        const double part = share == 1.0 ? effort[i] : effort[i] * share;
+        const double effort = entry(&m->held, board, i);
+        const double part = share == 1.0 ? effort : effort * share;
         row[i] = fresh ? part : row[i] + part;
     }
     *count += fresh;
@@ -260,19 +268,18 @@ static int evaluate(const Loop *l, Hold *h, int64_t tick, double ahead) {
 
 static int blend(const Loop *l, const Op *op, int64_t tick) {
     Hold *h = l->holds[op->a];
-    double value[h->n], sum[h->n];
+    double *value = hold_scratch(h), *sum = h->held;
     for (int64_t k = 0; k < h->n; k++) sum[k] = 0.0;
     for (int64_t i = op->b; i < op->c; i++) {
         const int code = hold_value(h, l, tick, l->points[i][1], value);
         if (code) return code;
         for (int64_t k = 0; k < h->n; k++) sum[k] += l->points[i][0] * value[k];
     }
-    memcpy(h->held, sum, h->n * sizeof *sum);
     return 0;
 }
 
 static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
-    double sample[h->width];
+    double *sample = hold_scratch(h);
     for (int64_t k = 0; k < h->width; k++) sample[k] = l->values[h->sources[k]];
     return hold_push(h, sample, stamp, arrival);
 }
@@ -382,6 +389,11 @@ EXPORT int hapticlink_events(Loop *l, Events *e) {
 
 /* Whether to notice signals; Windows has none that Python would not notice. */
 EXPORT void hapticlink_watch(int on) { watch_signals(on); }
+
+/* PyGILState_Ensure, PyErr_Occurred and PyGILState_Release. */
+EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int)) {
+    use_python(ensure, occurred, release);
+}
 
 /* Runs one sequence of operations at a tick, within an operation that Python carries out. */
 EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick) { return carry_out(l, tick, at); }

@@ -19,13 +19,14 @@ typedef struct {
 } Place;
 
 /* A call of fmiXGet<Type> or fmiXSet<Type>: n numbers in `buffer` as the FMU has them, in `values`
- * as doubles. These are the same memory where the FMU has doubles. */
+ * as doubles. These are the same memory where the FMU has doubles. python: whether it is an FMU that
+ * holds an interpreter. */
 typedef struct {
     void *call, *fmu;
     const uint32_t *references;
     void *buffer;
     double *values;
-    int64_t n_references, n, type, fmi;
+    int64_t n_references, n, type, fmi, python;
 } Transfer;
 
 enum { DOUBLE, FLOAT, INT64, INT32, INT16, INT8, UINT64, UINT32, UINT16, UINT8, BOOL2, BOOL3 };
@@ -45,7 +46,7 @@ typedef struct {
     Place *place;
     void *fmu, *do_step;
     void *get_state, *state;              /* saved before each step that may be repeated */
-    int64_t fmi, forward;                 /* noSetFMUStatePriorToCurrentPoint */
+    int64_t fmi, forward, python;         /* noSetFMUStatePriorToCurrentPoint; as in Transfer */
     uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
     double *reached;
     const Transfer *gets;
@@ -114,7 +115,8 @@ typedef struct {
 } Account;
 
 /* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
- * followed by its derivative. `vectors`: (6, n), what else the kind remembers. */
+ * followed by its derivative. `vectors`: (8, n), what else the kind remembers, and
+ * `hold_scratch`: arrays of any size are no place for the stack. */
 typedef struct {
     int64_t kind, n, width, depth, count;
     int64_t stamps[3];
@@ -221,6 +223,7 @@ enum {
     CALL,        /* carry out this operation in Python */
     JUDGE,       /* outputs are not finite, or beyond a bound */
     FAILED,      /* call number `what` of a get or set returned `status` */
+    RAISED,      /* call `what`, -1 for doStep, has left a Python exception, which ctypes raises */
     STEPPED,     /* doStep returned `status`, or asks to end */
     UNSAVED,     /* the state before a step could not be saved */
     UNRESTORED,  /* the state before a step that was checked could not be restored */
@@ -236,6 +239,9 @@ enum {
 int64_t now(void);
 void watch_signals(int on);
 int signal_came(void);
+void use_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
+int exception_left(void);
+double *hold_scratch(const Hold *h); /* (2, n) */
 int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
 int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
 int account_has_room(const Account *a, int64_t samples);

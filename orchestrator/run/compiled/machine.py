@@ -114,7 +114,7 @@ class Machine:
 
         def call(tick: int) -> None:
             at.op, at.last = first, last
-            while code := run(loop, here, tick):
+            while code := self.code(at, run, loop, here, tick):
                 self.serve(code, at, tick)
 
         return call
@@ -249,6 +249,18 @@ class Machine:
 
     # --- what the loop returns for --------------------------------------------------------
 
+    def code(self, at: structures.At, run: Callable[..., int], *arguments: int) -> int:
+        """What a function of the loop returns. Raises FmuFault for an exception that a Python FMU
+        left behind in it."""
+        try:
+            return run(*arguments)
+        except SystemError as error:
+            instruction, _ = self._bound[at.op]
+            assert isinstance(instruction, Get | Read | Set | Step)
+            instance = self._simulation.instances[instruction.fmu]
+            assert isinstance(instance, InProcess)
+            raise instance.raised(self._called(instruction, at.what, instance), error) from error
+
     def serve(self, code: int, at: structures.At, tick: int) -> None:
         """Does what the loop cannot do at operation `at.op`, and sets where it goes on."""
         instruction, call = self._bound[at.op]
@@ -286,7 +298,9 @@ class Machine:
         at.op += 1
 
     def _called(self, instruction: Instruction, number: int, instance: InProcess) -> str:
-        """The name of a failed call of a get or a set."""
+        """The name of the failed call of a get, a set or a step."""
+        if number < 0:
+            return instance.do_step
         transfers = instance.gets
         if isinstance(instruction, Set):
             simulation = self._simulation

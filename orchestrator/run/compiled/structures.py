@@ -19,7 +19,7 @@ def _all(kind: type, names: str) -> Iterator[tuple[str, type]]:
 class Transfer(ctypes.Structure):
     _fields_ = (
         *_all(_POINTER, "call fmu references buffer values"),
-        *_all(_INT, "n_references n type fmi"),
+        *_all(_INT, "n_references n type fmi python"),
     )
 
 
@@ -35,7 +35,7 @@ class Check(ctypes.Structure):
 class Fmu(ctypes.Structure):
     _fields_ = (
         *_all(_POINTER, "place fmu do_step get_state state"),
-        *_all(_INT, "fmi forward"),
+        *_all(_INT, "fmi forward python"),
         *_all(_POINTER, "event terminate early reached gets"),
         ("n_gets", _INT),
         *_all(_POINTER, "outputs inverse good"),
@@ -159,7 +159,7 @@ ALL = (
 """Codes of operations."""
 
 (
-    DONE, CALL, JUDGE, FAILED, STEPPED, UNSAVED, UNRESTORED, FULL, DRAW, STOP, KIND, STARTS, PAUSE,
-    GROW,
-) = range(14)  # fmt: skip
+    DONE, CALL, JUDGE, FAILED, RAISED, STEPPED, UNSAVED, UNRESTORED, FULL, DRAW, STOP, KIND, STARTS,
+    PAUSE, GROW,
+) = range(15)  # fmt: skip
 """Why the loop returns."""

@@ -135,6 +135,23 @@ def test_faults_of_python_fmus(
     both(str(scene(tmp_path, ONE.format("Fails"))), tmp_path, monkeypatch, *options)
 
 
+LEFT = {
+    "OverflowError": "if self.steps == 5: self.steps = 10**30",
+    "ValueError": "if self.steps == 5: return __import__('numpy').zeros(2)",
+}
+
+
+@pytest.mark.parametrize("error", LEFT)
+def test_exceptions_that_a_python_fmu_leaves_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: str
+) -> None:
+    """The library of pythonfmu checks neither an integer's size nor a status that has no truth
+    value: it goes on with -1, or with a step that is taken."""
+    python_fmu(tmp_path, "Leaves", LEFT[error])
+    run, _ = both(str(scene(tmp_path, ONE.format("Leaves"))), tmp_path, monkeypatch)
+    assert error in run["fault"]["message"]
+
+
 @pytest.mark.parametrize("mode", range(1, 5))
 def test_every_status_of_a_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int) -> None:
     c_fmu(tmp_path)

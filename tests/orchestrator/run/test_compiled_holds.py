@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import subprocess
+import sys
 from fractions import Fraction
 
 import numpy as np
@@ -109,3 +111,36 @@ def test_holds_in_c_are_those_in_python(name: str, wrapped: str, seed: int) -> N
         later = tick + 7
         expected = np.array(pair.python.value(later, 1.5), copy=True)
         assert pair.compiled.value(later, 1.5).tobytes() == expected.tobytes()
+
+
+LARGE = """
+import ctypes, threading
+import numpy as np
+from hapticlink.orchestrator.holds import HOLDS, HoldContext
+from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.holds import CompiledHold
+from hapticlink.orchestrator.run.compiled.library import load
+
+N = 100_000
+values, held = np.arange(float(N)), np.zeros(N)
+points = np.array([(0.25, 0.0), (0.75, 0.0)])
+ops = (structures.Op * 2)(
+    structures.Op(structures.PUSH), structures.Op(structures.BLEND, 0, 0, len(points))
+)
+loop = structures.Loop(values=values.ctypes.data, ops=ctypes.addressof(ops))
+hold = HOLDS["foh"](HoldContext(N, float))
+compiled = CompiledHold(load(), ctypes.addressof(loop), hold, range(N), held)
+holds = (ctypes.c_void_p * 1)(compiled.address)
+loop.holds, loop.points = ctypes.addressof(holds), points.ctypes.data
+at = structures.At(0, len(ops))
+threading.stack_size(1 << 18)
+run = threading.Thread(target=load().block, args=(ctypes.addressof(loop), ctypes.addressof(at), 0))
+run.start()
+run.join()
+assert np.array_equal(held, values)
+"""
+
+
+def test_a_large_array_takes_no_place_on_the_stack() -> None:
+    """Of 256 KB: that of a thread is 512 KB on macOS, and an FMU may have a million numbers."""
+    subprocess.run([sys.executable, "-c", LARGE], check=True)
