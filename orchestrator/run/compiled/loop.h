@@ -114,7 +114,7 @@ typedef struct {
 } Account;
 
 /* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
- * followed by its derivative. `vectors`: (6, n), what else the kind remembers. */
+ * followed by its derivative or integral. `vectors`: (6, n), what else the kind remembers. */
 typedef struct {
     int64_t kind, n, width, depth, count;
     int64_t stamps[3];
@@ -135,7 +135,7 @@ typedef struct {
 
 enum {
     ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
-    MEAN, PASSIVE_SET_POSITION, OBSERVED
+    MEAN, PASSIVE_SET_POSITION, OBSERVED, SLOPE
 };
 
 /* --- meters, tables --------------------------------------------------------------------------- */
