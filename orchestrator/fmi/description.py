@@ -89,6 +89,13 @@ class Description:
         found = [by_name.get(self.derivatives.get(s.name, "")) for s in outputs]
         return None if None in found else tuple(s for s in found if s)
 
+    def integral(self, outputs: Iterable[Scalar]) -> tuple[Scalar, ...] | None:
+        """The outputs of which `outputs` are the derivatives, all or none."""
+        by_name = {s.name: s for s in self.outputs}
+        of = {derivative: name for name, derivative in self.derivatives.items()}
+        found = [by_name.get(of.get(s.name, "")) for s in outputs]
+        return None if None in found else tuple(s for s in found if s)
+
     def unit(self, scalar: Scalar) -> Unit | None:
         return None if scalar.unit is None else self.units.get(scalar.unit, Unit(scalar.unit))
 

@@ -17,6 +17,7 @@ from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyP
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.holds.second_order import SecondOrder
+from hapticlink.orchestrator.holds.slope import Slope
 from hapticlink.orchestrator.holds.smooth import Smooth
 from hapticlink.orchestrator.holds.zero_order import Latest, ZeroOrder
 
@@ -38,6 +39,7 @@ HOLDS: Registry[type[Hold]] = Registry(
         "lead": Lead,
         "foh": FirstOrder,
         "foh-derivative": FirstOrderDerivative,
+        "slope": Slope,
         "second-order": SecondOrder,
         "hermite": Hermite,
         "delayed": Delayed,

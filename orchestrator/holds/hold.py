@@ -14,7 +14,7 @@ from hapticlink.orchestrator.holds.restorable import Restorable
 Vector = NDArray[np.float64]
 
 
-Needs = Literal["derivative", "power", "spring"]
+Needs = Literal["derivative", "integral", "power", "spring"]
 
 
 class Hold(Restorable, ABC):
@@ -27,8 +27,9 @@ class Hold(Restorable, ABC):
     """
 
     needs: ClassVar[Needs | None] = None
-    """derivative: a sample is the signal followed by its time derivative (its unit per s). power:
-    the connection carries power, and the context reads the conjugate displacement. spring: the
+    """derivative: a sample is the signal followed by its time derivative (its unit per s).
+    integral: by its integral over time, the output of which it is the derivative. power: the
+    connection carries power, and the context reads the conjugate displacement. spring: the
     connection sets a spring-damper, whose energy tank is in the context."""
     gives_samples: ClassVar[bool] = False
     """Whether every value is one of the samples, unchanged, so that a matrix keeps its kind."""

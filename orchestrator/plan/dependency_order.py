@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.system.ports import derivative
+from hapticlink.orchestrator.system.ports import beside
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
@@ -42,12 +41,10 @@ def direct(system: System, units: Iterable[Fmu]) -> dict[str, set[str]]:
 
 
 def _read(system: System, unit: Fmu) -> Iterator[Scalar]:
-    """The used outputs: those of connections, and those that holds read as derivatives."""
+    """The used outputs: those of connections, and those that holds read beside them."""
     for c in system.out_of(unit.name):
         yield from c.outputs
-        slope = derivative(c, system.fmu)
-        if slope and c.hold and HOLDS[c.hold].needs == "derivative":
-            yield from slope
+        yield from beside(c, system.fmu)
 
 
 def plants(system: System, units: Iterable[Fmu]) -> Iterator[list[Fmu]]:

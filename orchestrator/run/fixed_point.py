@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hapticlink.orchestrator.base.faults import Fault
-from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.operations import Repeat
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.jacobians import Through
@@ -18,7 +17,7 @@ from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.solvers import SOLVERS, Found, Matrix, Newton, Vector
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
-from hapticlink.orchestrator.system.ports import derivative
+from hapticlink.orchestrator.system.ports import beside
 from hapticlink.orchestrator.system.system import Connection, System
 
 
@@ -182,9 +181,7 @@ def _constant(c: Connection, system: System) -> bool:
 
 
 def _read(c: Connection, system: System, signals: SignalVector) -> list[int]:
-    """Indices of the signals that the input of `c` depends on: the source's outputs, and their
-    derivatives where its hold needs them."""
-    places = signals.sources(c)
-    if c.hold and HOLDS[c.hold].needs == "derivative" and (slope := derivative(c, system.fmu)):
-        places = places + [signals.scalar(c.source, s.name) for s in slope]
-    return places
+    """Indices of the signals that the input of `c` depends on: the source's outputs, and those
+    that its hold reads beside them."""
+    further = (signals.scalar(c.source, s.name) for s in beside(c, system.fmu))
+    return [*signals.sources(c), *further]

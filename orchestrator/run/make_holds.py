@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.system.latency import Late, Link
-from hapticlink.orchestrator.system.ports import derivative, turns
+from hapticlink.orchestrator.system.ports import beside, kind, turns
 from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -36,43 +37,63 @@ def make_hold(
     signals: SignalVector,
     shared: dict[SetSpring, EnergyTank],
 ) -> Hold:
-    """The hold of `connection`, wrapped for its kind, its latency and its derivative samples;
-    `shared` are the energy tanks so far."""
+    """The hold of `connection`, wrapped for its kind, its latency and what it reads beside its
+    samples; `shared` are the energy tanks so far."""
     assert connection.hold is not None
-    kind, size = HOLDS[connection.hold], len(connection.inputs)
+    made_by, size = HOLDS[connection.hold], len(connection.inputs)
     context = _context(connection, system, signals, shared)
 
     def make() -> Hold:
-        made = kind(context)
+        made = made_by(context)
         if connection.hold not in HOLDS.origins:
             return made
         return CheckedHold(made, size, connection.hold, connection.name)
 
     hold = make()
-    if connection.kind == "projector" and not kind.gives_samples:
+    if connection.kind == "projector" and not made_by.gives_samples:
         hold = Projector(make, size)
-    elif connection.kind == "semidefinite" and not kind.gives_samples:
+    elif connection.kind == "semidefinite" and not made_by.gives_samples:
         hold = Semidefinite(make, size)
-    elif connection.kind == "angle":
-        turned = turns(connection, system.fmu)
+    elif turned := _turns(connection, system):
         hold = Unwrapped(make, list(turned), list(turned.values()))
     if connection.latency:
         hold = Late(hold, Link(connection.latency, system.timeline.base))
-    if kind.needs == "derivative" and (slope := derivative(connection, system.fmu)):
-        slopes = [signals.scalar(connection.source, s.name) for s in slope]
-        hold = WithDerivative(hold, _reader(signals, slopes))
+    if further := beside(connection, system.fmu):
+        places = [signals.scalar(connection.source, s.name) for s in further]
+        hold = WithFurther(hold, _reader(signals, places))
     return hold
 
 
-class WithDerivative(Hold):
-    """Appends the source's derivative to each sample, so that both have the same latency."""
+def _turns(connection: Connection, system: System) -> dict[int, float]:
+    """For each entry of a sample that is a wrapped angle, a full turn in its unit: of the
+    connection's own, and of integrals beside them, which are as the connection that carries them
+    is, or else as the source declares them."""
+    if connection.kind == "angle":
+        return turns(connection, system.fmu)
+    assert connection.hold is not None
+    if HOLDS[connection.hold].needs != "integral":
+        return {}
+    of = replace(connection, outputs=beside(connection, system.fmu))
+    held = (
+        c.kind
+        for c in system.out_of(connection.source)
+        if c.hold and not c.initial and c.outputs == of.outputs
+    )
+    if next(held, kind(of, system.fmu)) != "angle":
+        return {}
+    return {len(connection.inputs) + i: turn for i, turn in turns(of, system.fmu).items()}
 
-    def __init__(self, hold: Hold, derivative: Reader) -> None:
-        self.hold, self.derivative = hold, derivative
+
+class WithFurther(Hold):
+    """Appends the source's derivative or integral to each sample, so that both have the same
+    latency."""
+
+    def __init__(self, hold: Hold, further: Reader) -> None:
+        self.hold, self.further = hold, further
         self.link: Link | None = getattr(hold, "link", None)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        self.hold.push(stamp, np.concatenate([sample, self.derivative()]), arrival)
+        self.hold.push(stamp, np.concatenate([sample, self.further()]), arrival)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         return self.hold.value(tick, ahead)

@@ -18,7 +18,7 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import declared, springs
-from hapticlink.orchestrator.system.ports import carries_power, derivative, kind, names
+from hapticlink.orchestrator.system.ports import carries_power, derivative, integral, kind, names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 
@@ -131,6 +131,11 @@ def _misfit(
         return (
             f"{c.source} does not put out the derivative of {c.source_port}, or does not declare "
             "it (docs/holds.md, Derivatives); take 'foh', which uses the difference of two samples"
+        )
+    if needs == "integral" and integral(c, fmus) is None:
+        return (
+            f"{c.source} does not put out anything of which {c.source_port} is the derivative, or "
+            "does not declare it (docs/holds.md, Derivatives); take 'foh'"
         )
     if needs == "power" and not carries_power(c, power):
         return (

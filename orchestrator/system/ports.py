@@ -1,4 +1,5 @@
-"""Properties of a connection that follow from its ports: names, kind, power and derivative."""
+"""Properties of a connection that follow from its ports: names, kind, power, derivative and
+integral."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from hapticlink.components.ports import Kind
 from hapticlink.orchestrator.fmi.kinds import MATRICES, turn
 from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import PowerPort
 from hapticlink.orchestrator.system.system import Connection, Fmu
 
@@ -50,3 +52,17 @@ def derivative(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...] | N
     """The outputs of the source that are the time derivatives of the connection's outputs; None
     where the source does not declare them."""
     return fmus[c.source].description.derivative(c.outputs)
+
+
+def integral(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...] | None:
+    """The outputs of the source of which the connection's outputs are the time derivatives; None
+    where the source does not declare them."""
+    return fmus[c.source].description.integral(c.outputs)
+
+
+def beside(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...]:
+    """The outputs of the source that a connection's hold reads beside the connection's own: their
+    derivatives or integrals, if it needs them."""
+    needs = HOLDS[c.hold].needs if c.hold else None
+    found = {"derivative": derivative, "integral": integral}.get(needs or "")
+    return (found(c, fmus) or ()) if found else ()

@@ -286,6 +286,12 @@ static void extrapolate(const Hold *h, const Loop *l, int64_t tick, double ahead
                            : a * first[k] + b * first[n + k] + c * y[k] + d * y[n + k];
         return;
     }
+    case SLOPE: {
+        const double width = seconds(l, (double)(h->stamps[last] - h->stamps[0]));
+        for (int64_t k = 0; k < n; k++)
+            value[k] = h->count < 2 ? 0.0 : (y[n + k] - first[n + k]) / width;
+        return;
+    }
     case DELAYED: delayed(h, tick, ahead, value); return;
     case SMOOTH: curve(h, (double)tick + ahead, value, NULL); return;
     }

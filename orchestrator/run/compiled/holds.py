@@ -24,11 +24,12 @@ from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.holds.second_order import SecondOrder
+from hapticlink.orchestrator.holds.slope import Slope
 from hapticlink.orchestrator.holds.smooth import Smooth
 from hapticlink.orchestrator.holds.zero_order import Latest, ZeroOrder
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.energy.bonds import Reader
-from hapticlink.orchestrator.run.make_holds import WithDerivative
+from hapticlink.orchestrator.run.make_holds import WithFurther
 from hapticlink.orchestrator.system.latency import Late, Link
 
 KINDS: Mapping[type[Hold], tuple[int, int]] = {
@@ -36,7 +37,7 @@ KINDS: Mapping[type[Hold], tuple[int, int]] = {
     for code, depth, *kinds in (
         (0, 1, ZeroOrder, Latest), (1, 2, Lead), (2, 2, FirstOrder), (3, 1, FirstOrderDerivative),
         (4, 3, SecondOrder), (5, 2, Hermite), (6, 2, Delayed), (7, 2, Smooth), (8, 1, Mean),
-        (9, 1, PassiveSetPosition), (10, 1, Passive, NearlyEnergyPreserving),
+        (9, 1, PassiveSetPosition), (10, 1, Passive, NearlyEnergyPreserving), (11, 2, Slope),
     )
     for kind in kinds
 }  # fmt: skip
@@ -51,21 +52,21 @@ class Parts(NamedTuple):
     own: Hold
     angles: Unwrapped | None
     link: Link | None
-    derivative: Reader | None
+    further: Reader | None
 
 
 def parts(hold: Hold) -> Parts:
     """The parts of a hold that `make_hold` has made; `own` is a wrapper that has no C where one is
     left."""
-    derivative, link, angles = None, None, None
-    if isinstance(hold, WithDerivative):
-        derivative, hold = hold.derivative, hold.hold
+    further, link, angles = None, None, None
+    if isinstance(hold, WithFurther):
+        further, hold = hold.further, hold.hold
     if isinstance(hold, Late):
         link, hold = hold.link, hold.hold
     if isinstance(hold, Unwrapped):
         angles = hold
         hold = hold.hold
-    return Parts(hold, angles, link, derivative)
+    return Parts(hold, angles, link, further)
 
 
 def can(hold: Hold, rolls_back: bool) -> bool:
@@ -180,13 +181,13 @@ class CompiledHold(Hold, State):
         held: Vector,
         tank: CompiledTank | None = None,
     ) -> None:
-        own, angles, link, derivative = parts(hold)
+        own, angles, link, further = parts(hold)
         n, (code, depth) = len(held), KINDS[type(own)]
-        places = [*sources, *(derivative.where if derivative else ())]
+        places = [*sources, *(further.where if further else ())]
         width, turned = len(places), len(angles.angles) if angles else 0
         State.__init__(self, depth * width + 8 * n + turned + _words(structures.Hold))
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
-        self._sources, self._derivative = np.array(places, np.intp), derivative
+        self._sources, self._further = np.array(places, np.intp), further
         self._held, self._tank = held, tank
         c = self.structure(structures.Hold)
         c.kind, c.n, c.width, c.depth = code, n, width, depth
@@ -236,8 +237,8 @@ class CompiledHold(Hold, State):
             self.grow()
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        if self._derivative:
-            sample = np.concatenate([sample, self._derivative()])
+        if self._further:
+            sample = np.concatenate([sample, self._further()])
         own = np.ascontiguousarray(sample, np.float64)
         assert len(own) == len(self._sources)
         while code := self._push(self.address, own.ctypes.data, stamp, arrival):

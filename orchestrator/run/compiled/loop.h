@@ -115,7 +115,7 @@ typedef struct {
 } Account;
 
 /* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
- * followed by its derivative. `vectors`: (8, n), what else the kind remembers, and
+ * followed by its derivative or integral. `vectors`: (8, n), what else the kind remembers, and
  * `hold_scratch`: arrays of any size are no place for the stack. */
 typedef struct {
     int64_t kind, n, width, depth, count;
@@ -137,7 +137,7 @@ typedef struct {
 
 enum {
     ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
-    MEAN, PASSIVE_SET_POSITION, OBSERVED
+    MEAN, PASSIVE_SET_POSITION, OBSERVED, SLOPE
 };
 
 /* --- meters, tables --------------------------------------------------------------------------- */

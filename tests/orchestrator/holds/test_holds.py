@@ -55,6 +55,28 @@ def test_a_polynomial_of_the_holds_degree_is_continued_exactly(
         np.testing.assert_allclose(lead, signal(times[-1] + period / 2), rtol=1e-9, atol=1e-9)
 
 
+@given(stamps, st.integers(0, 40), st.floats(0, 20), st.floats(1, 20))
+def test_a_slope_is_the_rate_of_what_foh_makes_of_the_pose(
+    times: Vector, later: int, ahead: float, apart: float
+) -> None:
+    pose = lambda t: np.array([np.sin(0.3 * t), t * t])  # noqa: E731
+    held = fed(HOLDS["foh"](HoldContext(2)), times, pose)
+    slope = fed(
+        HOLDS["slope"](HoldContext(2, lambda ticks: ticks / 512)),
+        times,
+        lambda t: np.concatenate([np.array([np.nan, np.nan]), pose(t)]),
+    )
+    tick = int(times[-1]) + later
+    moved = held.value(tick, ahead + apart) - held.value(tick, ahead)
+    np.testing.assert_allclose(slope.value(tick, ahead), moved * 512 / apart, rtol=1e-6, atol=1e-6)
+
+
+def test_until_the_second_sample_a_slope_is_zero_as_the_pose_is_constant() -> None:
+    slope = HOLDS["slope"](HoldContext(2))
+    slope.push(0, np.array([3.0, 4.0, 1.0, 2.0]), 0)
+    np.testing.assert_array_equal(slope.value(5, 2.5), [0.0, 0.0])
+
+
 @given(stamps)
 def test_delayed_and_smooth_reach_each_sample_a_period_later(times: Vector) -> None:
     signal = lambda t: np.array([np.sin(0.3 * t), t * t])  # noqa: E731

@@ -59,10 +59,16 @@ def test_order_of_a_hold(fmus: Fmus, tmp_path: Path, hold: Hold, substeps: int, 
     assert observed == pytest.approx(order, abs=0.1)
 
 
-@pytest.mark.parametrize("name", ["passive", "nepce"])
-def test_holds_that_keep_account_are_of_order_one(fmus: Fmus, tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    "further",
+    [{"two.F": "passive"}, {"two.F": "nepce"}, {"one.x": "foh", "one.v": "slope"}],
+    ids=["passive", "nepce", "slope"],
+)
+def test_holds_that_reach_order_one_at_higher_rates(
+    fmus: Fmus, tmp_path: Path, further: Mapping[str, str]
+) -> None:
     rates = [400, 800, 1600]
-    errors = [error(fmus, tmp_path, rate, {**OWN, "two.F": name}, 1) for rate in rates]
+    errors = [error(fmus, tmp_path, rate, {**OWN, **further}, 1) for rate in rates]
     observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
     assert observed == pytest.approx(1, abs=0.15)
 

@@ -55,7 +55,7 @@ class Pair:
         self._loop.numerator, self._loop.denominator = NUMERATOR, DENOMINATOR
         tank = getattr(parts(own).own, "tank", None)
         shared = CompiledTank(tank) if tank else None
-        twice = HOLDS[name].needs == "derivative"
+        twice = HOLDS[name].needs in ("derivative", "integral")
         self.width = SIZE * (1 + twice)
         held, loop = np.zeros(SIZE), ctypes.addressof(self._loop)
         places = range(self.width)

@@ -1,0 +1,102 @@
+"""The hold `slope` between two FMUs: the velocity that a target gets is the rate of its pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.components.component import Block, Component, Variable
+from hapticlink.fmus.build import build
+from hapticlink.orchestrator.base.faults import SceneFault
+
+RATE = 7.3
+"""Of the angle, rad/s; the other coordinate is sin(3 t)."""
+SCENE = """title = "A slow motion, seen by a fast controller"
+duration = 2.0
+haptics.rate = 512
+holds = { "slow.x" = "foh", "slow.v" = "slope" }
+[[fmu]]
+name = "slow"
+path = "slow.fmu"
+rate = 32
+[[fmu]]
+name = "fast"
+path = "fast.fmu"
+[[connection]]
+from = "slow.x"
+to = "fast.x"
+[[connection]]
+from = "slow.v"
+to = "fast.v"
+"""
+
+
+def slow() -> Component:
+    """A pose whose angle turns round and is wrapped, and a velocity that is not used."""
+    pose, twist = ("m", "rad"), ("m/s", "rad/s")
+    block = Block(
+        outputs=[
+            Variable("x", (2,), pose, kind="angle"),
+            Variable("v", (2,), twist, derivative_of="x"),
+        ]
+    )
+    angle, wrong = RATE * block.t, ca.SX([99.0, 99.0])
+    output = {"x": ca.vertcat(ca.sin(3 * block.t), ca.atan2(ca.sin(angle), ca.cos(angle)))}
+    output["v"] = wrong
+    return block.component("slow", "moves", "continuous", initial={}, step={}, output=output)
+
+
+def fast() -> Component:
+    inputs = [Variable("x", (2,), ("m", "rad")), Variable("v", (2,), ("m/s", "rad/s"))]
+    outputs = [Variable("pose", (2,), ("m", "rad")), Variable("rate", (2,), ("m/s", "rad/s"))]
+    block = Block(inputs=inputs, outputs=outputs)
+    output = {"pose": block.u["x"], "rate": block.u["v"]}
+    return block.component("fast", "sees it", "sampled", initial={}, step={}, output=output)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("slope")
+    for component in (slow(), fast()):
+        build(component, made)
+    return made
+
+
+def ran(folder: Path, text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, pose and velocity that `fast` gets."""
+    (folder / "scene.toml").write_text(text)
+    results = hl.run(hl.scene(str(folder / "scene.toml")))
+    assert results.run["fault"] is None
+    return results.haptics["time"], results["fast.pose"], results["fast.rate"]
+
+
+def test_the_held_velocity_is_the_rate_of_the_held_pose_over_the_seam(folder: Path) -> None:
+    time, pose, rate = ran(folder, SCENE)
+    frame = np.floor(time * 32 + 1e-9)  # the newest sample at each instant
+    for n in range(2, 60):
+        (k,) = np.nonzero(frame == n)
+        moved = np.diff(pose[k], axis=0) * 512
+        np.testing.assert_allclose(moved, rate[k][1:], rtol=1e-9, atol=1e-9)
+        a, b = np.sin(3 * np.array([n - 1, n]) / 32)
+        expected = np.tile([(b - a) * 32, RATE], (len(k), 1))
+        np.testing.assert_allclose(rate[k], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_a_late_pose_and_its_rate_agree_too(folder: Path) -> None:
+    """Both with the same latency and losses."""
+    late = "{ min = 0.003, max = 0.05, loss = 0.2, seed = 4 }"
+    _, pose, rate = ran(folder, f'delays = {{ "slow.x" = {late}, "slow.v" = {late} }}\n' + SCENE)
+    same = (np.abs(np.diff(rate, axis=0)) < 1e-12).all(axis=1)
+    moved = np.diff(pose, axis=0)[same] * 512
+    np.testing.assert_allclose(moved, rate[1:][same], rtol=1e-9, atol=1e-9)
+    assert 800 < same.sum() < 1010
+
+
+def test_a_slope_needs_the_pose(folder: Path) -> None:
+    (folder / "scene.toml").write_text(SCENE.replace('"slow.x" = "foh"', '"slow.x" = "slope"'))
+    with pytest.raises(SceneFault, match="anything of which x is the derivative"):
+        hl.run(hl.scene(str(folder / "scene.toml")))
