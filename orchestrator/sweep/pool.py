@@ -22,7 +22,7 @@ from multiprocessing.process import BaseProcess
 from types import ModuleType
 from typing import Any
 
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.process_end import leave_threads
 from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.row import DIED, Row, failed
@@ -106,6 +106,11 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
             process.terminate()
         for process in workers:  # time to remove their folders, since `shutdown` does not wait
             process.join(5.0)
+            if process.is_alive():
+                process.kill()
+                process.join(1.0)
+            if process.pid:
+                temporary_folders.clear(process.pid)
         raise
     finally:
         pool.shutdown()

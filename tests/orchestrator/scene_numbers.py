@@ -91,8 +91,8 @@ def beyond(number: Number) -> st.SearchStrategy[Any]:
     found: list[st.SearchStrategy[Any]] = []
     if number.whole:
         assert low is not None
-        found.append(st.integers(max_value=int(low) - 1))
-        found += [st.integers(min_value=int(high) + 1)] if high is not None else []
+        found.append(st.integers(-(2**63), int(low) - 1))
+        found += [st.integers(int(high) + 1, 2**63 - 1)] if high is not None else []
         return st.one_of(found)
     if low is not None:
         found.append(st.floats(max_value=low, exclude_max="ge" in number.quantity.bounds))
