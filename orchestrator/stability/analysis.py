@@ -14,6 +14,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability import frozen
+from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
@@ -119,7 +120,7 @@ def stability(scene: str | Path | Scene, options: Options = (), *, at: float = 0
         read = open_scene.load(scene, options)
         with built(read) as whole:
             system, removed = frozen.without(whole)
-            with opened(long_enough(read, system, at), at) as map_:
+            with opened(long_enough(read, system, at), at, Closures(read)) as map_:
                 found = equilibrium(map_, read.duration)
                 return _result(read.title, map_, found, [*removed, *frozen.kept(system)])
 
@@ -129,7 +130,8 @@ def _result(title: str, map_: LiftedMap, at: Linear, lines: list[str]) -> Stabil
     neutral = [mode for mode in found if mode.neutral]
     others = [mode for mode in found if not mode.neutral]
     names = tuple(str(map_.coordinates[i]) for i in at.taken)
-    kinks = tuple(n for n, kink in zip(names, at.kink, strict=True) if kink > KINK)
+    kinked = np.abs(at.V[:, at.kink > KINK]).max(axis=1, initial=0.0)
+    kinks = tuple(str(c) for c, share in zip(map_.coordinates, kinked, strict=True) if share)
     first = others[0] if others else None
     return Stability(
         title=title,

@@ -33,6 +33,7 @@ def equilibrium(map_: LiftedMap, seconds: float) -> Linear:
     """
     state, passed, ahead = map_.start, 0, 1
     nearest: Linear | None = None
+    ended: FmuFault | None = None
     while passed * map_.period <= seconds:
         try:
             found = _newton(map_, state)
@@ -43,10 +44,11 @@ def equilibrium(map_: LiftedMap, seconds: float) -> Linear:
                 nearest = found
             for _ in range(ahead):
                 state = map_.image(state)
-        except FmuFault:  # diverges from here on
+        except FmuFault as fault:  # diverges from here on
+            ended = fault
             break
         passed, ahead = passed + ahead, 1 + passed // 2
-    raise InputFault(_why_none(map_, nearest))
+    raise InputFault(_why_none(map_, nearest, ended))
 
 
 def _require_rest(map_: LiftedMap, at: Linear) -> None:
@@ -67,9 +69,8 @@ def rests(at: Linear) -> bool:
 
 
 def _unrest(at: Linear) -> Vector:
-    """By coordinate taken, its change over a period, relative."""
-    z = at.point[at.taken]
-    found: Vector = np.abs(at.image[at.taken] - z) / np.maximum(1.0, np.abs(z))
+    """Along each direction, the change over a period, relative."""
+    found: Vector = np.abs(at.change) / np.maximum(1.0, np.abs(at.V.T @ at.point))
     return found
 
 
@@ -82,28 +83,25 @@ def _newton(map_: LiftedMap, state: Vector) -> Linear:
         if left <= TOLERANCE or idle == PATIENCE:
             break
         least = min(least, left)
-        step = at.image[at.taken] - at.point[at.taken]
         d = at.scales
-        balanced = np.eye(len(step)) - at.A * d / d[:, None]
-        step = d * np.linalg.lstsq(balanced, step / d, rcond=NEUTRAL)[0]
-        point = at.image.copy()  # what is not taken is overwritten
-        point[at.taken] = at.point[at.taken] + step
+        balanced = np.eye(len(d)) - at.A * d / d[:, None]
+        step = d * np.linalg.lstsq(balanced, at.change / d, rcond=NEUTRAL)[0]
         try:
-            at = linearised(map_, point)
+            at = linearised(map_, at.moved(step))
         except FmuFault:  # far from where it is linear
             break
     return at
 
 
-def _why_none(map_: LiftedMap, nearest: Linear | None) -> str:
+def _why_none(map_: LiftedMap, nearest: Linear | None, ended: FmuFault | None) -> str:
     remedy = (
         "the map is linearised around a state of rest: take a hand that holds the mechanism, "
         "such as an arm or a spring, and no wrench, drive or target that changes with time"
     )
     if nearest is None:
-        return f"no equilibrium: the run diverges before one is found; {remedy}"
-    i = int(np.argmax(_unrest(nearest)))
-    j = nearest.taken[i]
+        return f"no equilibrium found before the run ends ({ended}); {remedy}"
+    along = nearest.V[:, int(np.argmax(_unrest(nearest)))]
+    j = int(np.argmax(np.abs(along)))
     change = nearest.image[j] - nearest.point[j]
     return (
         f"no equilibrium found: {map_.coordinates[j]} still changes by {change:.3g} in "

@@ -22,6 +22,7 @@ from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.bind import Binder
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.frozen import discrete
 from hapticlink.orchestrator.stability.state_vector import Coordinate, StateVector, Vector
 from hapticlink.orchestrator.system.system import System
@@ -53,10 +54,12 @@ class LiftedMap:
     before the time `at` (s).
 
     period: the hyperperiod (s), of a number of `events`. coordinates: of the state, in order.
-    start: the state there. free: indices of the coordinates that are no switches.
+    start: the state there.
     """
 
-    def __init__(self, plan: Plan, simulation: Simulation, at: float = 0.0) -> None:
+    def __init__(
+        self, plan: Plan, simulation: Simulation, at: float, closures: Closures | None
+    ) -> None:
         self._simulation, time = simulation, plan.system.timeline
         self._bound: dict[Event | Part, list[Call]] = {}
         self._plan = plan
@@ -76,7 +79,7 @@ class LiftedMap:
         self.coordinates: Sequence[Coordinate] = self._state.coordinates(self._template)
         self.start = self._state.numbers(self._template)
         free = [i for i, c in enumerate(self.coordinates) if not discrete(c)]
-        self.free = np.array(free, dtype=np.intp)
+        self._free, self._closures = np.array(free, dtype=np.intp), closures
 
     def __call__(
         self, state: Vector, watch: Watch = lambda count, state: False, always: bool = False
@@ -90,6 +93,14 @@ class LiftedMap:
                 return None
         interrupt.check()
         return self._numbers()
+
+    def directions(self, point: Vector) -> Iterator[Vector]:
+        """Orthonormal directions in which the state can be moved from `point`, that of the
+        coordinates that are no switches."""
+        if self._closures:
+            yield from self._closures.directions(self.coordinates, self._free, point)
+        else:
+            yield from np.eye(len(point))[self._free]
 
     def image(self, state: Vector) -> Vector:
         """F(state)."""
@@ -147,8 +158,11 @@ def long_enough(scene: Scene, system: System, at: float = 0.0) -> System:
 
 
 @contextmanager
-def opened(system: System, at: float = 0.0) -> Iterator[LiftedMap]:
-    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded.
+def opened(
+    system: System, at: float = 0.0, closures: Closures | None = None
+) -> Iterator[LiftedMap]:
+    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; `closures` are
+    those of its mechanism.
 
     Raises InputFault where there is none: adaptive step sizes, rates and latencies that vary, an
     FMU whose state cannot be read.
@@ -170,4 +184,4 @@ def opened(system: System, at: float = 0.0) -> Iterator[LiftedMap]:
         simulation = Simulation(system, results, stack)
         simulation.step_checks.clear()
         simulation.start()
-        yield LiftedMap(Plan(system), simulation, at)
+        yield LiftedMap(Plan(system), simulation, at, closures)

@@ -1,10 +1,12 @@
 """The linearisation of the lifted map by central differences.
 
-    A_ij = (F_i(z + d_j e_j) - F_i(z - d_j e_j)) / 2 d_j,   d_j = 1e-6 max(1, |z_j|)
+    A_ij = V_i' (F(z + d_j V_j) - F(z - d_j V_j)) / 2 d_j,   d_j = 1e-6 max(1, |z|)
 
-A number that is overwritten before anything reads it has a zero column; it is left out as soon as
-the state after some events is that of z, bit for bit. A number that nothing changes, a gain that a
-hold keeps, is a parameter of the map: its row is that of the identity, and it is left out too.
+V_j are the unit vectors of the coordinates, or directions within the closures (closures.py); |z| is
+the largest of the numbers that V_j moves. A number that is overwritten before anything reads it has
+a zero column; it is left out as soon as the state after some events is that of z, bit for bit. A
+number that nothing changes, a gain that a hold keeps, is a parameter of the map: its row is that of
+the identity, and it is left out too.
 """
 
 from __future__ import annotations
@@ -25,15 +27,32 @@ SAME = 1e-7
 
 @dataclass(frozen=True)
 class Linear:
-    """The map around `point`: F(point) = image, with the Jacobian A (n, n) over the coordinates
-    `taken`, its error E (n, n) by differences of one side, and per column the largest of them
-    relative to the column (`kink`): of order 1 where the map is not differentiable."""
+    """The map around `point`: F(point) = image, with the Jacobian A (n, n) along the orthonormal
+    directions V, the columns of a matrix; its error E (n, n) by differences of one side, and per
+    column the largest of them relative to the column (`kink`): of order 1 where the map is not
+    differentiable."""
 
     point: Vector
     image: Vector
-    taken: NDArray[np.intp]
+    V: Matrix
     A: Matrix
     E: Matrix
+
+    @property
+    def taken(self) -> NDArray[np.intp]:
+        """The coordinates of the state that the directions move."""
+        return np.flatnonzero(self.V.any(axis=1))
+
+    @property
+    def change(self) -> Vector:
+        """Along each direction, F(point) - point."""
+        found: Vector = self.V.T @ (self.image - self.point)
+        return found
+
+    def moved(self, by: Vector) -> Vector:
+        """The point moved along the directions, with all that is overwritten as in the image."""
+        found: Vector = self.image + self.V @ (by - self.change)
+        return found
 
     @property
     def kink(self) -> Vector:
@@ -49,7 +68,7 @@ class Linear:
 
 
 def linearised(map_: LiftedMap, point: Vector) -> Linear:
-    """The Jacobian of the map at `point`, over the coordinates that act on it."""
+    """The Jacobian of the map at `point`, along the directions that act on it."""
     nominal: dict[int, Vector] = {}
 
     def remember(count: int, state: Vector) -> bool:
@@ -62,27 +81,25 @@ def linearised(map_: LiftedMap, point: Vector) -> Linear:
     image = map_(point, remember)
     assert image is not None
     taken, columns, errors = [], [], []
-    for j in map_.free:
-        d = STEP * max(1.0, abs(point[j]))
+    for along in map_.directions(point):
+        d = STEP * max(1.0, float(np.abs(point[along != 0.0]).max()))
         moved = []
         for sign in (1.0, -1.0):
-            shifted = point.copy()
-            shifted[j] += sign * d
-            width = shifted[j] - point[j]
+            shifted = point + sign * d * along
+            width = along @ (shifted - point)
             found = map_(shifted, lost)
             moved.append(image * 0.0 if found is None else (found - image) / width)
         forward, backward = moved
         if forward.any() or backward.any():
-            taken.append(j)
+            taken.append(along)
             columns.append((forward + backward) / 2)
             errors.append((forward - backward) / 2)
     if not taken:
         raise AssertionError("a map without a state")
-    chosen = np.array(taken, dtype=np.intp)
-    A, E = np.stack(columns, axis=1), np.stack(errors, axis=1)
-    kept = ~_constant(A[chosen], point[chosen] == image[chosen])
-    chosen = chosen[kept]
-    return Linear(point, image, chosen, A[chosen][:, kept], E[chosen][:, kept])
+    V = np.stack(taken, axis=1)
+    A, E = V.T @ np.stack(columns, axis=1), V.T @ np.stack(errors, axis=1)
+    kept = ~_constant(A, V.T @ (image - point) == 0.0)
+    return Linear(point, image, V[:, kept], A[kept][:, kept], E[kept][:, kept])
 
 
 def _constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -60,7 +60,7 @@ def modes(at: Linear, period: float) -> list[Mode]:
             continue
         v, w = right[:, i], left[:, i].conj()
         overlap = abs(w @ v)
-        shares = np.abs(v * w)
+        shares = np.abs((at.V @ (v * scale)) * (at.V @ (w / scale)))[at.taken]
         uncertainty = float(np.abs(w) @ E @ np.abs(v)) / overlap if overlap else np.inf
         s = np.log(z) / period if z else complex(-np.inf)
         found.append(
@@ -70,7 +70,7 @@ def modes(at: Linear, period: float) -> list[Mode]:
                 float(s.real),
                 float(s.imag),
                 shares / shares.sum() if shares.any() else shares,
-                v * scale,
+                at.V @ (v * scale),
             )
         )
     return sorted(found, key=lambda mode: -abs(mode.z))

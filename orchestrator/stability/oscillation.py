@@ -22,10 +22,10 @@ def traced(map_: LiftedMap, at: Linear, mode: Mode) -> Mode:
     if map_.events == 1:
         return mode
     j = int(np.argmax(mode.participation))
-    largest = np.max(np.abs(mode.vector) / np.maximum(1.0, np.abs(at.point[at.taken])))
-    v = mode.vector * (STEP / largest)
-    rest = _followed(map_, at, at.point, j)
-    paths = [_followed(map_, at, _moved(at, part), j) - rest for part in (v.real, v.imag)]
+    j = int(at.taken[j])
+    v = mode.vector * (STEP / np.max(np.abs(mode.vector) / np.maximum(1.0, np.abs(at.point))))
+    rest = _followed(map_, at.point, j)
+    paths = [_followed(map_, at.point + part, j) - rest for part in (v.real, v.imag)]
     path = np.array([v[j], *(paths[0] + 1j * paths[1])])
     path = path[np.abs(path) > 0]
     if len(path) < 2:
@@ -39,18 +39,12 @@ def traced(map_: LiftedMap, at: Linear, mode: Mode) -> Mode:
     return replace(mode, omega=abs(argument + 2 * np.pi * turns) / map_.period)
 
 
-def _moved(at: Linear, by: Vector) -> Vector:
-    point = at.point.copy()
-    point[at.taken] += by
-    return point
-
-
-def _followed(map_: LiftedMap, at: Linear, point: Vector, j: int) -> Vector:
-    """The coordinate j of those taken after each event."""
+def _followed(map_: LiftedMap, point: Vector, j: int) -> Vector:
+    """The coordinate j after each event."""
     seen: list[float] = []
 
     def watch(count: int, state: Vector) -> bool:
-        seen.append(float(state[at.taken[j]]))
+        seen.append(float(state[j]))
         return False
 
     map_(point, watch, always=True)

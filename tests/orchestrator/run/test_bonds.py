@@ -5,12 +5,16 @@ from __future__ import annotations
 
 import uuid
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.passive import Passive
+from hapticlink.orchestrator.run.energy.bonds import Reader
 from tests.orchestrator.foreign_fmus import python_fmu_of, scene, with_units
 
 SLAVE = """
@@ -159,3 +163,17 @@ min = "1/8192"
         steps.append(experiment.outcome.steps["haptics"])
     assert steps[0] == steps[1]
     assert steps[0].shortest < 0.5 * steps[0].longest
+
+
+def test_a_hold_that_was_restored_reads_the_signals_that_are() -> None:
+    signals = SimpleNamespace(values=np.zeros(2), view=lambda places: None)
+    reader = Reader(signals, [0], np.ones(1))  # type: ignore[arg-type]
+    hold = Passive(HoldContext(1, displacement=reader))
+    saved = hold.saved()
+    hold.restore(saved)
+    signals.values[0] = 5.0
+    for value in vars(hold).values():
+        if isinstance(value, Reader):
+            assert value() == 5.0
+            return
+    raise AssertionError("no reader in the hold")

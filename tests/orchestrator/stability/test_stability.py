@@ -40,6 +40,20 @@ def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
     )
 
 
+def test_a_hanging_and_a_standing_mechanism_move_as_their_linearisations_do() -> None:
+    """A uniform rod of 1 m and 1 kg with 0.01 N.m.s/rad, and the N-four-bar above its pivots, which
+    is singular there: phi'' = a phi, a = g ((N + 1)/2 + N)/((N + 1)/3 + N)."""
+    (hanging,) = hl.stability("pendulum").modes
+    assert hanging.growth == pytest.approx(-0.01 / (2 / 3), rel=1e-5)
+    assert math.hypot(hanging.growth, hanging.omega) == pytest.approx(
+        math.sqrt(1.5 * 9.81), rel=1e-6
+    )
+    standing = hl.stability("n-four-bar")
+    a = 9.81 * (1.5 + 2) / (1.0 + 2)
+    growth = [mode.growth for mode in standing.modes]
+    assert growth == pytest.approx([math.sqrt(a), -math.sqrt(a)], rel=1e-5)
+
+
 @pytest.mark.parametrize(("share", "verdict"), [(0.995, "stable"), (1.005, "unstable")])
 def test_semi_implicit_euler_is_stable_up_to_alpha_4_minus_2_beta(
     share: float, verdict: str
@@ -92,6 +106,41 @@ def test_growth_and_frequency_are_those_of_a_run_across_rates() -> None:
     crossings = np.count_nonzero(np.diff(np.sign((x - x[0])[75:, 2])))
     hertz = crossings / 2 / (run.time("virtual_mechanism.x")[-1] - 2.5)
     assert first.omega / (2 * np.pi) == pytest.approx(hertz, abs=0.15)
+
+
+def test_redundant_closures_are_kept_by_perturbations(tmp_path: Path) -> None:
+    """A bar that hangs on three equal rods, of which two would do (one equation is redundant):
+    phi'' = -g (3 m/2 + M)/(l (m + M)) phi. Nothing dissipates: the radius is 1, though z is not."""
+    rods, bar, length = 0.5, 2.0, 0.8
+    lines = [
+        'title = "a bar on three rods"',
+        "duration = 1.0",
+        "haptics.rate = 512",
+        "[linkage]",
+        'operational_point = { body = "bar" }',
+        "gravity = [0.0, -9.81]",
+        "start = { joint1 = -1.5707963267948966, joint2 = -1.5707963267948966, "
+        "joint3 = -1.5707963267948966, bar = 1.5707963267948966 }",
+        f'[[linkage.body]]\nname = "bar"\nmass = {bar}\ninertia = 0.1\ncenter = [0.5, 0.0]',
+        '[[linkage.joint]]\nname = "bar"\nparent = "rod1"\nchild = "bar"'
+        f"\nat_parent = [{length}, 0.0]",
+    ]
+    for k in (1, 2, 3):
+        lines += [
+            f'[[linkage.body]]\nname = "rod{k}"\nmass = {rods}\ninertia = {rods * length**2 / 12}',
+            f"center = [{length / 2}, 0.0]",
+            f'[[linkage.joint]]\nname = "joint{k}"\nchild = "rod{k}"\nat_parent = [{0.5 * k}, 0.0]',
+        ]
+    for k in (2, 3):
+        ends = f"[[{0.5 * (k - 1)}, 0.0], [{length}, 0.0]]"
+        lines += [f'[[linkage.loop]]\nbodies = ["bar", "rod{k}"]\nat = {ends}']
+    path = tmp_path / "bar.toml"
+    path.write_text("\n".join(lines))
+    found = hl.stability(path)
+    (mode,) = found.modes
+    omega = math.sqrt(9.81 * (1.5 * rods + bar) / (length * (rods + bar)))
+    assert mode.omega == pytest.approx(omega, rel=1e-6)
+    assert found.verdict == "marginal"
 
 
 def test_a_moving_target_and_a_push_into_the_free_have_no_equilibrium() -> None:
