@@ -76,8 +76,10 @@ def _direct() -> Iterator[Job]:
 
 
 def _holds(without: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """Options of each hold from slow to fast, except for holds with the needs `without`."""
-    names = HOLDS.names(lambda kind: kind.needs not in without and not kind.downsamples)
+    """Options of each hold from slow to fast, except for holds with the needs `without`, and for
+    `slope`, which belongs to the velocity of a pose that another hold holds."""
+    apart = (*without, "integral")
+    names = HOLDS.names(lambda kind: kind.needs not in apart and not kind.downsamples)
     found: dict[str, tuple[str, ...]] = {n: (f"hold={n}",) for n in names}
     means = {f"{n}, mean": (*found[n], "downsampling=mean") for n in MEANS if n in found}
     passive = tuple(f"holds.{wrench}=passive" for wrench in WRENCHES)
