@@ -26,7 +26,7 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 
 EVERY = 97
-"""One step in so many is checked: two half steps, a saved state and two reads cost below 5 %. A
+"""One step in so many is checked, which adds two half steps, a saved state and two reads to them. A
 prime, so that checks fall on all phases between two rates."""
 FIRST = 13
 SLOT = 2
