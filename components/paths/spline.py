@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from hapticlink.components.time_signals import LookUp, Rows, TimeSignal, checked
 
@@ -27,6 +26,8 @@ class TimeSpline(TimeSignal):
         self.rows, self.size = rows, data.shape[1] - 1
         if len(rows) < 2:
             return
+        from scipy.interpolate import CubicSpline  # slow to load
+
         times, number = data[:, 0], np.arange(len(rows), dtype=float)
         with np.errstate(all="ignore"):
             cubics = CubicSpline(times, data[:, 1:], bc_type="clamped").c[::-1]

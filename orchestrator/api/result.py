@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hapticlink.orchestrator.api.frame import frame
 from hapticlink.orchestrator.base.faults import unknown
-from hapticlink.orchestrator.results import figures, summary
+from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import Tracking, pose_error, table_of
 
@@ -69,6 +69,8 @@ class Run(Results):
     def figures(self) -> dict[str, Figure]:
         """Matplotlib figures by name, as far as the scene has the signals: `mechanism`,
         `trajectories`, `distance`, `forces`, `contact`, `constraints`, `energies`."""
+        from hapticlink.orchestrator.results import figures  # with casadi, slow to load
+
         return figures.figures(self)
 
     def _table(self, name: str) -> Table:

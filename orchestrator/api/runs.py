@@ -12,7 +12,7 @@ from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import figures, folders, summary, tables
+from hapticlink.orchestrator.results import folders, summary, tables
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -34,13 +34,14 @@ def run(
     options: Options = (),
     *,
     out: str | Path | None = None,
+    figures: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Run a scene, changed by `options` (see `scene`).
 
     The results are returned, and with `out` also written to that folder: a CSV per rate, run.json,
-    plan.txt and figures. They replace those of an earlier run there from the first row on.
-    `progress` is called with the simulated time (s) from time to time.
+    plan.txt and, unless `figures` is false, figures. They replace those of an earlier run there from
+    the first row on. `progress` is called with the simulated time (s) from time to time.
 
     Raises InputFault for invalid input, before anything runs. A fault during the run raises no
     exception: it is the `fault` of the returned Run, which has the results up to then. Ctrl-C
@@ -54,7 +55,7 @@ def run(
             warned = {**found.run, "warnings": list(summary.lines(found))}
             made = Run(None, warned, found.tables)
         else:
-            made = _in_folder(scene, Path(out), options, progress)
+            made = _in_folder(scene, Path(out), options, progress, figures)
         if interrupt.came() or made.run["end"]["reason"] == "interrupted":
             raise RunInterrupted(made)
     return made
@@ -65,6 +66,7 @@ def _in_folder(
     folder: Path,
     options: Options,
     progress: Callable[[float], None] | None,
+    drawn: bool,
 ) -> Run:
     ended = simulate(scene, folder, options, progress)
     if ended.too_large(MOST):
@@ -79,7 +81,7 @@ def _in_folder(
     try:
         run = folders.add(folder, (), warnings)
         if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
-            run = folders.add(folder, _drawn(ended, found))
+            run = folders.add(folder, [*_explained(ended), *(_drawn(ended, found) if drawn else ())])
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None
@@ -89,14 +91,21 @@ def _in_folder(
     return Run(folder, run, found.tables)
 
 
-def _drawn(ended: Experiment, found: Results) -> list[str]:
-    """Writes plan and figures; returns their names. Raises Interrupted and OSError."""
+def _explained(ended: Experiment) -> list[str]:
+    """Writes the plan; returns its file's name. Raises Interrupted and OSError."""
     (ended.folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed
     with (ended.folder / "plan.txt").open("x", encoding="utf-8") as file:
         for line in explain.explain(Plan(ended.system)):
             interrupt.check()
             file.write(f"{line}\n")
-    return ["plan.txt", *figures.save(figures.figures(found), ended.folder)]
+    return ["plan.txt"]
+
+
+def _drawn(ended: Experiment, found: Results) -> list[str]:
+    """Writes the figures; returns their names. Raises Interrupted and OSError."""
+    from hapticlink.orchestrator.results import figures  # with Matplotlib, slow to load
+
+    return figures.save(figures.figures(found), ended.folder)
 
 
 def load(folder: str | Path) -> Run:

@@ -12,6 +12,7 @@ from hapticlink.orchestrator.base.say import say
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, default_folder, options
 from hapticlink.orchestrator.commands.progress import progress
 
+Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 Explain = Annotated[
     bool, Parameter(negative="", help="Print what would run when, from which samples; do not run.")
 ]
@@ -24,6 +25,7 @@ def run(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
+    figures: Figures = True,
     explain: Explain = False,
 ) -> int:
     """Run a scene; write CSV files, run.json, plan.txt, figures to OUT (default runs/<scene>)."""
@@ -37,7 +39,7 @@ def run(
     try:
         read = api.scene(scene, options(set, swap))
         with progress(read.title, read.duration) as told:
-            made = api.run(read, out=folder, progress=told)
+            made = api.run(read, out=folder, figures=figures, progress=told)
     except api.RunInterrupted as ended:
         made = ended.run
     if made.fault:

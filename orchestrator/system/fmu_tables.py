@@ -8,9 +8,8 @@ from dataclasses import replace
 from itertools import chain
 from operator import attrgetter
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from hapticlink.components.component import Component
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.fmi.start_values import Starts, fitting
@@ -18,6 +17,9 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import ForeignFmu, Value
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
+
+if TYPE_CHECKING:
+    from hapticlink.components.component import Component
 
 
 def fmus(

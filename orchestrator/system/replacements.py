@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
-from hapticlink.components.component import Component
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.faults import InputFault
@@ -14,6 +14,9 @@ from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.fmu_files import settled
 from hapticlink.orchestrator.system.system import Connection, Fmu, Replacement
+
+if TYPE_CHECKING:
+    from hapticlink.components.component import Component
 
 
 def replaced(scene: Scene, timeline: Timeline) -> dict[str, Component]:

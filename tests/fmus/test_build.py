@@ -18,8 +18,8 @@ import fmpy
 import pytest
 
 from hapticlink.components.component import Variable
-from hapticlink.fmus import FmuError, build
-from hapticlink.fmus.errors import UnsupportedPlatform
+from hapticlink.fmus.build import build
+from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from tests.fmus import sample_components
 
 
@@ -32,7 +32,7 @@ def test_same_component_same_bytes(fmus, tmp_path):
 def test_same_bytes_from_another_process(fmus, tmp_path):
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "import sample_components\nfrom hapticlink.fmus import build\n"
+        "import sample_components\nfrom hapticlink.fmus.build import build\n"
         "build(sample_components.spring(), sys.argv[2])"
     )
     here = str(Path(__file__).parent)

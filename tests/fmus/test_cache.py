@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.fmus import build, cache, cached, check_fmu
+from hapticlink.fmus import cache
+from hapticlink.fmus.build import build
+from hapticlink.fmus.cache import cached
+from hapticlink.fmus.check import check_fmu
 from tests.fmus import sample_components
 
 MATERIAL = {"scene": {"mass": 1.0, "rates": [512, 30]}}

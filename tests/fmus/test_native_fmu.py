@@ -36,10 +36,10 @@ from hapticlink.components.specs.linkage import (
     PDDrive,
 )
 from hapticlink.components.specs.paths import CoordinateSine, Interpolation
-from hapticlink.fmus import FmuError, build_native, check_fmu
 from hapticlink.fmus.blocks import component
-from hapticlink.fmus.build import build
-from hapticlink.fmus.check import session
+from hapticlink.fmus.build import build, build_native
+from hapticlink.fmus.check import check_fmu, session
+from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.native import compile_library, compiler
 from hapticlink.fmus.native.source import component_header
 from hapticlink.orchestrator import open_scene

@@ -16,8 +16,8 @@ from fmpy.fmi1 import FMICallException
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Block, Variable
 from hapticlink.components.specs.linkage import Mechanism
-from hapticlink.fmus import build, check_fmu
-from hapticlink.fmus.check import session
+from hapticlink.fmus.build import build
+from hapticlink.fmus.check import check_fmu, session
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
 from tests.mechanisms import five_bar

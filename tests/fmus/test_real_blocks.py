@@ -5,7 +5,7 @@ from __future__ import annotations
 import fmpy
 import pytest
 
-from hapticlink.fmus import check_fmu
+from hapticlink.fmus.check import check_fmu
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline

@@ -11,7 +11,8 @@ import pytest
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.ports import Power, Spring
-from hapticlink.fmus import FmuError, build, build_native
+from hapticlink.fmus.build import build, build_native
+from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.description import describe
 from tests.orchestrator.foreign_fmus import edited, python_fmu
