@@ -15,14 +15,14 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache
-from importlib.metadata import version
+from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import hapticlink.components
 from hapticlink.components import registry
+from hapticlink.fmus.versions import version
 
 LONGEST = 3600.0
 """Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
@@ -95,7 +95,8 @@ def cached(
     if root is not None:
         place = root / key(key_material)
         for path in place.glob("[!.]*.fmu"):
-            if _is_whole(path):
+            stat = path.stat()
+            if _is_whole(path, stat.st_mtime_ns, stat.st_size):
                 return path
     room.mkdir(parents=True, exist_ok=True)
     making = Path(tempfile.mkdtemp(dir=room))
@@ -137,7 +138,9 @@ def _clear(root: Path) -> None:
                 left.unlink()
 
 
-def _is_whole(path: Path) -> bool:
+@lru_cache(64)
+def _is_whole(path: Path, changed_ns: int, size: int) -> bool:
+    """Whether a file can be read to its end: asked once as long as it does not change."""
     try:
         with zipfile.ZipFile(path) as archive:
             return archive.testzip() is None and "modelDescription.xml" in archive.namelist()

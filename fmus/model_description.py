@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
-from importlib.metadata import version
 from xml.etree import ElementTree as ET
 
 import casadi as ca
@@ -25,6 +24,7 @@ from hapticlink.components.component import Component, Variable
 from hapticlink.components.ports import Power, Spring
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.units import base_unit
+from hapticlink.fmus.versions import version
 
 CAPABILITIES = {
     "canHandleVariableCommunicationStepSize": "true",

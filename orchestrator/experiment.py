@@ -66,19 +66,25 @@ def simulate(
     folder: Path | str,
     options: Options = (),
     progress: Progress | None = None,
+    csv: bool = True,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
     Raises InputFault before the run for invalid input, and Interrupted for a signal before the run.
     A fault during the run is in the outcome, and its results up to then are kept. Results of an
-    earlier run in `folder` are removed once the first rows of this one are written.
+    earlier run in `folder` are removed once the first rows of this one are written. Without `csv`
+    the tables stay in the binary form in which a run writes them.
     """
     with interrupt.held():
-        return _simulated(scene, Path(folder), options, progress)
+        return _simulated(scene, Path(folder), options, progress, csv)
 
 
 def _simulated(
-    scene: str | Path | Scene, folder: Path, options: Options, progress: Progress | None
+    scene: str | Path | Scene,
+    folder: Path,
+    options: Options,
+    progress: Progress | None,
+    csv: bool,
 ) -> Experiment:
     begin = perf_counter()
     read = open_scene.load(scene, options)
@@ -90,7 +96,7 @@ def _simulated(
         alone = isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path]
         risky = any(name not in alone for name in foreign)
-        with RunFolder(folders.ensure(folder), story, at_once=bool(foreign)) as results:
+        with RunFolder(folders.ensure(folder), story, bool(foreign), csv) as results:
             with crash_monitor.watched(folder) if risky else nullcontext():
                 outcome = run(plan, results, progress)
             ending = _ending(system, outcome, build_time)

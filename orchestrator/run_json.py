@@ -5,9 +5,9 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any
 
+from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.plan import Plan

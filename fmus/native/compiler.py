@@ -12,12 +12,13 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import fmpy
 
 from hapticlink.fmus.errors import CompilerError, FmuError
+from hapticlink.fmus.versions import version
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
 TARGETS = {

@@ -40,7 +40,7 @@ def run(
     """Run a scene, changed by `options` (see `scene`).
 
     The results are returned, and with `out` also written to that folder: a CSV per rate, run.json,
-    plan.txt and, unless `figures` is false, figures. They replace those of an earlier run there from
+    plan.txt and, where `figures` is true, figures. They replace those of an earlier run there from
     the first row on. `progress` is called with the simulated time (s) from time to time.
 
     Raises InputFault for invalid input, before anything runs. A fault during the run raises no
@@ -66,7 +66,7 @@ def _in_folder(
     folder: Path,
     options: Options,
     progress: Callable[[float], None] | None,
-    drawn: bool,
+    figures: bool,
 ) -> Run:
     ended = simulate(scene, folder, options, progress)
     if ended.too_large(MOST):
@@ -81,7 +81,8 @@ def _in_folder(
     try:
         run = folders.add(folder, (), warnings)
         if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
-            run = folders.add(folder, [*_explained(ended), *(_drawn(ended, found) if drawn else ())])
+            run = folders.add(folder, _explained(ended))
+            run = folders.add(folder, _drawn(ended, found) if figures else ())
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import shutil
 import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
@@ -18,10 +17,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from fmpy import extract, fmi2
+from fmpy import fmi2
 
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi import messages
+from hapticlink.orchestrator.fmi import kept, messages
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
@@ -57,7 +56,7 @@ class InProcess(Instance):
     def _load(self) -> None:
         before = os.getcwd()
         try:
-            extract(str(self.description.path), self._folder)
+            self._folder = kept.unpack(self.description, self._folder)
             self.slave = self._instantiate()
             self.holds_python = hasattr(self.slave.dll, "finalizePythonInterpreter")
         except Exception as error:  # FMPy raises bare Exception
@@ -346,4 +345,4 @@ class InProcess(Instance):
             messages.closed(self._key)
             # pythonfmu puts resources/ on sys.path for good.
             sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]
-            shutil.rmtree(self._folder, ignore_errors=True)
+            kept.leave(self._folder)

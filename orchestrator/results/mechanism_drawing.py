@@ -117,14 +117,12 @@ class _Drawing:
     def _outline(self, body: Body) -> Pose:
         """The corners of the convex hull of what is attached, (k, 2): two for points on a line, one
         for a single point."""
-        from scipy.spatial import ConvexHull
-
         found = np.unique(np.round(np.array(list(self._attached(body.name))), 9), axis=0)
         if len(found) <= 2:
             return found
         _, sizes, (direction, _) = np.linalg.svd(found - found.mean(axis=0), full_matrices=False)
         if sizes[1] > 1e-6 * sizes[0]:
-            return found[ConvexHull(found).vertices]
+            return _hull(found)
         along = found @ direction
         return found[[along.argmin(), along.argmax()]]
 
@@ -306,6 +304,27 @@ def _device(axes: Axes, device: Device, pose: Pose) -> None:
         for i, arm in enumerate(arms):
             label = "arms of the device" if i == 0 else None
             axes.plot(*arm.T, color="0.75", lw=1.5, marker="o", ms=3, zorder=0, label=label)
+
+
+def _hull(points: Pose) -> Pose:
+    """The corners of the convex hull of points that are sorted by x and then y, anticlockwise, by
+    Andrew's monotone chain (Information Processing Letters 9, 1979, 216). scipy.spatial, which has
+    one, takes as long to load as a figure to draw."""
+
+    def chain(ordered: Pose) -> list[Pose]:
+        kept: list[Pose] = []
+        for point in ordered:
+            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
+                kept.pop()
+            kept.append(point)
+        return kept[:-1]
+
+    return np.array(chain(points) + chain(points[::-1]))
+
+
+def _turn(a: Pose, b: Pose, c: Pose) -> float:
+    """Twice the area of the triangle a, b, c, positive where it turns anticlockwise."""
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def _rgb(color: str) -> tuple[float, float, float]:

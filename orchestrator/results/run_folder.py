@@ -30,13 +30,17 @@ class RunFolder:
     A context manager that records how the run ended in run.json even when an exception or a second
     signal, which ends the process at once, breaks it off. `published`: the folder has the results
     of this run. at_once: whether each row has to be written before the FMUs are called again, since
-    one of them may crash or hang.
+    one of them may crash or hang. csv: whether `finish` makes the CSV of the rows.
     """
 
     def __init__(
-        self, folder: Path, story: dict[str, Any] | None = None, at_once: bool = False
+        self,
+        folder: Path,
+        story: dict[str, Any] | None = None,
+        at_once: bool = False,
+        csv: bool = True,
     ) -> None:
-        self.folder, self.published, self._at_once = folder, False, at_once
+        self.folder, self.published, self._at_once, self._csv = folder, False, at_once, csv
         self._story = story
         self._recorders: list[Recorder] = []
 
@@ -68,7 +72,7 @@ class RunFolder:
     def finish(self) -> None:
         """Make the CSV of all clocks. Raises OSError, as on a full disk; the rows can be read
         nevertheless."""
-        for recorder in self._recorders:
+        for recorder in self._recorders if self._csv else ():
             recorder.finish()
 
     @property

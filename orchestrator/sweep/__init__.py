@@ -11,6 +11,7 @@ from pathlib import Path
 from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.fmi import kept
 from hapticlink.orchestrator.sweep import cluster, job, pool, table
 from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.row import DIED, INTERRUPTED, REFUSED, Row, failed, measure
@@ -42,13 +43,15 @@ def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row
         return failed(DIED, "this worker has another version of hapticlink or of what it uses")
     with tempfile.TemporaryDirectory(dir=room) if room else temporary_folders.room() as folder:
         try:
-            experiment = simulate(each.scene, folder)
+            experiment = simulate(each.scene, folder, csv=False)
             row, fault = measure(experiment), experiment.outcome.fault
             return row if fault is None or _of_scene(fault) else row | {"end": _retried(fault)}
         except Fault as fault:
             return failed(REFUSED if _of_scene(fault) else _retried(fault), str(fault))
         except Exception as error:  # the other runs of the sweep go on
             return failed(DIED, f"{type(error).__name__}: {error}")
+        finally:
+            kept.trim()
 
 
 def _of_scene(fault: Fault) -> bool:

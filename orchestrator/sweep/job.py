@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from platform import python_version
 from typing import Any
@@ -16,6 +15,7 @@ from pydantic_core import to_json
 import hapticlink.components
 import hapticlink.fmus
 import hapticlink.orchestrator
+from hapticlink.fmus.versions import version
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import Fault, InputFault

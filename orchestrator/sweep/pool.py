@@ -24,6 +24,7 @@ from typing import Any
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.process_end import leave_threads
+from hapticlink.orchestrator.fmi import kept
 from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.row import DIED, Row, failed
 
@@ -78,7 +79,8 @@ class _Worker(SpawnProcess):
             sys.modules["__main__"] = main
 
     def run(self) -> None:
-        super().run()
+        with kept.unpacked_once():
+            super().run()
         leave_threads(0)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.fmi.kept import described
 from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.records import Wire
@@ -30,7 +30,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     problems: list[Problem] = []
     of = timeline.of
     blocks = replacements.replaced(scene, timeline)
-    ours = tuple(Fmu(b.name, describe(files[b.name]), of[b.name]) for b in loop_blocks(scene))
+    ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in loop_blocks(scene))
     foreign = (
         Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
         for fmu, description, starts in fmu_tables.fmus(scene, files, blocks, problems)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.fmi.kept import described
 from hapticlink.orchestrator.fmi.start_values import Starts, fitting
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import ForeignFmu, Value
@@ -57,7 +58,7 @@ def fmus(
 
 def _described(path: FilePath, fmu: ForeignFmu) -> Description:
     """The FMU with the sizes that `start` gives it by structural parameters. Raises InputFault."""
-    found = describe(path)
+    found = described(path)
     structural = {s.name for s in found.scalars if s.structural}
     sizes = {n: v for n, v in fmu.start.items() if n in structural and type(v) is int}
     return describe(path, sizes) if sizes else found
