@@ -21,7 +21,6 @@ import math
 from collections.abc import Iterator
 
 import casadi as ca
-from scipy.optimize import brentq
 
 from hapticlink.components.component import Variable
 from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
@@ -33,6 +32,7 @@ from hapticlink.components.specs.linkage import Limits, Linkage
 
 def damping_ratio(restitution: float) -> float:
     """z with e(z) = restitution, from 0.01 to 1."""
+    from scipy.optimize import brentq  # slow to load
 
     def excess(z: float) -> float:
         if z == 1:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import eigh, null_space
 
 from hapticlink.components.component import Component
 from hapticlink.components.dynamics.light_bodies import groups, own_inertia
@@ -32,6 +31,8 @@ def require_inertia(component: Component, model: LinkageModel) -> None:
     bodies, n = model.linkage.body, model.q.numel()
     if all(b.mass and b.inertia for b in bodies):
         return
+    from scipy.linalg import eigh, null_space  # slow to load
+
     start = component.initialize(component.start_inputs, component.start_parameters)[:n]
     poses = ca.vertcat(
         *(ca.vertcat(model.centers[b.name], model.frames[b.name].angle) for b in bodies)

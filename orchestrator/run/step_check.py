@@ -128,10 +128,11 @@ class StepCheck:
             return None
         found = self.found[: self.count.value]
         share = found / np.where(self.scales > 0, self.scales, 1.0)
+        ordered = np.sort(share.max(axis=1)).tolist()  # np.median loads masked arrays
         k, port = np.unravel_index(int(share.argmax()), share.shape)
         return StepErrors(
             checked=len(share),
-            median=float(np.median(share.max(axis=1))),
+            median=(ordered[(len(share) - 1) // 2] + ordered[len(share) // 2]) / 2,
             largest=float(share[k, port]),
             output=self._ports[port],
             time=float(self.times[k]),
