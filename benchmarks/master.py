@@ -31,7 +31,7 @@ PYTHON = "hapticlink, loop in Python"
 Row = dict[str, float]
 
 
-def pass_on(step_s: float, signals: int = 3) -> Component:
+def pass_on(signals: int = 3) -> Component:
     """y = u/2 + 1."""
     block = Block(inputs=[Variable("u", (signals,), "m")], outputs=[Variable("y", (signals,), "m")])
     output = {"y": block.u["u"] / 2 + 1}

@@ -24,6 +24,9 @@ from hapticlink.components.ports import Kind, Power, Spring
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
 Timing = Literal["continuous", "sampled"]
+STEP_SIZE, FRAME_SIZE = "step_size", "frame_size"
+"""Parameters that a run sets, where a block has them: the longest communication step (s) of the
+block, and of the graphics copy. No block is built for a step size."""
 Variability = Literal["fixed", "tunable"]
 
 
@@ -34,8 +37,8 @@ class Variable:
     unit: an SI unit in FMI's notation ("m", "N.m", "rad/s", "1/kg"; "1" for none), or one for each
     entry. start: one value for all entries or one for each. variability: of parameters. kind: of
     outputs. derivative_of: the output of which this output is the time derivative. max: the
-    magnitude of an output above which the run has diverged, None without such a bound. power: of
-    inputs, their power port.
+    magnitude of an output above which the run has diverged, or of `step_size` the longest that the
+    equations suit; None without such a bound. power: of inputs, their power port.
 
     `starts`, `units` and `names` raise ValueError where sizes do not agree.
     """
@@ -96,7 +99,8 @@ MOBILITY = ("1/kg", "1/kg", "1/(kg.m)") * 2 + ("1/(kg.m)", "1/(kg.m)", "1/(kg.m2
 
 
 class Signals(Mapping[str, ca.SX]):
-    """CasADi symbols of a list of variables, by name and as one flat column `vector`. Raises
+    """CasADi symbols of a list of variables, by name and as one flat column `vector`, and names for
+    expressions of them. Raises
     ValueError for a name that is declared twice."""
 
     def __init__(self, prefix: str, variables: Iterable[Variable]) -> None:
@@ -112,6 +116,13 @@ class Signals(Mapping[str, ca.SX]):
                 flat = ca.reshape(flat, v.shape[1], v.shape[0]).T
             self._by_name[v.name] = flat
             offset += v.size
+
+    def define(self, name: str, value: ca.SX) -> None:
+        """Gives a name to an expression of these symbols. Raises ValueError for one that is
+        taken."""
+        if name in self._by_name:
+            raise ValueError(f"`{name}` is declared twice")
+        self._by_name[name] = value
 
     def __getitem__(self, name: str) -> ca.SX:
         return self._by_name[name]

@@ -21,14 +21,11 @@ Starts = Mapping[str, tuple[float, ...]]
 Packaging = Literal["python", "native"]
 
 
-def component(
-    name: str, settings: Settings, step_size: float, starts: Starts = MappingProxyType({})
-) -> Component:
-    """The component of the block `name` with `settings`; step_size (s) is its communication step
-    size, `starts` replace start values of its parameters. Raises FmuError if the settings give no
-    component."""
+def component(name: str, settings: Settings, starts: Starts = MappingProxyType({})) -> Component:
+    """The component of the block `name` with `settings`; `starts` replace start values of its
+    parameters. Raises FmuError if the settings give no component."""
     try:
-        made = BLOCKS[name](step_size, **settings)
+        made = BLOCKS[name](**settings)
     except (ValueError, ArithmeticError) as error:
         raise FmuError(f"{name}: {error}") from error
     from hapticlink.components.component import Component  # loads casadi, as the block has done
@@ -44,8 +41,7 @@ def build_block(
     settings: Settings,
     room: Path,
     *,
-    stop_time: float,
-    step_size: float,
+    experiment: Mapping[str, float] = MappingProxyType({}),
     packaging: Packaging = "python",
     platforms: Sequence[str] = (),
     starts: Starts = MappingProxyType({}),
@@ -53,16 +49,15 @@ def build_block(
     """The path of the block's FMU: in the cache, or built in `room` where the cache is off.
 
     settings: the block's own, by name; starts: start values that replace those of its parameters.
-    stop_time (s): of the default experiment. step_size (s): the communication step size. platforms:
-    those of a native FMU, by default this machine's. Raises FmuError if the settings give no FMU,
+    experiment: stop_time and step_size (s) of the default experiment. platforms: those of a native
+    FMU, by default this machine's. Raises FmuError if the settings give no FMU,
     CompilerError if it cannot be compiled.
     """
-    experiment = {"stop_time": stop_time, "step_size": step_size}
 
     def make(folder: Path) -> Path:
         from hapticlink.fmus.build import build, build_native
 
-        made = component(name, settings, step_size, starts)
+        made = component(name, settings, starts)
         if packaging == "python":
             return build(made, folder, **experiment)
         return build_native(made, folder, platforms=platforms, **experiment)

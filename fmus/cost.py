@@ -20,10 +20,9 @@ class Cost:
     outputs: Mapping[str, int]
 
 
-def cost(name: str, settings: Mapping[str, Any], step_size: float) -> Cost:
-    """The cost of the block `name` with `settings`; step_size (s) is its communication step size.
-    Raises FmuError if they give no component."""
-    made = component(name, settings, step_size)
+def cost(name: str, settings: Mapping[str, Any]) -> Cost:
+    """The cost of the block `name` with `settings`. Raises FmuError if they give no component."""
+    made = component(name, settings)
     return Cost(
         step=made.step.n_instructions() * made.substeps,
         output=made.output.n_instructions(),

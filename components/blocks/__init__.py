@@ -1,8 +1,8 @@
 """The blocks, one FMU a file; `BLOCKS` holds them by the names that a scene uses.
 
-A block is a function that returns a component. Its first argument is the communication step size
-(s); the others are its settings, whose names and annotations define the keys of a scene. The
-functions here import their equations when they are called, so that reading a scene does not.
+A block is a function that returns a component. Its arguments are its settings, whose names and
+annotations define the keys of a scene; step sizes are none of them, but parameters (component.py).
+The functions here import their equations when they are called, so that reading a scene does not.
 """
 
 from __future__ import annotations
@@ -27,15 +27,17 @@ from hapticlink.components.specs.quantities import (
 if TYPE_CHECKING:
     from hapticlink.components.component import Component
 
+FRAME = 1 / 30
+"""Where `frame_size` (s) starts, which a run sets."""
+
 
 def _virtual_mechanism(
-    step_s: float,
     linkage: Linkage,
     mechanism: Mechanism,
     directions: Directions | None = None,
     contacts: Contacts | None = None,
     length_scale: float | None = None,
-    frame_s: float | None = None,
+    local_model: bool = False,
 ) -> Component:
     from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 
@@ -44,14 +46,12 @@ def _virtual_mechanism(
         mechanism,
         directions,
         contacts,
-        step_s=step_s,
         length_scale=length_scale,
-        frame_s=frame_s,
+        frame_s=FRAME if local_model else None,
     )
 
 
 def _virtual_environment(
-    step_s: float,
     linkage: Linkage,
     graphics: GraphicsCopy,
     directions: Directions | None = None,
@@ -66,15 +66,13 @@ def _virtual_environment(
     )
 
 
-def _haptic_device(step_s: float, device: Device) -> Component:
+def _haptic_device(device: Device) -> Component:
     from hapticlink.components.blocks.haptic_device import haptic_device
 
     return haptic_device(device)
 
 
-def _controller(
-    step_s: float, controller: Controller, linkage: Linkage, directions: Directions
-) -> Component:
+def _controller(controller: Controller, linkage: Linkage, directions: Directions) -> Component:
     from hapticlink.components.blocks import controller as block
     from hapticlink.components.linkage.parameters import mean_link_length
 
@@ -84,20 +82,19 @@ def _controller(
     return block.controller(controller, length_scale)
 
 
-def _hand(step_s: float, hand: Hand) -> Component:
+def _hand(hand: Hand) -> Component:
     from hapticlink.components.blocks import hand as block
 
     return block.hand(hand)
 
 
-def _discrete_equivalent(step_s: float, rule: str) -> Component:
+def _discrete_equivalent(rule: str) -> Component:
     from hapticlink.components.blocks.discrete_equivalent import discrete_equivalent
 
     return discrete_equivalent(rule)
 
 
 def _virtual_wall(
-    step_s: float,
     stiffness: LinearStiffness,
     damping: LinearDamping | None = None,
     position: Position = 0.0,
@@ -108,7 +105,6 @@ def _virtual_wall(
     from hapticlink.components.blocks.virtual_wall import virtual_wall
 
     return virtual_wall(
-        step_s,
         stiffness,
         damping,
         position=position,
@@ -122,10 +118,7 @@ def _misfit(part: Any) -> str:
     """Why a part is no block, "" if it is one."""
     if why := no_function(part):
         return why
-    arguments = [*inspect.signature(part).parameters.values()]
-    if not arguments:
-        return "takes no communication step size"
-    for a in arguments[1:]:
+    for a in inspect.signature(part).parameters.values():
         if a.kind not in (a.POSITIONAL_OR_KEYWORD, a.KEYWORD_ONLY) or a.annotation is a.empty:
             return f"has an argument {a}: a setting has a name and an annotation"
     return ""

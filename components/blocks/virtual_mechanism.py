@@ -17,7 +17,13 @@ from dataclasses import dataclass
 import casadi as ca
 
 from hapticlink.components import forces, integrators, time_signals
-from hapticlink.components.component import WRENCH, Block, Component, Variable
+from hapticlink.components.blocks.step_defaults import StepDefaults
+from hapticlink.components.component import (
+    WRENCH,
+    Block,
+    Component,
+    Variable,
+)
 from hapticlink.components.contact import contact_forces, joint_limits, located_events
 from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
@@ -26,11 +32,9 @@ from hapticlink.components.contact.located_events import LocatedEvents
 from hapticlink.components.contact.unilateral import AllOneSidedForces, OneSidedForces
 from hapticlink.components.dynamics import (
     closure_diagnostics,
-    friction_scale,
     further_points,
     joint_ports,
     local_model,
-    stabilization,
     starting_friction,
 )
 from hapticlink.components.dynamics.articulated_body import TreeInertia
@@ -69,24 +73,26 @@ def virtual_mechanism(
     directions: Directions | None = None,
     contacts: Contacts | None = None,
     *,
-    step_s: float,
+    step_s: float | None = None,
     length_scale: float | None = None,
     frame_s: float | None = None,
 ) -> Component:
     """The FMU `virtual_mechanism`. With `directions` it has its own Lambda_inv and P_c as outputs;
     with frame_s (s) it is the local model (B.15), with D, W, w and J_h as inputs, held for a frame.
 
-    step_s (s), the communication step size, sets the default Baumgarte alpha; length_scale (m) is L
-    where `directions` does not give it. Raises AssemblyError where a loop does not close,
-    MasslessError where a massless body is free to move, ValueError for an unknown method, for a
-    formulation that does not fit the other settings and for friction that is too stiff.
+    The parameter `step_size` starts at step_s (s), and `frame_size` at frame_s: defaults depend on
+    them (step_defaults.py). length_scale (m) is L where `directions` does not give it. Raises
+    AssemblyError where a loop does not close, MasslessError where a massless body is free to move,
+    ValueError for an unknown method, for a formulation that does not fit the other settings and for
+    friction too stiff for step_s.
     """
     independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
-    linkage = friction_scale.resolved(linkage, mechanism, step_s / mechanism.substeps)
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     parts = _Parts(linkage, mechanism, directions, contacts, frame_s)
-    block = _block(parts, step_s / mechanism.substeps, length_scale)
+    defaults = StepDefaults(linkage, mechanism, contacts, step_s, frame_s)
+    block = _block(parts, defaults, length_scale)
+    defaults.define(block.p)
     signals = drives.signals(linkage)
     tabled = ca.SX.sym("tabled", 2 * len(signals))
     at = block.x["q"], block.x["qd"]
@@ -164,7 +170,7 @@ class _Parts:
         return bool(self.contacts) or self.linkage.limited
 
 
-def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
+def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) -> Block:
     """The variables of the parts."""
     linkage, directions, contacts = parts.linkage, parts.directions, parts.contacts
     inputs = [
@@ -177,10 +183,8 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
             power=Power("x", sign=-1.0),
         ),
     ]
-    baumgarte, period = stabilization.gains(parts.mechanism.integrator), step_s
-    if parts.frame_s:
-        baumgarte, period = stabilization.HELD, parts.frame_s
-    parameters = mechanism_parameters(linkage, parts.mechanism, baumgarte, period)
+    parameters = mechanism_parameters(linkage, parts.mechanism, defaults.baumgarte.beta)
+    parameters += defaults.parameters
     outputs = motion_outputs(linkage)
     inputs += further_points.inputs(linkage) + joint_ports.inputs(linkage)
     outputs += further_points.outputs(linkage, directions is not None)
@@ -197,7 +201,7 @@ def _block(parts: _Parts, step_s: float, length_scale: float | None) -> Block:
         parameters += joint_limits.parameters(linkage)
         outputs.append(contact_forces.wrench_output())
     if contacts:
-        parameters += contact_forces.contact_parameters(linkage, contacts, step_s)
+        parameters += contact_forces.contact_parameters(linkage, contacts)
         outputs.append(contact_forces.gap_output())
         memory += contact_forces.states(linkage, contacts)
         if contacts.detection == "graphics":

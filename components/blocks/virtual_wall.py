@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.component import Block, Component, Variable
+from hapticlink.components.component import STEP_SIZE, Block, Component, Variable
 
 
 def virtual_wall(
-    period_s: float,
     stiffness: float,
     damping: float | None,
     *,
@@ -22,12 +21,14 @@ def virtual_wall(
     quantum: float | None,
     unilateral: bool,
     measured_velocity: bool,
+    step_s: float = 1e-3,
 ) -> Component:
     """The FMU `virtual_wall`, sampled: F of t_k from the inputs at t_k.
 
-    period_s: T (s). stiffness: K (N/m). damping: B (N.s/m), None without a damper. position: x_w
-    (m). quantum: of the encoder (m), whose reading is rounded down to a whole number of them; None
-    reads x exactly, and so does the parameter 0. The backward difference starts with v = 0.
+    stiffness: K (N/m). damping: B (N.s/m), None without a damper. position: x_w (m). quantum: of
+    the encoder (m), whose reading is rounded down to a whole number of them; None reads x exactly,
+    and so does the parameter 0. The backward difference starts with v = 0; its T is the parameter
+    `step_size`, which starts at step_s (s).
     """
     differenced = damping is not None and not measured_velocity
     inputs = [Variable("x", (), "m", description="position of the device")]
@@ -42,7 +43,7 @@ def virtual_wall(
     if quantum is not None:
         parameters += [Variable("quantum", (), "m", quantum, "resolution of the encoder")]
     if differenced:
-        parameters += [Variable("period", (), "s", period_s, "T of the difference", "fixed")]
+        parameters += [Variable(STEP_SIZE, (), "s", step_s, "T of the difference", "fixed")]
     block = Block(
         inputs=inputs,
         parameters=parameters,
@@ -53,7 +54,7 @@ def virtual_wall(
     x = _reading(u["x"], p["quantum"]) if quantum is not None else u["x"]
     F = -p["stiffness"] * (x - p["position"])
     if differenced:
-        F -= p["damping"] * (x - block.x["x_last"]) / p["period"]
+        F -= p["damping"] * (x - block.x["x_last"]) / p[STEP_SIZE]
     elif damping is not None:
         F -= p["damping"] * u["v"]
     if unilateral:

@@ -53,25 +53,25 @@ def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
     return Variable("contacts", (rows, len(COLUMNS)), COLUMNS, description=text, kind="table")
 
 
-def contact_parameters(linkage: Linkage, contacts: Contacts, step_s: float) -> list[Variable]:
-    """Parameters of the block that evaluates the contact forces in integration steps of step_s
-    (s)."""
+def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
+    """Parameters of the block that evaluates the contact forces."""
     return [
         *detection_parameters(linkage, contacts, contacts.detection == "haptics"),
         Variable("k_contact", (), "N/m", contacts.stiffness, "stiffness of a contact"),
         Variable("b_contact", (), "N.s/m", contacts.damping, "damping of a contact"),
-        *_friction(contacts, step_s),
+        *_friction(contacts),
     ]
 
 
-def _friction(contacts: Contacts, step_s: float) -> list[Variable]:
+def _friction(contacts: Contacts) -> list[Variable]:
     if contacts.friction is None:
         return []
-    text = "damping over stiffness of a contact that sticks"
-    return [
-        Variable("mu_contact", (), "1", contacts.friction, "friction of a contact"),
-        Variable("tau_contact", (), "s", dry_friction.LAG * step_s, text),
-    ]
+    return [Variable("mu_contact", (), "1", contacts.friction, "friction of a contact")]
+
+
+def lag(h: ca.SX) -> ca.SX:
+    """tau (s), damping over stiffness of a contact that sticks, for integration steps of h."""
+    return dry_friction.LAG * h
 
 
 def states(linkage: Linkage, contacts: Contacts) -> list[Variable]:

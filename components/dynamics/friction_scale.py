@@ -9,13 +9,15 @@ by default
 for steps of h: all dampers together have a pole at 1/(4 h) or slower, and a joint that sticks has a
 damping ratio of sqrt(f A d)/(2 v_f) = 1/2 for N = 1, as it has where only one of both is given and
 this is not stiffer. So friction approaches Coulomb's law with h. Given values that an explicit
-method cannot integrate at the start pose are refused.
+method cannot integrate at the start pose bound the step.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any, NoReturn
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -28,59 +30,77 @@ from hapticlink.components.forces.dry_friction import LAG
 from hapticlink.components.forces.friction import rubbing
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.specs.linkage import Linkage, Mechanism
+from hapticlink.components.specs.linkage import Linkage
 
 LEAST = 1e-9  # rad/s or m/s, of a default v_f
 OPENED = 0.25  # share of the mobility with open loops
 STABLE = 2.0  # |pole| h up to which the explicit methods are stable
-IMPLICIT = "linearly-implicit"
 
 
-def resolved(linkage: Linkage, mechanism: Mechanism, step_s: float) -> Linkage:
-    """The linkage with the default speeds and deflections of its friction for integration steps of
-    step_s (s). Raises ValueError for given ones that are too stiff for the method."""
-    rubs = rubbing(linkage)
-    if not rubs:
-        return linkage
-    joints, loops = {j.name: j for j in linkage.joint}, list(linkage.loop)
-    for j, (closed, opened) in zip(rubs, _mobilities(linkage, rubs), strict=True):
-        if mechanism.integrator != IMPLICIT:
-            _require_slow(j, closed, step_s)
-        scaled = _scaled(j.joint, max(closed, OPENED * opened), len(rubs), step_s)
-        if j.cut is None:
-            joints[j.name] = scaled
-        else:
-            loops[j.cut] = scaled
-    return replace(linkage, joint=tuple(joints.values()), loop=tuple(loops))
+@dataclass(frozen=True)
+class Scale:
+    """A joint with friction: its mobility with closed loops, A, and N."""
+
+    name: str
+    joint: Any
+    closed: float
+    A: float
+    N: int
+
+    @property
+    def poles(self) -> Iterator[tuple[str, float]]:
+        """The poles (1/s) of a joint that sticks with the values that are given, each with them."""
+        d, v_f = self.joint.friction_deflection, self.joint.friction_speed
+        pull = (self.joint.friction or 0.0) * self.closed
+        if v_f:
+            yield f"joint `{self.name}`: `friction_speed` = {v_f!r}", pull / v_f
+        if d:
+            pole = max((pull / d) ** 0.5, (v_f or 0.0) / d)
+            yield f"joint `{self.name}`: `friction_deflection` = {d!r}", pole
+
+    def defaults(self, h: ca.SX) -> dict[str, ca.SX]:
+        """v_f and d that are not given, by their names as parameters; if f is 0, which may be
+        tuned, those for f = 1."""
+        d, v_f = self.joint.friction_deflection, self.joint.friction_speed
+        pull, found = (self.joint.friction or 1.0) * self.A, {}
+        if v_f is None:
+            v_f = ca.fmax(4 * self.N * pull * h, LEAST)
+            v_f = v_f if d is None else ca.fmax(ca.fmin(v_f, d / h), (pull * d) ** 0.5)
+            found[f"{self.name}.friction_speed"] = v_f
+        if d is None:
+            d = ca.fmax(LAG * h * v_f, v_f**2 / pull if pull else 0.0)
+            found[f"{self.name}.friction_deflection"] = d
+        return found
 
 
-def _scaled(joint: Any, A: float, N: int, h: float) -> Any:
-    """The joint with both its v_f and d; if f is 0, which may be tuned, those for f = 1."""
-    d, v_f, pull = joint.friction_deflection, joint.friction_speed, (joint.friction or 1.0) * A
-    if v_f is None:
-        v_f = max(4 * N * pull * h, LEAST)
-        v_f = v_f if d is None else max(min(v_f, d / h), (pull * d) ** 0.5)
-    if d is None:
-        d = max(LAG * h * v_f, v_f**2 / pull if pull else 0.0)
-    return replace(joint, friction_speed=v_f, friction_deflection=d)
+def scales(linkage: Linkage) -> list[Scale]:
+    """The joints and cut joints with friction."""
+    if not (rubs := rubbing(linkage)):
+        return []
+    return [
+        Scale(j.name, j.joint, closed, max(closed, OPENED * opened), len(rubs))
+        for j, (closed, opened) in zip(rubs, _mobilities(linkage, rubs), strict=True)
+    ]
 
 
-def _require_slow(rubbing: JointCoordinate, A: float, h: float) -> None:
-    joint, name = rubbing.joint, f"joint `{rubbing.name}`"
-    pull, d, v_f = (joint.friction or 0.0) * A, joint.friction_deflection, joint.friction_speed
-    if v_f and pull / v_f * h > STABLE:
-        _refuse(f"{name}: `friction_speed` = {v_f!r}", pull / v_f, 4 * pull * h, h)
-    if d and (pole := max((pull / d) ** 0.5, (v_f or 0.0) / d)) * h > STABLE:
-        enough = LAG * h * max(v_f or 0.0, pull * h)
-        _refuse(f"{name}: `friction_deflection` = {d!r}", pole, enough, h)
+def longest_step(scales: Iterable[Scale]) -> float:
+    """The longest step (s) in which explicit methods are stable with the values that are given."""
+    fastest = max((pole for scale in scales for _, pole in scale.poles), default=0.0)
+    return STABLE / fastest if fastest else math.inf
 
 
-def _refuse(what: str, pole: float, enough: float, h: float) -> NoReturn:
-    raise ValueError(
-        f"{what} makes a pole at {pole:.3g} 1/s, too fast for steps of {h:.3g} s: leave it out, "
-        f"take {enough:.2g} or more, a higher rate, more `mechanism.substeps`, or "
-        f"`mechanism.integrator` = {IMPLICIT!r}"
-    )
+def require_slow(scales: Iterable[Scale], h: float) -> None:
+    """Raises ValueError for given values that are too stiff for steps of h (s) of explicit
+    methods."""
+    for what, pole in (found for scale in scales for found in scale.poles):
+        if pole * h > STABLE:
+            raise ValueError(f"{what} makes a pole at {pole:.3g} 1/s, {TOO_FAST.format(h)}")
+
+
+TOO_FAST = (
+    "too fast for steps of {:.3g} s: leave it out, take a larger one, a higher rate, more "
+    "`mechanism.substeps`, or `mechanism.integrator` = 'linearly-implicit'"
+)
 
 
 def _mobilities(linkage: Linkage, joints: list[JointCoordinate]) -> list[tuple[float, float]]:

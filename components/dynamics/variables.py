@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from hapticlink.components import forces
 from hapticlink.components.component import ACCELERATION, MOBILITY, POSE, TWIST, Variable
-from hapticlink.components.dynamics.stabilization import Baumgarte
 from hapticlink.components.linkage.closures import gear_parameters, rows
 from hapticlink.components.linkage.parameters import (
     body_parameters,
@@ -21,15 +20,16 @@ def parameters(linkage: Linkage) -> tuple[Variable, ...]:
 
 
 def mechanism_parameters(
-    linkage: Linkage, mechanism: Mechanism, default: Baumgarte, period_s: float
+    linkage: Linkage, mechanism: Mechanism, default_beta: float
 ) -> list[Variable]:
-    """Parameters of the virtual mechanism; `default` are the Baumgarte gains for steps of period_s
-    (s), for alpha and beta that the scene does not give."""
+    """Parameters of the virtual mechanism; Baumgarte's alpha only where the scene gives it, since
+    its default depends on the step size."""
     found = [*parameters(linkage), *start_parameters(linkage)]
     if linkage.closed and mechanism.stabilization == "baumgarte":
-        alpha = default.alpha_T / period_s if mechanism.alpha is None else mechanism.alpha
-        beta = default.beta if mechanism.beta is None else mechanism.beta
-        found.append(Variable("alpha", (), "1/s", alpha, "Baumgarte frequency of (3.3)"))
+        text = "Baumgarte frequency of (3.3)"
+        if mechanism.alpha is not None:
+            found.append(Variable("alpha", (), "1/s", mechanism.alpha, text))
+        beta = default_beta if mechanism.beta is None else mechanism.beta
         found.append(Variable("beta", (), "1", beta, "Baumgarte damping ratio of (3.3)"))
     return found
 

@@ -26,7 +26,7 @@ def rubbing(linkage: Linkage) -> list[JointCoordinate]:
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
-    """The parameters of joints with friction, those that are given (friction_scale.py)."""
+    """The parameters of joints with friction that are given; friction_scale.py defines others."""
     found = []
     texts = ("friction", "deflection at which it slides", "speed at which it slides")
     for j in rubbing(linkage):
@@ -45,8 +45,8 @@ def states(linkage: Linkage) -> list[Variable]:
 
 class Joints:
     """Rates v, deflections z and d, friction f and tau of the joints with friction, each k x 1, and
-    the Jacobian of their coordinates (k x n); NaN for a linkage that is not `resolved`
-    (friction_scale.py), whose friction is not evaluated."""
+    the Jacobian of their coordinates (k x n); NaN without the defaults of friction_scale.py, where
+    friction is not evaluated."""
 
     def __init__(self, model: LinkageModel) -> None:
         joints, p = rubbing(model.linkage), model.p

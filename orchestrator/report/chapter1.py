@@ -30,7 +30,7 @@ def images(rule: str, poles: np.ndarray) -> np.ndarray:
     """The discrete pole z of each pole s (T = 1 s), from one step of the FMU from x = 1."""
     settings = {"rule": rule}
     with temporary_folders.room() as room:
-        path = build_block("discrete_equivalent", settings, room, stop_time=1.0, step_size=1.0)
+        path = build_block("discrete_equivalent", settings, room)
         with session(path) as opened:
             reference = {v.name: v.valueReference for v in opened.description.modelVariables}
             gains = [reference["re"], reference["im"]]

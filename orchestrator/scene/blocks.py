@@ -79,6 +79,8 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
             settings["contacts"] = scene.contacts
         if scene.contacts or scene.linkage.limited:
             settings["length_scale"] = scene.directions.length_scale
+        if scene.local_model:
+            settings["local_model"] = True
         found.append(BlockPlan("virtual_mechanism", scene.mechanism_at, settings))
     if scene.linkage and scene.graphics and (graphics_block(scene) or not skip):
         names = (f.name for f in fields(GraphicsCopy))

@@ -44,8 +44,8 @@ def record_of(path: Path, data: Any) -> Any:
 
 @cache
 def _arguments(block: Callable[..., Any]) -> Any:
-    """A record of a block's arguments, without the first, the communication step size."""
-    _, *arguments = inspect.signature(block).parameters.values()
+    """A record of a block's arguments."""
+    arguments = inspect.signature(block).parameters.values()
     return make_dataclass(
         "Settings",
         [(a.name, a.annotation, field(**_default(a))) for a in arguments],

@@ -18,6 +18,7 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system import checks, fmu_tables, haptic_loop, replacements
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import connect, whole
+from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
@@ -29,7 +30,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     """
     problems: list[Problem] = []
     of = timeline.of
-    blocks = replacements.replaced(scene, timeline)
+    blocks = replacements.replaced(scene)
     ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in loop_blocks(scene))
     foreign = (
         Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
@@ -37,7 +38,10 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     )
     order = {name: i for i, name in enumerate(loop_names(scene))}
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
-    fmus = tuple(replace(u, isolate=u.isolate or scene.isolate) for u in every)
+    fmus = tuple(
+        with_sizes(replace(u, isolate=u.isolate or scene.isolate), timeline) for u in every
+    )
+    problems += (((), why) for fmu in fmus for why in too_long(fmu))
     connections = _connections(scene, fmus, problems)
     rules = rules_of(scene, fmus, connections)
     assigned, refused = assign(fmus, connections, timeline, rules)

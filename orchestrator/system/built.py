@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from types import MappingProxyType
 
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import temporary_folders
@@ -16,9 +15,9 @@ from hapticlink.orchestrator.system.timeline import timeline
 
 
 @contextmanager
-def built(scene: Scene, starts: Mapping[str, Starts] = MappingProxyType({})) -> Iterator[System]:
-    """The system of `scene`, with its FMU files built or taken from the cache. `starts`, by block,
-    override the start values of its parameters.
+def built(scene: Scene, starts: Mapping[str, Starts] | None = None) -> Iterator[System]:
+    """The system of `scene`, with its FMU files built or taken from the cache. `starts` is for FMUs
+    that other tools run (`fmu_files`).
 
     Files that are not in the cache exist only within the context. Raises InputFault where no FMU
     can be built from the settings, SceneFault where FMUs and connections do not fit.

@@ -10,7 +10,6 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.fmu_files import settled
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ def costs(scene: Scene, timeline: Timeline, *, skip: bool = True) -> tuple[Block
         clock = timeline.of.get(block.name, str(block.rate))
         period = timeline.clock(clock).longest if clock in clocks else tick
         try:
-            counted = cost(block.made_by, settled(scene, block, timeline), timeline.seconds(period))
+            counted = cost(block.made_by, block.settings)
         except FmuError as error:
             raise InputFault(str(error)) from error
         found.append(BlockCost(block.name, counted, tick / period))

@@ -8,25 +8,22 @@ from typing import TYPE_CHECKING
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.blocks import replaced_blocks
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.fmu_files import settled
 from hapticlink.orchestrator.system.system import Connection, Fmu, Replacement
 
 if TYPE_CHECKING:
     from hapticlink.components.component import Component
 
 
-def replaced(scene: Scene, timeline: Timeline) -> dict[str, Component]:
+def replaced(scene: Scene) -> dict[str, Component]:
     """The blocks that FMUs replace, by name. Raises InputFault where the settings of one give no
     block."""
     found = {}
     for name, plan in replaced_blocks(scene).items():
-        size = timeline.seconds(timeline.clock(timeline.of[name]).longest)
         try:
-            found[name] = component(plan.made_by, settled(scene, plan, timeline), size)
+            found[name] = component(plan.made_by, plan.settings)
         except FmuError as error:
             raise InputFault(str(error)) from error
     return found
