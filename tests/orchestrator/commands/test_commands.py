@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+import hapticlink as hl
 from hapticlink.orchestrator import api
 from hapticlink.orchestrator.commands.progress import progress
 from hapticlink.orchestrator.results import tables
@@ -97,13 +98,36 @@ def test_a_run_that_fails_is_status_1_and_keeps_results(
     assert (out / "haptics.csv").is_file()
 
 
-def test_the_command_imports_no_equations_before_it_needs_them() -> None:
+EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.archive", "scipy")
+
+
+@pytest.mark.parametrize(
+    ("line", "left"),
+    [
+        (("--help",), (*EQUATIONS, "casadi", "numpy", "pydantic", "fmpy", "matplotlib")),
+        (("run", "{bar}", "--no-figures"), (*EQUATIONS, "matplotlib")),
+        (("run", "{bar}"), ("scipy",)),
+        (("info", "{bar}"), ("scipy", "matplotlib")),
+    ],
+)
+def test_a_command_imports_what_it_uses(
+    bar: Path, tmp_path: Path, line: tuple[str, ...], left: tuple[str, ...]
+) -> None:
+    """Where every FMU is in the cache."""
+    hl.explain(bar)
     code = (
-        "import sys, hapticlink.orchestrator.commands\n"
-        "print([m for m in ('casadi', 'numpy', 'matplotlib') if m in sys.modules])"
+        "import sys\nfrom hapticlink.orchestrator.commands import main\n"
+        "try:\n    main(sys.argv[2:])\nexcept SystemExit as ended:\n"
+        "    assert not ended.code, ended.code\n"
+        "print([m for m in sys.argv[1].split() if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    given = [part.format(bar=bar) for part in line]
+    done = subprocess.run(
+        [sys.executable, "-c", code, " ".join(left), *given],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert bool([*tmp_path.rglob("*.png")]) == (line == ("run", "{bar}"))
 
 
 def test_a_signal_before_the_first_event_has_a_good_end(

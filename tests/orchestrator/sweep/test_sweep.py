@@ -20,6 +20,8 @@ from pythonfmu.builder import FmuBuilder
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault, Interrupted
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi import kept
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.sweep import figure, grid, pool, row, table
@@ -203,6 +205,38 @@ def test_one_table_whatever_the_processes(bar: Path, tmp_path: Path) -> None:
     ends = [(np.floor(1024 * limit) + 1) / 512 for limit in limits]
     assert [float(r["end_time_s"]) for r in tables[0]] == ends
     assert {r["end"] for r in tables[0]} == {"stop_when"}
+
+
+def test_a_process_of_many_runs_makes_each_as_a_process_of_its_own(
+    tmp_path: Path, own_temporary_folder: Path
+) -> None:
+    """Rates, holds and masses in turn: the bytes of single runs, FMUs in their place from the first
+    run on, and nothing left."""
+    points = [
+        {"duration": "0.1", "haptics.rate": "256", "linkage.body.link1.mass": "0.5"},
+        {"duration": "0.1", "hold": "foh"},
+    ]
+    made = points_of.jobs("closed-loop", (), points)
+
+    def rows(job: Job) -> bytes:
+        assert job.scene
+        out = tmp_path / "run"
+        assert simulate(job.scene, out, csv=False).outcome.fault is None
+        return b"".join(path.read_bytes() for path in sorted(out.glob("*.rows")))
+
+    single = [rows(job) for job in made]
+    assert single[0] != single[1]
+    mapped, folders = [], []
+    with kept.unpacked_once():
+        for _ in range(3):
+            assert [rows(job) for job in made] == single
+            mapped.append(Path("/proc/self/maps").read_text().count(str(own_temporary_folder)))
+            folders.append(len([*own_temporary_folder.iterdir()]))
+        assert mapped[0] == mapped[-1]
+        assert folders[0] == folders[-1]
+        kept.trim(1)
+        assert len([*own_temporary_folder.iterdir()]) == 1
+    assert not [*own_temporary_folder.iterdir()]
 
 
 @pytest.mark.usefixtures("in_this_process")
