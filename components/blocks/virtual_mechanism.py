@@ -241,7 +241,7 @@ def _touching(
         places = (
             touches(model, contacts, block.p)
             if contacts.detection == "haptics"
-            else contact_forces.held(parts.linkage, contacts, block.u["contacts"])
+            else contact_forces.held(model, contacts, block.u["contacts"])
         )
         deflection = block.x.get("contact_deflection")
         contact = ContactForces(model, contacts, block.p, places, deflection)

@@ -1,4 +1,4 @@
-"""Broad phase: pairs of a body and an obstacle that can never touch and need no narrow phase.
+"""Broad phase: pairs that can never touch and need no narrow phase.
 
 A chain of revolute joints keeps every point of a body within the sum of its links' lengths of the
 joint on the ground. A prismatic or free joint in the chain has no such bound. Loops only reduce the
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from hapticlink.components.specs.bodies import counterclockwise, edges
 from hapticlink.components.specs.contacts import Contacts, Pair, pairs
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Point
@@ -23,7 +24,7 @@ def reach(linkage: Linkage, body: str) -> tuple[Point, float]:
     shape = next(b for b in linkage.body if b.name == body)
     joint = by_child[body]
     here = joint.at_child or ORIGIN
-    length = max(math.dist(here, end) for end in shape.capsule) + (shape.radius or 0.0)
+    length = max(math.dist(here, end) for end in shape.shape) + (shape.radius or 0.0)
     while True:
         if joint.type != "revolute":
             return ORIGIN, math.inf
@@ -35,7 +36,7 @@ def reach(linkage: Linkage, body: str) -> tuple[Point, float]:
 
 
 def near(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
-    """The pairs of a body and an obstacle that can touch."""
+    """The pairs that can touch."""
     far = set(out_of_reach(linkage, contacts))
     return tuple(pair for pair in pairs(linkage, contacts) if pair not in far)
 
@@ -49,6 +50,9 @@ def out_of_reach(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
 
 def _can_touch(linkage: Linkage, contacts: Contacts, pair: Pair) -> bool:
     center, radius = reach(linkage, pair.body)
+    if pair.kind == "body":
+        other, further = reach(linkage, pair.obstacle)
+        return math.dist(center, other) < radius + further
     if pair.kind == "disc":
         disc = contacts.disc[pair.index]
         return math.dist(center, disc.center) < radius + disc.radius
@@ -59,16 +63,6 @@ def _can_touch(linkage: Linkage, contacts: Contacts, pair: Pair) -> bool:
     if all(_beyond(center, *wall) <= 0 for wall in walls):
         return True
     return min(_distance(center, *wall) for wall in walls) < radius
-
-
-def counterclockwise(corners: tuple[Point, ...]) -> tuple[Point, ...]:
-    """The corners in counterclockwise order, with the inside on the left of every edge."""
-    area = sum(a[0] * b[1] - b[0] * a[1] for a, b in edges(corners))
-    return corners if area > 0 else corners[::-1]
-
-
-def edges(corners: tuple[Point, ...]) -> list[tuple[Point, Point]]:
-    return list(zip(corners, (*corners[1:], *corners[:1]), strict=True))
 
 
 def _beyond(point: Point, a: Point, b: Point) -> float:

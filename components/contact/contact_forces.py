@@ -1,11 +1,15 @@
-"""Penalty contact of capsule-shaped links that never pulls (k_contact, b_contact of section B.6).
+"""Penalty contact of bodies that never pulls (k_contact, b_contact of section B.6).
 
     g  = n . (x - x_plane) - r,   g' = n . v          gap (m) and its rate at the contact point
     F  = n max(0, -k g - b g')  where g < 0, else 0   (unilateral.py)
     Q  = sum_i J_i' F_i
 
+F acts on the point of the body's surface that has the velocity v relative to the other body, or to
+the ground, on which -F acts at the same point of the world: between bodies, momentum and angular
+momentum are conserved.
+
 With a coefficient of friction mu, F also has the tangential part -k e of dry_friction.py, with the
-rate of the link's surface along the plane, the spring of stiffness k with its deflection z as a
+rate of the body's surface along the plane, the spring of stiffness k with its deflection z as a
 state, and a limit k d = mu n . F.
 
 F_env (2.18) is the wrench at the operational point that has the same effect there as all contacts,
@@ -49,7 +53,7 @@ def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
     """The port for the contact geometry from the virtual environment to the mechanism, one row per
     place."""
     rows = places(linkage, contacts)
-    text = "one row a place: active, point in the body, point and normal of the obstacle's plane"
+    text = "one row a place: active, point in the body, point and normal of the other's plane"
     return Variable("contacts", (rows, len(COLUMNS)), COLUMNS, description=text, kind="table")
 
 
@@ -85,7 +89,7 @@ def detection_parameters(
     linkage: Linkage, contacts: Contacts, obstacles: bool = True
 ) -> list[Variable]:
     """Radii of the links, and the obstacles in the block that detects contacts."""
-    radii = {b.name: b.radius for b in linkage.body if b.radius is not None}
+    radii = {b.name: b.radius or 0.0 for b in linkage.body}
     found = shape_parameters(near(linkage, contacts), radii)
     return found + (obstacle_parameters(contacts) if obstacles else [])
 
@@ -111,17 +115,22 @@ def detected(model: LinkageModel, contacts: Contacts) -> ca.SX:
     rows = []
     for touch in touches(model, contacts, model.p):
         active = ca.logic_and(touch.active, gap(model, touch) < contacts.margin)
-        rows.append(Touch(touch.body, active, touch.point, touch.plane, touch.normal).row)
+        other = model.frames[touch.other]
+        plane = ca.vertcat(other.local(touch.plane), other.rotation.T @ touch.normal)
+        rows.append(ca.vertcat(active, touch.point, plane).T)
     return ca.vertcat(*rows)
 
 
-def held(linkage: Linkage, contacts: Contacts, rows: ca.SX) -> list[Touch]:
-    """The places given by the rows of the `contacts` port."""
-    bodies = [pair.body for pair in near(linkage, contacts) for _ in range(pair.places)]
-    return [
-        Touch(body, row[0] > 0.5, row[1:3].T, row[3:5].T, row[5:7].T)
-        for body, row in zip(bodies, ca.vertsplit(rows), strict=True)
-    ]
+def held(model: LinkageModel, contacts: Contacts, rows: ca.SX) -> list[Touch]:
+    """The places given by the rows of the `contacts` port, whose planes move with their bodies."""
+    found = []
+    pairs = [pair for pair in near(model.linkage, contacts) for _ in range(pair.places)]
+    for pair, row in zip(pairs, ca.vertsplit(rows), strict=True):
+        name = pair.obstacle if pair.kind == "body" else "ground"
+        other = model.frames[name]
+        plane, normal = other.point(row[3:5].T), other.rotation @ row[5:7].T
+        found.append(Touch(pair.body, name, row[0] > 0.5, row[1:3].T, plane, normal))
+    return found
 
 
 class ContactForces(OneSidedForces):
@@ -138,22 +147,30 @@ class ContactForces(OneSidedForces):
         deflection: ca.SX | None = None,
     ) -> None:
         self._model, self._p, self._touches, self._z = model, p, found, deflection
-        self._arms: list[ca.SX] = []
+        self._arms: list[dict[str, ca.SX]] = []
         slides: list[ca.SX] = []
         self.sides = []
         for touch in found:
-            frame = model.frames[touch.body]
+            frame, other = model.frames[touch.body], model.frames[touch.other]
             arm = frame.rotation @ touch.point - model.p[f"{touch.body}.radius"] * touch.normal
-            v = model.rate(frame.origin) + model.rate(frame.angle) * ca.vertcat(-arm[1], arm[0])
+            arms = {touch.body: arm, touch.other: frame.origin + arm - other.origin}
+            v = self._velocity(touch.body, arm) - self._velocity(touch.other, arms[touch.other])
             rate, damped = ca.dot(touch.normal, v), (p["k_contact"], p["b_contact"])
             self.sides.append(Unilateral(gap(model, touch), rate, *damped, touch.active))
-            self._arms.append(arm)
+            self._arms.append(arms)
             slides.append(ca.dot(_along(touch), v))
         self._slides = ca.vertcat(*slides)
         least = ca.SX(FAR)
         for side in self.sides:
             least = ca.fmin(least, ca.if_else(side.active, side.gap, FAR))
         self.gap = ca.if_else(least < FAR, least, contacts.margin)
+
+    def _velocity(self, body: str, arm: ca.SX) -> ca.SX:
+        """Of the point of a body at `arm` from its origin; 0 of the ground."""
+        if body == "ground":
+            return ca.SX(2, 1)
+        frame, rate = self._model.frames[body], self._model.rate
+        return rate(frame.origin) + rate(frame.angle) * ca.vertcat(-arm[1], arm[0])
 
     @property
     def energy(self) -> ca.SX:
@@ -178,10 +195,13 @@ class ContactForces(OneSidedForces):
             held = dry_friction.held(self._z, self._slides, breaks, tau)
             rubs = -self._p["k_contact"] * held
         wrenches: dict[str, ca.SX] = {}
-        for i, (touch, arm) in enumerate(zip(self._touches, self._arms, strict=True)):
+        for i, (touch, arms) in enumerate(zip(self._touches, self._arms, strict=True)):
             F = touch.normal * pushes[i] + _along(touch) * rubs[i]
-            wrench = ca.vertcat(F, arm[0] * F[1] - arm[1] * F[0])
-            wrenches[touch.body] = wrenches.get(touch.body, ca.SX(3, 1)) + wrench
+            for body, on in ((touch.body, F), (touch.other, -F)):
+                if body != "ground":
+                    arm = arms[body]
+                    wrench = ca.vertcat(on, arm[0] * on[1] - arm[1] * on[0])
+                    wrenches[body] = wrenches.get(body, ca.SX(3, 1)) + wrench
         frames, q = self._model.frames, self._model.q
         poses = [ca.vertcat(frames[b].origin, frames[b].angle) for b in wrenches]
         return ca.jtimes(ca.vertcat(*poses), q, ca.vertcat(*wrenches.values()), True)

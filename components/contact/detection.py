@@ -1,56 +1,71 @@
-"""Narrow phase: point, normal and gap where a link is nearest to an obstacle, with bounded work.
+"""Narrow phase: points, normals and gaps where a body is nearest to an obstacle or another body,
+with bounded work.
 
-A link is a capsule, the points within `radius` of a segment. Each place of a pair is a `Touch`: a
-point on the segment, and the plane of the obstacle that faces it. The number of places is fixed,
-each with a flag whether it is active, so that there is no iteration and no branch.
+A shape is the points within `radius` of its core: a point, a segment or a convex polygon. Each
+place of a pair is a `Touch`: a point on the core of the body, and the plane of the other shape that
+faces it. The number of places is fixed, each with a flag whether it is active, so that there is no
+iteration and no branch.
 
-    enclosure   each end against its two nearest walls; with friction, against all walls
-    disc        the segment's point nearest to the centre
-    polygon     each end's nearest point of the boundary, and the corner that is nearest to
-                the inside of the segment
+    enclosure   each corner of the core against its two nearest walls; with friction, against all
+    disc        the core's point nearest to the centre, or the centre's nearest on the other core
+    otherwise   each corner of either core, and the other core's point that is nearest to it
 
-A link that penetrates deeper than its radius is still pushed back out on the side where it entered,
-up to the middle of the obstacle, where another side is as near (closest_points.py).
+Each place is a spring k max(0, -g)^2/2, which acts on both bodies. Its gap g is continuous in the
+pose, so that the force is the gradient of a potential: a corner that passes the end of a link
+leaves it, as the end leaves the corner's edge, within a distance of sqrt(2 radius depth). Within a
+polygon the gap is negative, and a place is pushed out through the nearest edge. A segment has no
+inside: a corner that has sunk past the axis of a link goes on to be pushed back on the side where
+it entered, up to the shortest way out of the polygon (closest_points.py); there alone a gap can
+jump, if that side changes or the corner passes an end of the link. Runs warn of contacts that deep
+(depth.py).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import casadi as ca
 
 from hapticlink.components.component import Signals, Variable
-from hapticlink.components.contact.broad_phase import counterclockwise, near
+from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.contact.closest_points import (
-    TINY,
-    along,
-    between,
     edges,
     nearest_on_boundary,
+    nearest_on_point,
+    nearest_on_segment,
     select,
-    way_out,
+    sunk_past,
 )
 from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.specs.bodies import counterclockwise
 from hapticlink.components.specs.contacts import Contacts, Pair
 
 COLUMNS = ("1", "m", "m", "m", "m", "1", "1")
 """Units of a row of the `contacts` port: active, point in the body (x, y), point of the plane
-(x, y), normal of the plane (x, y)."""
+(x, y), normal of the plane (x, y), both in the other body or the world."""
 
 
 @dataclass(frozen=True)
 class Touch:
-    """A potential contact: a point in the body's frame, and a plane in the world."""
+    """A potential contact: a point in a body's frame, and a plane in the world, of another body or
+    the ground."""
 
     body: str
+    other: str
     active: ca.SX
     point: ca.SX
     plane: ca.SX
     normal: ca.SX
 
-    @property
-    def row(self) -> ca.SX:
-        return ca.vertcat(self.active, self.point, self.plane, self.normal).T
+
+@dataclass(frozen=True)
+class Shape:
+    """The points within `radius` of a core, whose corners (k x 2) are in the frame of `body`."""
+
+    body: str
+    corners: ca.SX
+    radius: ca.SX | float
 
 
 def obstacle_parameters(contacts: Contacts) -> list[Variable]:
@@ -77,7 +92,8 @@ def obstacle_parameters(contacts: Contacts) -> list[Variable]:
 
 def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) -> list[Variable]:
     """Radii of the bodies that can touch something, as parameters."""
-    names = dict.fromkeys(pair.body for pair in pairs)
+    touched = [(p.body, p.obstacle) if p.kind == "body" else (p.body,) for p in pairs]
+    names = dict.fromkeys(name for names in touched for name in names)
     return [
         Variable(f"{n}.radius", (), "m", model_bodies[n], f"radius of {n}", "fixed") for n in names
     ]
@@ -85,27 +101,37 @@ def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) ->
 
 def touches(model: LinkageModel, contacts: Contacts, p: Signals) -> list[Touch]:
     """Every place of every pair within reach, in the order of `broad_phase.near`."""
-    found = []
+    found: list[Touch] = []
     for pair in near(model.linkage, contacts):
-        ends = _ends(model, pair.body)
+        body = _body(model, pair.body)
         if pair.kind == "enclosure":
             at_end = _in_corner if contacts.friction is None else _at_walls
-            found += [t for end in ends for t in at_end(model, pair.body, end, p)]
-        elif pair.kind == "disc":
-            found.append(_on_disc(model, pair, ends, p))
+            found += [t for end in _rows(body) for t in at_end(model, pair.body, end, p)]
         else:
-            found += _on_polygon(model, pair, ends, p)
+            found += _between(model, body, _obstacle(model, pair, p))
     return found
 
 
-def _ends(model: LinkageModel, body: str) -> list[ca.SX]:
-    shape = next(b for b in model.linkage.body if b.name == body)
-    return [ca.SX(list(end)) for end in shape.capsule]
+def _body(model: LinkageModel, name: str) -> Shape:
+    shape = next(b for b in model.linkage.body if b.name == name).shape
+    return Shape(name, ca.SX(ca.DM(shape)), model.p[f"{name}.radius"])
+
+
+def _obstacle(model: LinkageModel, pair: Pair, p: Signals) -> Shape:
+    if pair.kind == "body":
+        return _body(model, pair.obstacle)
+    if pair.kind == "disc":
+        return Shape("ground", p[f"{pair.obstacle}.center"].T, p[f"{pair.obstacle}.radius"])
+    return Shape("ground", p[f"{pair.obstacle}.corners"], 0.0)
+
+
+def _rows(shape: Shape) -> list[ca.SX]:
+    return [shape.corners[k, :].T for k in range(shape.corners.shape[0])]
 
 
 def _at_walls(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:
     walls = edges(p["enclosure.corners"])
-    return [Touch(body, ca.SX(1), end, a, -outward) for a, _, outward in walls]
+    return [Touch(body, "ground", ca.SX(1), end, a, -outward) for a, _, outward in walls]
 
 
 def _in_corner(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:
@@ -119,54 +145,35 @@ def _in_corner(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[T
         nearer, next_one = wall[0] < first[0], wall[0] < second[0]
         second = select(nearer, first, select(next_one, wall, second))
         first = select(nearer, wall, first)
-    return [Touch(body, ca.SX(1), end, plane, normal) for _, plane, normal in (first, second)]
+    return [Touch(body, "ground", ca.SX(1), end, plane, n) for _, plane, n in (first, second)]
 
 
-def _on_disc(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) -> Touch:
-    center, radius = p[f"{pair.obstacle}.center"], p[f"{pair.obstacle}.radius"]
-    world = [model.frames[pair.body].point(end) for end in ends]
-    s = ca.fmin(ca.fmax(along(ends, world, center), 0), 1)
-    away = between(world, s) - center
-    distance = ca.norm_2(away)
-    # If the link's axis passes through the centre the direction is undefined: take its normal.
-    span = world[-1] - world[0] if len(world) == 2 else ca.SX([1.0, 0.0])
-    across = ca.vertcat(-span[1], span[0]) / ca.norm_2(span)
-    normal = ca.if_else(distance > 0, away / (distance + TINY), across)
-    return Touch(pair.body, ca.SX(1), between(ends, s), center + radius * normal, normal)
+def _between(model: LinkageModel, a: Shape, b: Shape) -> Iterator[Touch]:
+    """The places of two shapes: each corner of either core at the other core; of a point alone."""
+    frame, other = model.frames[a.body], model.frames[b.body]
+    if b.corners.shape[0] > 1:
+        for corner in _rows(a):
+            plane, normal = _nearest(b, other.local(frame.point(corner)))
+            outward = other.rotation @ normal
+            at = other.point(plane) + b.radius * outward
+            yield Touch(a.body, b.body, ca.SX(1), corner, at, outward)
+    if a.corners.shape[0] > 1 or b.corners.shape[0] == 1:
+        world = [other.point(corner) for corner in _rows(b)]
+        seen = [frame.local(at) for at in world]
+        backs: list[ca.SX] = [ca.SX(0)] * len(seen)
+        if a.corners.shape[0] == 2 and len(seen) > 2:
+            backs = sunk_past(a.corners, ca.horzcat(*seen).T)
+        for at, local, back in zip(world, seen, backs, strict=True):
+            point, normal = _nearest(a, local, back)
+            inward = -(frame.rotation @ normal)
+            yield Touch(a.body, b.body, ca.SX(1), point, at + b.radius * inward, inward)
 
 
-def _on_polygon(model: LinkageModel, pair: Pair, ends: list[ca.SX], p: Signals) -> list[Touch]:
-    corners = p[f"{pair.obstacle}.corners"]
-    world = [model.frames[pair.body].point(end) for end in ends]
-    found = []
-    for end, at in zip(ends, world, strict=True):
-        plane, normal = nearest_on_boundary(edges(corners), at)
-        found.append(Touch(pair.body, ca.SX(1), end, plane, normal))
-    if len(ends) == 2:
-        found.append(_nearest_corner(pair.body, ends, world, corners))
-    return found
-
-
-def _nearest_corner(body: str, ends: list[ca.SX], world: list[ca.SX], corners: ca.SX) -> Touch:
-    """The corner nearest to the segment between its ends; not active where none faces it.
-
-    The plane is parallel to the segment. Its normal points to the segment, or, if the segment has
-    penetrated past the corner by no more than its distance to the outside, to that side.
-    """
-    span = world[1] - world[0]
-    side = ca.vertcat(-span[1], span[0]) / ca.norm_2(span)
-    heights = [ca.dot(side, world[0] - corners[k, :].T) for k in range(corners.shape[0])]
-    depth, outward = way_out(world, corners, side, heights)
-    up = ca.if_else(ca.dot(outward, side) >= 0, 1, -1)
-    best: list[ca.SX] = []
-    for k, height in enumerate(heights):
-        corner = corners[k, :].T
-        s = along(ends, world, corner)
-        inside = ca.logic_and(s > 0, s < 1)
-        sunk = ca.logic_and(depth <= up * height, depth < 0)
-        sign = ca.if_else(sunk, up, ca.if_else(height >= 0, 1, -1))
-        distance = ca.if_else(inside, sign * height, ca.SX(1e9))
-        point = between(ends, ca.fmin(ca.fmax(s, 0), 1))
-        this = [distance, inside, point, corner, sign * side]
-        best = select(distance < best[0], this, best) if best else this
-    return Touch(body, *best[1:])
+def _nearest(shape: Shape, at: ca.SX, back: ca.SX | int = 0) -> list[ca.SX]:
+    """Point and outward normal of a core that is nearest to a point of its frame."""
+    corners = shape.corners
+    if corners.shape[0] == 1:
+        return nearest_on_point(corners.T, at)
+    if corners.shape[0] == 2:
+        return nearest_on_segment(corners, at, back)
+    return nearest_on_boundary(edges(corners), at)

@@ -40,6 +40,10 @@ class Frame:
         """World position of a point of the body; None is the frame's origin."""
         return self.origin if at is None else self.origin + self.rotation @ at
 
+    def local(self, at: ca.SX) -> ca.SX:
+        """Position in the body's frame of a point of the world."""
+        return self.rotation.T @ (at - self.origin)
+
 
 def _rotation(angle: ca.SX) -> ca.SX:
     c, s = ca.cos(angle), ca.sin(angle)

@@ -74,11 +74,13 @@ def coordinates(linkage: Linkage, values: Mapping[str, float | tuple[float, ...]
 def mean_link_length(linkage: Linkage) -> float:
     """Mean over the bodies of the largest distance between two of their joint points (m).
 
-    For a linkage without any such distance, the mean radius of gyration.
+    For a linkage without any such distance, the mean radius of gyration. Objects do not count.
     """
-    points: dict[str, list[Point]] = {b.name: [] for b in linkage.body}
+    bodies = [b for b in linkage.body if b.name not in linkage.objects]
+    points: dict[str, list[Point]] = {b.name: [] for b in bodies}
     for j in linkage.joint:
-        points[j.child].append(j.at_child or (0.0, 0.0))
+        if j.child in points:
+            points[j.child].append(j.at_child or (0.0, 0.0))
         if j.parent in points:
             points[j.parent].append(j.at_parent or (0.0, 0.0))
     for loop in linkage.loop:
@@ -87,7 +89,7 @@ def mean_link_length(linkage: Linkage) -> float:
                 points[body].append(at)
     spans = [max(math.dist(a, b) for a in p for b in p) for p in points.values() if p]
     lengths = [s for s in spans if s > 0] or [
-        math.sqrt(b.inertia / b.mass) for b in linkage.body if b.mass > 0 and b.inertia > 0
+        math.sqrt(b.inertia / b.mass) for b in bodies if b.mass > 0 and b.inertia > 0
     ]
     return sum(lengths) / len(lengths) if lengths else 1.0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Annotated, Literal
 
 from hapticlink.components.specs.linkage import Linkage
@@ -39,7 +40,7 @@ class Polygon:
 
 @dataclass(frozen=True, kw_only=True)
 class Contacts:
-    """Obstacles that the links can touch, and the parameters of the contact force."""
+    """What bodies can touch, and the parameters of the contact force."""
 
     enclosure: tuple[Point, ...] | None = None
     """Corners of a convex polygon around the linkage."""
@@ -47,6 +48,9 @@ class Contacts:
     """Fixed discs."""
     polygon: tuple[Polygon, ...] = ()
     """Fixed convex polygons."""
+    bodies: Literal["free", "all", "none"] = "free"
+    """Bodies that touch each other. free: each on a free joint and in no loop touches every other
+    body; all: any two that no joint connects; none."""
     stiffness: LinearStiffness = 15000.0
     """k_contact of section B.6."""
     damping: LinearDamping = 300.0
@@ -64,33 +68,52 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Pair:
-    """A body that can reach an obstacle, and the number of places where they can touch."""
+    """A body, an obstacle or another body that it can reach, and the number of places where they
+    can touch."""
 
     body: str
-    kind: Literal["enclosure", "disc", "polygon"]
+    kind: Literal["enclosure", "disc", "polygon", "body"]
     index: int
     obstacle: str
     places: int
 
 
 def pairs(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
-    """Every pair of a body with a shape and an obstacle.
+    """Every pair of a body with a shape and an obstacle, and of two bodies that touch each other.
 
-    A capsule has these places: at the enclosure, either end at up to two walls (a corner), or with
-    friction, whose deflections belong to walls, at all of them; at a disc, one; at a polygon,
-    either end and one along its side.
+    They have these places: at the enclosure, each corner of the body's shape at up to two walls (a
+    corner), or with friction, whose deflections belong to walls, at all of them; else each corner
+    of either shape at the other shape, but only one place if one of them is a disc.
     """
     walls = 2 if contacts.friction is None else len(contacts.enclosure or ())
+    shaped = [(i, body) for i, body in enumerate(linkage.body) if body.shape]
     found = []
-    for body in linkage.body:
-        if body.radius is None:
-            continue
-        ends = len(body.capsule)
+    for _, body in shaped:
+        corners = len(body.shape)
         if contacts.enclosure:
-            found.append(Pair(body.name, "enclosure", 0, "enclosure", walls * ends))
+            found.append(Pair(body.name, "enclosure", 0, "enclosure", walls * corners))
         for i, disc in enumerate(contacts.disc):
             found.append(Pair(body.name, "disc", i, disc.name or f"disc{i + 1}", 1))
         for i, polygon in enumerate(contacts.polygon):
             name = polygon.name or f"polygon{i + 1}"
-            found.append(Pair(body.name, "polygon", i, name, ends + (ends == 2)))
+            places = _places(corners, len(polygon.corners))
+            found.append(Pair(body.name, "polygon", i, name, places))
+    for (_, first), (i, second) in combinations(shaped, 2):
+        if _touch(linkage, contacts, {first.name, second.name}):
+            places = _places(len(first.shape), len(second.shape))
+            found.append(Pair(first.name, "body", i, second.name, places))
     return tuple(found)
+
+
+def _places(corners: int, others: int) -> int:
+    return 1 if 1 in (corners, others) else corners + others
+
+
+def _touch(linkage: Linkage, contacts: Contacts, both: set[str]) -> bool:
+    """Whether two bodies touch each other."""
+    joined = [{j.parent, j.child} for j in linkage.joint if j.type != "free"]
+    if contacts.bodies == "none" or both in joined:
+        return False
+    if contacts.bodies == "free":
+        return bool(both & linkage.free)
+    return both not in [set(loop.bodies) for loop in linkage.loop]

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from hapticlink.components.integrators import METHODS
+from hapticlink.components.specs.bodies import Body
 from hapticlink.components.specs.paths import CoordinateSine, EffortSine, Interpolation
 from hapticlink.components.specs.quantities import (
     Angle,
@@ -23,8 +24,6 @@ from hapticlink.components.specs.quantities import (
     Length,
     LinearDamping,
     LinearStiffness,
-    Mass,
-    MomentOfInertia,
     Point,
     Pose,
     Quantity,
@@ -37,24 +36,6 @@ Acceleration = Annotated[float, Quantity("m/s2")]
 Velocity = Annotated[float, Quantity("rad/s or m/s")]
 LinearVelocity = Annotated[float, Quantity("m/s")]
 Twist = tuple[LinearVelocity, LinearVelocity, Annotated[float, Quantity("rad/s")]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Body:
-    """A rigid body. With a radius it can touch obstacles: as a capsule, or as a disc."""
-
-    name: str
-    """Its name in joints, loops and points; not "ground"."""
-    mass: Mass
-    """Mass; may be 0 for a body in a loop that cannot move without other masses."""
-    inertia: MomentOfInertia
-    """Moment of inertia about the centre of mass."""
-    center: Point | None = None
-    """Centre of mass in the body's frame; by default its origin."""
-    radius: Length | None = None
-    """Radius of the body's shape; without one it touches nothing."""
-    capsule: tuple[Point, ...] = ((0.0, 0.0),)
-    """Ends of the axis of the body's shape, in its frame; one point for a disc."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -290,6 +271,18 @@ class Linkage:
     def closed(self) -> bool:
         """Whether it has closures: loops or gears."""
         return bool(self.loop or self.gear)
+
+    @property
+    def free(self) -> set[str]:
+        """The bodies on a free joint that are in no loop."""
+        looped = {name for loop in self.loop for name in loop.bodies}
+        return {j.child for j in self.joint if j.type == "free"} - looped
+
+    @property
+    def objects(self) -> set[str]:
+        """The free bodies that no hand holds and that carry no other body: movable objects."""
+        held = {point.body for point in (self.operational_point, *self.point)}
+        return self.free - held - {j.parent for j in self.joint}
 
     @property
     def _joints(self) -> tuple[Joint | Loop, ...]:

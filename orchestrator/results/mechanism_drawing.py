@@ -126,10 +126,22 @@ class _Drawing:
         along = found @ direction
         return found[[along.argmin(), along.argmax()]]
 
+    def _shape(self, body: Body) -> Pose:
+        """The outline of what a body touches with, (k, 2): the hull of discs at its corners."""
+        from scipy.spatial import ConvexHull
+
+        angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+        round_it = np.column_stack([np.cos(angle), np.sin(angle)]) * (body.radius or 0.0) * MM
+        discs = [self._world(body.name, at) + round_it for at in body.shape]
+        found = np.unique(np.round(np.vstack(discs), 9), axis=0)
+        return found[ConvexHull(found).vertices]
+
     def outlines(self) -> None:
         """The bodies as thin lines."""
         for i, body in enumerate(self.linkage.body):
             corners = self._outline(body)
+            if len(corners) == 1 and body.shape:
+                corners = self._shape(body)
             closed = np.vstack([corners, corners[:1]])
             label = "at the end" if i == 0 else None
             self.axes.plot(*closed.T, color="0.55", lw=1.0, ls="--", zorder=2, label=label)
@@ -147,11 +159,13 @@ class _Drawing:
                 )
             else:
                 self.axes.plot(*corners.T, color=color, lw=5, solid_capstyle="round", zorder=3)
-                if len(corners) == 1:
+                if len(corners) == 1 and not body.shape:
                     self.axes.plot(*corners.T, "s", color=color, ms=14, alpha=0.5, zorder=3)
-            if body.radius:
-                ends = np.array([self._world(body.name, at) for at in body.capsule])
-                self.axes.add_patch(_capsule(ends, body.radius * MM, color))
+            if body.shape:
+                filled = (*_rgb(color), 0.25)
+                self.axes.add_patch(
+                    Polygon(self._shape(body), fc=filled, ec=color, lw=0.8, zorder=3)
+                )
             center = self._world(body.name, body.center)
             mark = "centre of mass" if i == 0 else None
             self.axes.plot(*center, "k+", ms=6, mew=1.2, zorder=6, ls="", label=mark)
@@ -331,17 +345,6 @@ def _rgb(color: str) -> tuple[float, float, float]:
     from matplotlib.colors import to_rgb
 
     return to_rgb(color)
-
-
-def _capsule(ends: Pose, radius: float, color: str) -> Any:
-    """The outline of points within `radius` of the axis between `ends`."""
-    from matplotlib.patches import Polygon
-
-    a, b = ends[0], ends[-1]
-    angle = np.arctan2(*(b - a)[::-1]) if len(ends) > 1 else 0.0
-    half = np.linspace(np.pi / 2, 3 * np.pi / 2, 20) + angle
-    turn = np.column_stack([np.cos(half), np.sin(half)]) * radius
-    return Polygon(np.vstack([a + turn, b - turn]), fill=False, ec=color, lw=0.8, zorder=3)
 
 
 def _zigzag(a: Pose, b: Pose) -> Pose:

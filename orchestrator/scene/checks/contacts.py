@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from hapticlink.components.contact.broad_phase import counterclockwise, edges
-from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.bodies import counterclockwise, edges
+from hapticlink.components.specs.contacts import Contacts, pairs
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Point
 from hapticlink.orchestrator.scene.scene import Scene
@@ -24,36 +24,49 @@ def check(scene: Scene) -> Iterator[Problem]:
     if scene.contacts is None:
         return
     contacts, here = scene.contacts, ("contacts",)
-    if scene.linkage is None or all(b.radius is None for b in scene.linkage.body):
-        yield here, "no body has a shape: give a [[linkage.body]] its radius"
-    if not contacts.enclosure and not contacts.disc and not contacts.polygon:
-        yield here, "there is nothing to touch: give an enclosure, a disc or a polygon"
+    if scene.linkage is None or not any(b.shape for b in scene.linkage.body):
+        yield here, "no body has a shape: give a [[linkage.body]] its radius or corners"
+    elif not pairs(scene.linkage, contacts):
+        message = "an enclosure, a disc, a polygon, or two bodies that touch each other (`bodies`)"
+        yield here, f"there is nothing to touch: give {message}"
     if contacts.detection == "graphics" and not scene.graphics:
         message = "there is no graphics rate: add [graphics], or take detection = 'haptics'"
         yield (*here, "detection"), message
+    pulled = scene.graphics and scene.graphics.sync == "operational"
+    if pulled and contacts.detection == "graphics" and scene.linkage and scene.linkage.objects:
+        name = min(scene.linkage.objects)
+        message = f"nothing pulls the copy of {name!r} along: take 'exact' or 'joint'"
+        yield ("graphics", "sync"), message
     if contacts.friction is not None and not contacts.stiffness:
         yield (*here, "friction"), "a contact without stiffness cannot stick: give one"
-    yield from _obstacles(contacts)
+    bodies = scene.linkage.body if scene.linkage else ()
+    yield from _obstacles(contacts, {b.name for b in bodies})
 
 
 def _shapes(linkage: Linkage) -> Iterator[Problem]:
     for i, body in enumerate(linkage.body):
+        path: Path = ("linkage", "body", i)
         if len(body.capsule) not in (1, 2) or len(set(body.capsule)) != len(body.capsule):
-            yield ("linkage", "body", i, "capsule"), "two different points, or one for a disc"
+            yield (*path, "capsule"), "two different points, or one for a disc"
+        if body.corners is not None:
+            yield from _convex((*path, "corners"), body.corners)
+            if body.capsule != ((0.0, 0.0),):
+                yield (*path, "capsule"), "the shape is a polygon already: leave out one of them"
 
 
-def _obstacles(contacts: Contacts) -> Iterator[Problem]:
+def _obstacles(contacts: Contacts, bodies: set[str]) -> Iterator[Problem]:
     here: Path = ("contacts",)
     if contacts.enclosure is not None:
         yield from _convex((*here, "enclosure"), contacts.enclosure)
     for i, polygon in enumerate(contacts.polygon):
         yield from _convex((*here, "polygon", i, "corners"), polygon.corners)
-    names: set[str] = {"enclosure"}
+    names: set[str] = {"enclosure", *bodies}
     for kind in ("disc", "polygon"):
         for i, obstacle in enumerate(getattr(contacts, kind)):
             name = obstacle.name or f"{kind}{i + 1}"
             if name in names:
-                yield (*here, kind, i, "name"), f"{name!r} is taken: name each obstacle once"
+                message = f"{name!r} is taken: name each obstacle and body once"
+                yield (*here, kind, i, "name"), message
             names.add(name)
 
 

@@ -22,9 +22,9 @@ def solve(
         g, rate, k, b = sides[i](y)
         return -k * g - b * rate
 
-    def event(i, on, inside):
+    def event(i, on):
         def value(t, y):
-            return push(i, y) if on else -push(i, y) if inside else sides[i](y)[0]
+            return push(i, y) if on else max(sides[i](y)[0], -push(i, y))
 
         value.terminal, value.direction = True, -1
         return value
@@ -37,7 +37,7 @@ def solve(
         def f(t, y, on=on):
             return rhs(y, np.array([push(i, y) * on[i] for i in range(len(on))]))
 
-        functions = [event(i, on[i], sides[i](y)[0] < 0) for i in range(len(on))]
+        functions = [event(i, on[i]) for i in range(len(on))]
         found = solve_ivp(f, (t, t_end), y, "DOP853", rtol=1e-12, atol=1e-13, events=functions)
         t, y = found.t[-1], found.y[:, -1]
         for i, times in enumerate(found.t_events):
