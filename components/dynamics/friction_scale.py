@@ -20,16 +20,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
-from hapticlink.components.component import Signals
-from hapticlink.components.dynamics.assembly import assemble
-from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.variables import parameters, start_parameters
+from hapticlink.components.dynamics.start_mobility import start_mobility
 from hapticlink.components.forces.dry_friction import LAG
 from hapticlink.components.forces.friction import rubbing
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate
-from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Linkage
 
 LEAST = 1e-9  # rad/s or m/s, of a default v_f
@@ -105,15 +100,8 @@ TOO_FAST = (
 
 def _mobilities(linkage: Linkage, joints: list[JointCoordinate]) -> list[tuple[float, float]]:
     """Mobilities (1/kg or 1/(kg.m2)) of joints at the start pose, with closed and open loops."""
-    p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
-    q0, _ = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
-    q, qd = ca.SX.sym("q", q0.numel()), ca.SX.sym("qd", q0.numel())
-    model = LinkageModel(linkage, p, q, qd)
-    J = ca.jacobian(ca.vertcat(*(j.value(model) for j in joints)), q)
-    start = ca.Function("start", [p.vector], [q0])
-    space = OperationalSpace(model)
-    both = [ca.diag(space.mobility(J)), ca.diag(space.open_mobility(J))]
-    mobilities = ca.Function("mobilities", [q, p.vector], both)
-    values = [value for v in p.variables for value in v.starts]
-    closed, opened = (np.array(m).ravel() for m in mobilities(start(values), values))
-    return [(max(float(c), 0.0), float(o)) for c, o in zip(closed, opened, strict=True)]
+    closed, opened = start_mobility(
+        linkage, lambda model: ca.vertcat(*(j.value(model) for j in joints))
+    )
+    both = zip(closed.diagonal(), opened.diagonal(), strict=True)
+    return [(max(float(c), 0.0), float(o)) for c, o in both]

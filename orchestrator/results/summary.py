@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
+from hapticlink.orchestrator.results import contact_warnings
 from hapticlink.orchestrator.results.figure_axes import short
 from hapticlink.orchestrator.results.force_figure import wrenches
 from hapticlink.orchestrator.results.tables import Results
@@ -53,7 +54,7 @@ def numbers(results: Results) -> Iterator[str]:
 
 def lines(results: Results) -> Iterator[str]:
     """One line for each warning: start poses, folded copy, held outputs, repeated steps,
-    convergence, lost samples, stability, and holds that did not fit."""
+    contacts, convergence, lost samples, stability, and holds that did not fit."""
     run = results.run
     yield from _start(results)
     off, frames = folded(results)
@@ -71,6 +72,7 @@ def lines(results: Results) -> Iterator[str]:
         yield f"{found['unconverged']} of {found['steps']} iterated steps did not converge"
     for fmu, errors in run.get("step_errors", {}).items():
         yield from long_steps(fmu, errors)
+    yield from contact_warnings.lines(results)
     for clock, steps in run["controlled_steps"].items():
         if steps["forced"]:
             few = f"{steps['forced']} of {steps['taken']} steps were accepted at the smallest size"

@@ -103,8 +103,8 @@ def driven_slider(sine: CoordinateSine | None = None) -> Component:
 
 
 def rubbing_rod() -> Component:
-    """A rod that falls on a floor, with friction there and in its pivot, and that turns back at a
-    limit: states beside q and qd."""
+    """A rod that falls on a free disc on a floor, with friction there and in its pivot, and that
+    turns back at a limit: states beside q and qd."""
     limits = Limits(upper=0.05, stiffness=50.0, restitution=0.6)
     pivot = Joint(name="pivot", child="rod", friction=0.02, friction_speed=0.05, limits=limits)
     linkage = Linkage(
@@ -117,9 +117,11 @@ def rubbing_rod() -> Component:
                 radius=0.01,
                 capsule=((0.0, 0.0), (0.2, 0.0)),
             ),
+            Body(name="disc", mass=0.1, radius=0.008),
         ),
-        joint=(pivot,),
+        joint=(pivot, Joint(name="disc", type="free", child="disc")),
         operational_point=OperationalPoint(body="rod", at=(0.2, 0.0)),
+        start={"disc": (0.12, -0.02, 0.0)},
         start_velocity={"pivot": 3.0},
         gravity=(0.0, -9.81),
     )

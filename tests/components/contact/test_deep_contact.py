@@ -26,16 +26,18 @@ SQUARE = ((0.1, -0.3), (0.7, -0.1), (0.5, 0.5), (0.0, 0.3))
 SPIKE = ((-0.06, -0.3), (0.06, -0.3), (0.02, 0.0))
 
 
-def loose(corners):
+def loose(corners, **law):
     """A free bar by a polygon."""
     shape = ((0.0, 0.0), (LENGTH, 0.0))
-    bar = Body(name="bar", mass=MASS, inertia=INERTIA, radius=R, capsule=shape)
+    middle = (LENGTH / 2, 0.0) if law else None
+    bar = Body(name="bar", mass=MASS, inertia=INERTIA, center=middle, radius=R, capsule=shape)
     linkage = Linkage(
         body=(bar,),
         joint=(Joint(name="float", type="free", child="bar"),),
         operational_point=OperationalPoint(body="bar"),
     )
-    contacts = Contacts(polygon=(Polygon(corners=corners),), damping=0.0, detection="haptics")
+    law |= {"damping": 0.0, "detection": "haptics"}
+    contacts = Contacts(polygon=(Polygon(corners=corners),), **law)
     return Running(virtual_mechanism(linkage, Mechanism(), None, contacts, step_s=1e-3))
 
 
@@ -120,3 +122,23 @@ def test_an_elastic_bounce_deeper_than_the_radius_returns_its_energy(obstacle, s
     places = 2 if obstacle == "edge" else 1
     assert deepest == pytest.approx(speed / math.sqrt(places * 15000.0), rel=1e-3)
     assert bar.y["qd"][0] == pytest.approx(-speed, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("q", "qd"),
+    [
+        ((-0.2769, 0.3536, 2.4271), (1.9605, -0.3273, 3.4602)),
+        ((1.0246, -0.2655, 0.873), (-2.0242, 0.7753, -0.3238)),
+    ],
+)
+def test_a_corner_that_passes_an_end_while_pressed_adds_no_energy(q, qd):
+    """Bars on a soft square without damping; at a radius' depth a spring of k r^2/2 = 2.5 J."""
+    bar = loose(SQUARE, stiffness=2000.0)
+    bar.put(q=q, qd=qd)
+    before, deepest = bar.y["energy"], 0.0
+    for _ in range(1400):
+        bar.step(5e-4)
+        y = bar.outputs("energy", "contact_gap")
+        deepest = max(deepest, -y["contact_gap"])
+        assert y["energy"] == pytest.approx(before, rel=1e-4)
+    assert deepest > 0.5 * R

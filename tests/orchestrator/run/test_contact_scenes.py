@@ -8,6 +8,7 @@ import pytest
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.tables import Table
 
 TOUCHED = "duration=0.6"
@@ -31,6 +32,16 @@ TOUCHED = "duration=0.6"
         ("enclosure", "contacts.friction=-0.3", "give a number >= 0"),
         ("obstacles", "contacts.disc.pin.name=block", "'block' is taken"),
         ("obstacles", "contacts.disc.pin.radius=0.0", r"give a number > 0 \(m\)"),
+        ("push-disc", "linkage.body.disc.name=block", "'block' is taken"),
+        ("push-disc", "contacts={bodies='none'}", "there is nothing to touch"),
+        ("push-disc", "linkage.body.block.corners=[[0,0],[1,0],[0.1,0.1],[0,1]]", "not convex at"),
+        ("push-disc", "linkage.body.block.capsule=[[0,0],[1,0]]", "leave out one of them"),
+        ("push-disc", "linkage.body.block.center=[0.01, 0.0]", "give its `inertia` too"),
+        (
+            "push-disc",
+            "contacts={detection='graphics'};graphics.sync=operational",
+            "nothing pulls the copy of 'block' along",
+        ),
         ("closed-loop", "controller.contact=true", r"there is nothing to touch: add \[contacts\]"),
         ("pendulum", "linkage.joint.pivot.limits={stiffness=9.0}", "give `lower`, `upper` or both"),
         (
@@ -61,7 +72,7 @@ TOUCHED = "duration=0.6"
 )
 def test_what_is_refused(scene: str, option: str, message: str) -> None:
     with pytest.raises(SceneFault, match=message):
-        open_scene.load(scene, [option])
+        open_scene.load(scene, option.split(";"))
 
 
 @pytest.fixture(scope="module")
@@ -123,3 +134,31 @@ def test_contact_rows_are_never_mixed(tmp_path):
     name = next(name for name in holds if ".contacts ->" in name)
     assert "zoh" in str(holds[name])
     assert "foh" in str(holds.values())
+
+
+def test_the_copy_follows_free_objects(tmp_path: Path) -> None:
+    """push-disc until the disc has been hit: geometry that the graphics block finds gives nearly
+    the motion of geometry that the mechanism finds."""
+    q = []
+    for detection in ("haptics", "graphics"):
+        options = ["duration=1.2", "mechanism.events=0", f"contacts.detection={detection}"]
+        rows = simulate("push-disc", tmp_path / detection, options).results.haptics
+        assert rows["virtual_mechanism.F_env"].any()
+        q.append(rows["virtual_mechanism.q"][:, 2:4])
+    moved = np.abs(q[0][-1] - q[0][0]).max()
+    assert moved > 1e-3  # of the disc
+    assert np.abs(q[0] - q[1]).max() < 0.2 * moved
+
+
+def test_contacts_that_are_too_deep_or_too_stiff_are_warned_of(tmp_path: Path) -> None:
+    """The disc starts on the axis of link 2, whose radius is 3 mm; b/m of the discs is 1/0.2 ms."""
+    options = [
+        "duration=0.02",
+        "mechanism.events=0",
+        "linkage.start.disc=[0.0445, 0.0148, 0.0]",
+        "contacts.damping=300",
+    ]
+    results = simulate("push-disc", tmp_path, options).results
+    deep, stiff = (line for line in summary.lines(results) if line.startswith("warning"))
+    assert "link2 is 11.9 mm deep in disc, past the middle of the thinner one (3 mm)" in deep
+    assert "contacts of disc with block have a pole" in stiff

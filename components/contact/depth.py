@@ -1,0 +1,76 @@
+"""How deep bodies are in what they touch, and how deep is meaningful.
+
+Beyond the middle of the thinner one of two shapes the nearest side is another one than that on
+which they met: the force changes its direction, and a corner that has sunk past the axis of a
+capsule can lose or gain its spring (detection.py), and with it energy. The walls of the enclosure
+are half planes, in which any depth is meaningful.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.components.component import Signals
+from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.contact.contact_forces import detection_parameters, gap
+from hapticlink.components.contact.detection import touches
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import body_parameters
+from hapticlink.components.specs.bodies import edges
+from hapticlink.components.specs.contacts import Contacts, Pair
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import Point
+
+
+def middle(linkage: Linkage, contacts: Contacts, pair: Pair) -> float:
+    """Half the smallest width (m) of the thinner one of two shapes; inf at the enclosure."""
+    if pair.kind == "enclosure":
+        return math.inf
+    bodies = {b.name: b for b in linkage.body}
+    body = bodies[pair.body]
+    shapes = [(body.shape, body.radius or 0.0)]
+    if pair.kind == "body":
+        other = bodies[pair.obstacle]
+        shapes.append((other.shape, other.radius or 0.0))
+    elif pair.kind == "disc":
+        shapes.append(((), contacts.disc[pair.index].radius))
+    else:
+        shapes.append((contacts.polygon[pair.index].corners, 0.0))
+    return min(_width(corners) / 2 + radius for corners, radius in shapes)
+
+
+def _width(corners: tuple[Point, ...]) -> float:
+    """The smallest distance of two parallel lines with a convex polygon between them, 0 for a
+    segment or a point: one of them is along an edge."""
+    if len(corners) < 3:
+        return 0.0
+    points, widths = np.array(corners), []
+    for a, b in edges(corners):
+        across = np.array([a[1] - b[1], b[0] - a[0]]) / math.dist(a, b)
+        widths.append(float(np.ptp(points @ across)))
+    return min(widths)
+
+
+def depths(
+    linkage: Linkage, contacts: Contacts, q: Sequence[Sequence[float]] | NDArray[np.float64]
+) -> Iterator[tuple[Pair, NDArray[np.float64]]]:
+    """Each pair that can touch, and its depth (m), negative where it is apart, (k,), at joint
+    coordinates q (k, n)."""
+    variables = [*body_parameters(linkage), *detection_parameters(linkage, contacts)]
+    p = Signals("p", variables)
+    rows = np.atleast_2d(np.asarray(q, float))
+    model = LinkageModel(linkage, p, ca.SX.sym("q", rows.shape[1]), ca.SX(rows.shape[1], 1))
+    gaps = ca.vertcat(*(gap(model, touch) for touch in touches(model, contacts, p)))
+    values = [value for variable in variables for value in variable.starts]
+    at = ca.Function("gaps", [model.q, p.vector], [gaps])
+    found = np.array([np.array(at(row, values)).ravel() for row in rows])
+    first = 0
+    for pair in near(linkage, contacts):
+        last = first + pair.places
+        yield pair, -found[:, first:last].min(axis=1)
+        first = last

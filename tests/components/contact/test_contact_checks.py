@@ -1,0 +1,69 @@
+"""What a run warns of: contacts past the middle of a shape, and too stiff for the steps."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.contact.depth import depths, middle
+from hapticlink.components.contact.stiffness import STABLE, poles
+from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
+from hapticlink.components.specs.linkage import Body
+from tests.components.contact.test_contact import FLOOR, R, block, loose
+from tests.components.contact.test_moving_bodies import disc, free
+
+BALL = loose(((0.0, 0.0),))  # 2 kg
+
+
+def test_depths_and_the_middle_of_shapes():
+    """A disc beside another, in a bar of 60 mm, an obstacle and the enclosure."""
+    bar = Body(name="bar", mass=1.0, corners=((0, 0), (0.5, 0), (0.5, 0.06), (0, 0.06)))
+    linkage = free(disc("ball", 1.0), disc("other", 1.0, 0.02), bar)
+    contacts = Contacts(
+        **FLOOR,
+        disc=(Disc(center=(0.0, 0.3), radius=0.2),),
+        polygon=(Polygon(corners=((1, 0), (2, 0), (2, 1), (1, 1))),),
+    )
+    q = [(0.2, 0.04, 0.0, 0.25, 0.04, 0.0, 0.0, 0.0, 0.0)]
+    found = {(p.body, p.obstacle): (p, d[0]) for p, d in depths(linkage, contacts, q)}
+    exact = {
+        ("ball", "enclosure"): (0.01, math.inf),
+        ("ball", "disc1"): (0.25 - math.hypot(0.2, 0.26), 0.05),
+        ("ball", "polygon1"): (0.05 - 0.8, 0.05),
+        ("ball", "other"): (0.07 - 0.05, 0.02),
+        ("ball", "bar"): (0.05 + 0.02, 0.03),
+        ("bar", "polygon1"): (-0.5, 0.03),
+    }
+    for key, (depth, half) in exact.items():
+        pair, value = found[key]
+        assert value == pytest.approx(depth, abs=1e-12), key
+        assert middle(linkage, contacts, pair) == pytest.approx(half, abs=1e-12), key
+    assert [p for p, _ in found.values()] == list(near(linkage, contacts))
+
+
+def test_poles_of_contacts():
+    """m e'' + b e' + k e = 0 at a wall, and with the reduced mass of two discs."""
+    for damping in (10.0, 3000.0):
+        contacts = Contacts(**FLOOR, stiffness=15000.0, damping=damping)
+        found = poles(free(disc("a", 2.0), disc("b", 3.0)), contacts)
+        for (_, pole), mass in zip(found, (2.0, 3.0, 1 / (1 / 2 + 1 / 3)), strict=True):
+            exact = np.abs(np.roots([mass, damping, 15000.0])).max()
+            assert pole == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize(("damping", "rises"), [(3900.0, False), (6000.0, True)])
+def test_energy_rises_in_a_tick_only_where_the_poles_are_too_fast(damping, rises):
+    """A ball of 2 kg at 1 m/s on a wall, which it meets at any part of a step of 1 ms."""
+    contacts = {**FLOOR, "damping": damping}
+    fastest = max(pole for _, pole in poles(BALL, Contacts(**contacts)))
+    assert (fastest * 1e-3 > STABLE) == rises
+    ball, most = block(BALL, contacts), 0.0
+    for share in np.linspace(0, 1, 8)[:-1]:
+        ball.put(q=(0.0, R + 0.002 + share * 1e-3, 0.0), qd=(0.0, -1.0, 0.0))
+        energies = [1.0]
+        for _ in range(20):
+            ball.step(1e-3)
+            energies.append(ball.outputs("energy")["energy"])
+        most = max(most, np.diff(energies).max())
+    assert (most > 1e-12) == rises
