@@ -155,3 +155,26 @@ def test_an_impact_with_friction_has_the_order_of_the_method():
         errors.append(np.abs(np.r_[y["x"], y["v"]] - exact).max())
     assert -np.polyfit(np.log(rates), np.log(errors), 1)[0] > 3.5
     assert errors[1] < 1e-4
+
+
+def test_a_change_from_sliding_to_sticking_is_of_second_order():
+    """A block on a rail that a floor presses by N: it slides with v' = -mu N/m until v = 0, where
+    its spring is deflected by d = mu N/k, and goes on as m z'' + k tau z' + k z = 0, z(0) = d,
+    z' = v. The force has no jump there, and such changes are not located."""
+    N, mu, speed, t_end = 19.62, 0.3, 0.5, 0.25
+    joint = Joint(name="rail", type="prismatic", axis=0.0, child="bar", at_parent=(0.0, R - N / K))
+    block = Linkage(
+        body=(Body(name="bar", mass=MASS, inertia=1.0, radius=R),),
+        joint=(joint,),
+        operational_point=OperationalPoint(body="bar"),
+        start_velocity={"rail": speed},
+    )
+    t = t_end - speed * MASS / (mu * N)
+    omega, d, tau = math.sqrt(K / MASS), mu * N / K, 4 * 2e-3  # of steps of 2 ms (`running`)
+    zeta = tau * omega / 2
+    damped = omega * math.sqrt(1 - zeta**2)
+    exact = -d * omega**2 / damped * math.exp(-zeta * omega * t) * math.sin(damped * t)
+    rates = (500, 1000, 2000, 4000, 8000)
+    errors = [abs(steps(running(block, mu), t_end, rate).state["qd"][0] - exact) for rate in rates]
+    assert 1.7 < -np.polyfit(np.log(rates), np.log(errors), 1)[0] < 2.5
+    assert errors[1] < 5e-6

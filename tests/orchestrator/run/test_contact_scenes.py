@@ -152,12 +152,8 @@ def test_the_copy_follows_free_objects(tmp_path: Path) -> None:
 
 def test_contacts_that_are_too_deep_or_too_stiff_are_warned_of(tmp_path: Path) -> None:
     """The disc starts on the axis of link 2, whose radius is 3 mm; b/m of the discs is 1/0.2 ms."""
-    options = [
-        "duration=0.02",
-        "mechanism.events=0",
-        "linkage.start.disc=[0.0445, 0.0148, 0.0]",
-        "contacts.damping=300",
-    ]
+    options = ["duration=0.02", "mechanism.events=0", "contacts.damping=300"]
+    options.append("linkage.start.disc=[0.0445, 0.0148, 0.0]")
     results = simulate("push-disc", tmp_path, options).results
     deep, stiff = (line for line in summary.lines(results) if line.startswith("warning"))
     assert "link2 is 11.9 mm deep in disc, past the middle of the thinner one (3 mm)" in deep
