@@ -39,7 +39,10 @@ class Body:
                 f"body {self.name!r}: a centre of mass that is given is not that of a uniform "
                 "shape: give its `inertia` too, or leave out `center`"
             )
-        center, per_mass = uniform(self.shape, self.radius or 0.0)
+        try:
+            center, per_mass = uniform(self.shape, self.radius or 0.0)
+        except OverflowError:
+            raise ValueError(f"body {self.name!r}: its shape is too large (m)") from None
         object.__setattr__(self, "inertia", self.mass * per_mass)
         if center != (0.0, 0.0):
             object.__setattr__(self, "center", center)
@@ -97,6 +100,8 @@ def uniform(corners: tuple[Point, ...], radius: float) -> tuple[Point, float]:
         middle = (q[0] + away * math.cos(angle), q[1] + away * math.sin(angle))
         parts.append((area, middle, area * (radius**2 / 2 - away**2)))
     total = math.fsum(area for area, _, _ in parts)
+    if math.isinf(total * total):
+        raise OverflowError
     if not total > 0:
         raise ValueError("a shape without area has no uniform density: give the body's `inertia`")
     x, y = (math.fsum(a * middle[i] for a, middle, _ in parts) / total for i in (0, 1))

@@ -56,7 +56,8 @@ class Contacts:
     damping: LinearDamping = 300.0
     """b_contact of section B.6."""
     friction: Annotated[float, Quantity("1", ge=0)] | None = None
-    """Coefficient of Coulomb friction, up to which contacts stick; by default there is none."""
+    """Coefficient of Coulomb friction, up to which contacts stick; by default there is none.
+    Changes between sticking and sliding are accurate to second order in the step."""
     detection: Literal["graphics", "haptics"] = "graphics"
     """graphics: the virtual environment detects contacts, and their geometry is held between frames
     (the report's local model); haptics: the mechanism detects them at every evaluation."""
