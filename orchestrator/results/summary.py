@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
-from hapticlink.orchestrator.results import contact_warnings
 from hapticlink.orchestrator.results.figure_axes import short
 from hapticlink.orchestrator.results.force_figure import wrenches
 from hapticlink.orchestrator.results.tables import Results
@@ -72,7 +71,7 @@ def lines(results: Results) -> Iterator[str]:
         yield f"{found['unconverged']} of {found['steps']} iterated steps did not converge"
     for fmu, errors in run.get("step_errors", {}).items():
         yield from long_steps(fmu, errors)
-    yield from contact_warnings.lines(results)
+    yield from _contacts(results)
     for clock, steps in run["controlled_steps"].items():
         if steps["forced"]:
             few = f"{steps['forced']} of {steps['taken']} steps were accepted at the smallest size"
@@ -88,6 +87,13 @@ def lines(results: Results) -> Iterator[str]:
         misfits = [f"{name} ({why['reason']})" for name, why in group]
         more = f" and {len(misfits) - 1} more" if len(misfits) > 1 else ""
         yield f"hold {hold} does not fit {misfits[0]}{more}: zoh there"
+
+
+def _contacts(results: Results) -> Iterator[str]:
+    if results.run["scene"]["contacts"]:
+        from hapticlink.orchestrator.results import contact_warnings
+
+        yield from contact_warnings.lines(results)
 
 
 LARGEST, MEDIAN = 0.1, 1e-3
