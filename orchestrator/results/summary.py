@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
+from hapticlink.orchestrator.results import friction_speed
 from hapticlink.orchestrator.results.figure_axes import short
 from hapticlink.orchestrator.results.force_figure import wrenches
 from hapticlink.orchestrator.results.tables import Results
@@ -71,6 +72,7 @@ def lines(results: Results) -> Iterator[str]:
         yield f"{found['unconverged']} of {found['steps']} iterated steps did not converge"
     for fmu, errors in run.get("step_errors", {}).items():
         yield from long_steps(fmu, errors, run["fmus"][fmu].get("block"))
+    yield from friction_speed.coarse(results)
     for clock, steps in run["controlled_steps"].items():
         if steps["forced"]:
             few = f"{steps['forced']} of {steps['taken']} steps were accepted at the smallest size"
