@@ -115,7 +115,7 @@ def _story(scene: Scene, plan: Plan) -> dict[str, Any]:
             }
             for u in system.fmus
         },
-        "friction_speeds": _friction_speeds(system),
+        "friction_speeds": _friction_speeds(scene, system),
         "coupling": system.coupling,
         "loops": [asdict(loop) for loop in plan.loops()],
         "connections": [c.name for c in system.connections],
@@ -123,12 +123,15 @@ def _story(scene: Scene, plan: Plan) -> dict[str, Any]:
     } | holds(system)
 
 
-def _friction_speeds(system: System) -> dict[str, float]:
+def _friction_speeds(scene: Scene, system: System) -> dict[str, float]:
     """v_f (rad/s or m/s) of the mechanism's joints with friction, by name."""
-    if MECHANISM not in system.fmu or system.block(MECHANISM) != MECHANISM:
+    if MECHANISM not in system.fmu or not (scene.linkage and scene.linkage.rubbing):
         return {}
-    ending, scalars = ".friction_speed", system.fmu[MECHANISM].description.scalars
-    return {s.name.removesuffix(ending): s.start for s in scalars if s.name.endswith(ending)}
+    from hapticlink.components.dynamics import friction_scale  # loads CasADi
+
+    timeline = system.timeline
+    period = timeline.seconds(timeline.clock(system.fmu[MECHANISM].clock).longest)
+    return friction_scale.speeds(scene.linkage, period / scene.mechanism.substeps)
 
 
 def _compilers(scene: Scene) -> tuple[str, ...]:
