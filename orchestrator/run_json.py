@@ -19,6 +19,7 @@ from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import held_polynomials
+from hapticlink.orchestrator.system.haptic_loop import MECHANISM
 from hapticlink.orchestrator.system.ports import carries_power
 from hapticlink.orchestrator.system.system import System
 
@@ -114,11 +115,23 @@ def _story(scene: Scene, plan: Plan) -> dict[str, Any]:
             }
             for u in system.fmus
         },
+        "friction_speeds": _friction_speeds(scene, system),
         "coupling": system.coupling,
         "loops": [asdict(loop) for loop in plan.loops()],
         "connections": [c.name for c in system.connections],
         "replaced": {name: asdict(r) for name, r in system.replacements.items()},
     } | holds(system)
+
+
+def _friction_speeds(scene: Scene, system: System) -> dict[str, float]:
+    """v_f (rad/s or m/s) of the mechanism's joints with friction, by name."""
+    if MECHANISM not in system.fmu or not (scene.linkage and scene.linkage.rubbing):
+        return {}
+    from hapticlink.components.dynamics import friction_scale  # loads CasADi
+
+    timeline = system.timeline
+    period = timeline.seconds(timeline.clock(system.fmu[MECHANISM].clock).longest)
+    return friction_scale.speeds(scene.linkage, period / scene.mechanism.substeps)
 
 
 def _compilers(scene: Scene) -> tuple[str, ...]:

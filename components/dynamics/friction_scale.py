@@ -78,6 +78,16 @@ def scales(linkage: Linkage) -> list[Scale]:
     ]
 
 
+def speeds(linkage: Linkage, h: float) -> dict[str, float]:
+    """v_f (rad/s or m/s) by joint, for steps of h (s)."""
+    found = {}
+    for scale in scales(linkage):
+        defaults = scale.defaults(ca.SX(h))
+        given = scale.joint.friction_speed
+        found[scale.name] = float(defaults.get(f"{scale.name}.friction_speed", given))
+    return found
+
+
 def longest_step(scales: Iterable[Scale]) -> float:
     """The longest step (s) in which explicit methods are stable with the values that are given."""
     fastest = max((pole for scale in scales for _, pole in scale.poles), default=0.0)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.device.workspace import links
 from hapticlink.components.linkage.poses import poses
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop
+from hapticlink.orchestrator.results import workspace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,8 +39,8 @@ def draw(
     contacts: Contacts | None = None,
 ) -> None:
     """The linkage at joint coordinates q, in mm; its pose at `end` as thin lines; what the links
-    can touch; the arms of the device, its handle at the operational point, as far as they reach
-    into the picture."""
+    can touch; the arms of the device, its handle at the operational point, and the border of its
+    workspace, as far as they reach into the picture."""
     drawing = _Drawing(axes, linkage, poses(linkage, [q]))
     if contacts:
         obstacles(axes, contacts)
@@ -52,7 +52,7 @@ def draw(
     drawing.points()
     limits = _limits(axes)
     if device:
-        _device(axes, device, drawing.operational_pose())
+        workspace.beneath(axes, device, drawing.operational_pose(), limits)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", xlim=limits[0], ylim=limits[1])
     axes.set_aspect("equal", adjustable="box")
 
@@ -310,14 +310,6 @@ def obstacles(axes: Axes, contacts: Contacts) -> None:
         found.append(Polygon(walls, fill=False, edgecolor="0.4", label="enclosure"))
     for patch in found:
         axes.add_patch(patch)
-
-
-def _device(axes: Axes, device: Device, pose: Pose) -> None:
-    arms = links(device, [float(value) for value in pose]) * MM
-    if np.isfinite(arms).all():
-        for i, arm in enumerate(arms):
-            label = "arms of the device" if i == 0 else None
-            axes.plot(*arm.T, color="0.75", lw=1.5, marker="o", ms=3, zorder=0, label=label)
 
 
 def _hull(points: Pose) -> Pose:

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hapticlink.components.device.workspace import Range, links, margin, workspace
+from hapticlink.components.device.workspace import Field, Range, links, margin, workspace
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.summary import outside
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+BEYOND = "#fbe3d6"
 Pose = Sequence[float]
 """x m, y m, theta rad."""
 
@@ -76,3 +78,20 @@ def draw(device: Device, start: Pose, title: str) -> Figure:
     axes.set_title(fill(title, 70), fontsize="medium")
     axes.grid(alpha=0.3)
     return figure
+
+
+def beneath(axes: Axes, device: Device, pose: Field, limits: Field) -> None:
+    """The arms at `pose`, and a shade where the handle cannot be at any theta, within `limits` of x
+    and y (mm), for a drawing in mm."""
+    arms = links(device, [float(value) for value in pose]) * 1e3
+    if np.isfinite(arms).all():
+        for i, arm in enumerate(arms):
+            label = "arms of the device" if i == 0 else None
+            axes.plot(*arm.T, color="0.75", lw=1.5, marker="o", ms=3, zorder=0, label=label)
+    x, y = (np.linspace(low, high, 41) for low, high in limits)
+    theta = np.linspace(-math.pi, math.pi, 16, endpoint=False)
+    poses = np.stack(np.meshgrid(x / 1e3, y / 1e3, theta, indexing="ij"), axis=-1)
+    most = margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3]).max(axis=2)
+    if most.min() < 0:
+        axes.contourf(x, y, most.T, [-math.inf, 0], colors=[BEYOND], zorder=-1)
+        axes.plot([], [], "s", color=BEYOND, ms=9, label="outside the device's workspace")

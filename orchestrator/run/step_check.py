@@ -1,12 +1,18 @@
 """Estimates the integration error of plants during a run, by step doubling on a few of their steps.
 
-e_k = |v(t_k + h) - v_2(t_k + h)| / max_k |v|
+e_k = |v(t_k + h) - v_2(t_k + h)| / max |v|
 
 v are the outputs that are first derivatives of others, v_2 the same after two steps of h/2 from
 the same FMU state with the same inputs (Hairer, Norsett, Wanner, Solving Ordinary Differential
 Equations I (1993), section II.4, without the factor 1/(1 - 2^-p): a step may be too long for its
 order p to show). e_k of about 1 is a step beyond the stability of its method, as with a stiff drive
-at a light body; an impact gives a single e_k that halves with h.
+at a light body. The sum of all e_k estimates what the errors of a run add up to where the motion
+neither damps nor amplifies them.
+
+One step in EVERY is checked, so that EVERY e_k stands for the sum. Episodes that are shorter, such
+as an impact or a light body that passes a dead centre, show in the change of v over a step: the
+first step, and each after one that changed v by a multiple JUMP of all before, are checked, too,
+and count once.
 
 The state is restored before the step that counts, so that results do not depend on the check. Only
 FMUs with a hapticlink annotation are checked: others may keep what they do not restore.
@@ -31,6 +37,9 @@ prime, so that checks fall on all phases between two rates."""
 FIRST = 13
 SLOT = 2
 """Slot of the saved FMU state, beside those of iteration and step control."""
+JUMP, SHARE = 2.0, 0.05
+"""A step is checked where the one before has changed v by more than a JUMP of the largest change
+that led to a check, and by more than a SHARE of the largest v."""
 AT_REST = 1e-6
 """Rate (1/s), relative to the magnitude of the output itself, below which it is at rest."""
 
@@ -40,11 +49,11 @@ ROOM = 256
 
 @dataclass(frozen=True)
 class StepErrors:
-    """Of the steps of an FMU, `size` (s) the longest checked: median and largest e_k, and the
-    output and time (s) of the largest."""
+    """Of the steps of an FMU, `size` (s) the longest checked: the estimated sum of all e_k of an
+    output, the largest e_k, and the output and time (s) of the latter."""
 
     checked: int
-    median: float
+    sum: float
     largest: float
     output: str
     time: float
@@ -52,7 +61,7 @@ class StepErrors:
 
 
 class StepCheck:
-    """Checks one in EVERY steps of an FMU for which `possible` is true."""
+    """Checks steps of an FMU for which `possible` is true."""
 
     def __init__(self, instance: Instance) -> None:
         self._instance = instance
@@ -64,9 +73,11 @@ class StepCheck:
         self.bases = np.array([names.index(base) for base, _ in pairs], dtype=np.int64)
         self.rates = np.array([names.index(rate) for _, rate in pairs], dtype=np.int64)
         self.port = np.array([self._ports.index(p) for p in ports], dtype=np.int64)
-        self.scales = np.zeros(len(self._ports))
+        self.last = np.full(len(pairs), np.nan)
+        self.scales, self.jumps = np.zeros((2, len(self._ports)))
         self.steps, self.count, self.size = ctypes.c_int64(), ctypes.c_int64(), ctypes.c_double()
-        self.found, self.times = np.zeros((ROOM, len(self._ports))), np.zeros(ROOM)
+        self.found = np.zeros((ROOM, len(self._ports)))
+        self.times, self.weights = np.zeros((2, ROOM))
         self.changed: Callable[[], object] = lambda: None
 
     @staticmethod
@@ -83,7 +94,8 @@ class StepCheck:
     def around(self, step: Callable[[], object], time: float, end: float) -> None:
         """Call `step`, which takes the FMU from `time` to `end` (s), and check it if it is due."""
         self.steps.value += 1
-        if self.steps.value % EVERY != FIRST:
+        regular = self.steps.value % EVERY == FIRST
+        if not self._moved() and not regular:
             step()
             return
         instance, outputs = self._instance, self._instance.outputs
@@ -94,7 +106,7 @@ class StepCheck:
         step()
         instance.read()
         if halves is not None:
-            self._compare(outputs, halves, time, end)
+            self._compare(outputs, halves, time, end, EVERY if regular else 1)
         outputs[:] = before
 
     def _halves(self, time: float, end: float) -> Vector | None:
@@ -108,18 +120,30 @@ class StepCheck:
             return None
         return instance.outputs.copy()
 
-    def _compare(self, whole: Vector, halves: Vector, time: float, end: float) -> None:
-        rates, found = whole[self.rates], np.zeros(len(self._ports))
-        np.maximum.at(found, self.port, np.abs(rates - halves[self.rates]))
+    def _moved(self) -> bool:
+        """Whether this is the first step (v before it is NaN) or the last one changed v by more
+        than those before; records v and the change."""
+        outputs = self._instance.outputs
+        rates, changes = outputs[self.rates], np.zeros(len(self._ports))
+        np.maximum.at(changes, self.port, np.abs(rates - self.last))
+        moved = not np.all((changes <= JUMP * self.jumps) | (changes <= SHARE * self.scales))
+        if moved:
+            np.fmax(self.jumps, changes, out=self.jumps)
+        size = np.fmax(np.abs(rates), AT_REST * np.abs(outputs[self.bases]))
+        np.fmax.at(self.scales, self.port, size)
+        self.last[:] = rates
+        return moved
+
+    def _compare(self, whole: Vector, halves: Vector, time: float, end: float, weight: int) -> None:
+        found = np.zeros(len(self._ports))
+        np.maximum.at(found, self.port, np.abs(whole[self.rates] - halves[self.rates]))
         if not np.all(np.isfinite(found)):
             return
-        size = np.maximum(np.abs(rates), AT_REST * np.abs(whole[self.bases]))
-        np.maximum.at(self.scales, self.port, size)
         if (k := self.count.value) == len(self.times):
             self.found = np.concatenate([self.found, np.zeros_like(self.found)])
-            self.times = np.concatenate([self.times, np.zeros_like(self.times)])
+            self.times, self.weights = (np.append(v, 0.0 * v) for v in (self.times, self.weights))
             self.changed()
-        self.found[k], self.times[k] = found, time
+        self.found[k], self.times[k], self.weights[k] = found, time, weight
         self.count.value, self.size.value = k + 1, max(self.size.value, end - time)
 
     def errors(self) -> StepErrors | None:
@@ -128,11 +152,10 @@ class StepCheck:
             return None
         found = self.found[: self.count.value]
         share = found / np.where(self.scales > 0, self.scales, 1.0)
-        ordered = np.sort(share.max(axis=1)).tolist()  # np.median loads masked arrays
         k, port = np.unravel_index(int(share.argmax()), share.shape)
         return StepErrors(
             checked=len(share),
-            median=(ordered[(len(share) - 1) // 2] + ordered[len(share) // 2]) / 2,
+            sum=float((self.weights[: len(share)] @ share).max()),
             largest=float(share[k, port]),
             output=self._ports[port],
             time=float(self.times[k]),

@@ -6,7 +6,7 @@ import re
 import tomllib
 from typing import Any
 
-LARGEST = 2**20
+LARGEST = 2**23
 """Bytes of a scene; a recorded trace of frames is a file of its own."""
 DEEPEST = 32
 """Brackets within one another, and names of a dotted key."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -62,7 +62,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         scene.faults,
         rules.power,
         scene.substeps,
-        scene.get_after_set,
+        (*scene.get_after_set, *_read_again(scene, ours)),
         scene.iteration,
         scene.step_control,
         refused,
@@ -70,6 +70,14 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         haptic_loop.energy_in_play(scene),
         replacements.replacements(blocks, haptic_loop.rows(scene), fmus, assigned),
     )
+
+
+def _read_again(scene: Scene, ours: Iterable[Fmu]) -> Iterator[str]:
+    """The hands that are plants, in iterated coupling: their force depends directly on the handle,
+    and errs to order 1 unless it is read with the inputs at the end of the step."""
+    hands = [u.name for u in ours if u.description.block == "hand" and not u.sampled]
+    if scene.coupling == "iterated":
+        yield from (name for name in hands if name not in scene.get_after_set)
 
 
 def _connections(

@@ -14,9 +14,9 @@ from tests.blocks import Running
 from tests.reference.absolute_coordinates import Absolute
 
 H = 1 / 512
-SLOTS = ("scotch-yoke", "quick-return", "scissor-lift")
-PINS = ("peaucellier", "watt-six-bar", "jansen", "pantograph", "geared-five-bar")
-DRIVEN = ("quick-return", "jansen")
+SLOTS = ("trammel", "scotch-yoke", "quick-return", "scissor-lift")
+PINS = ("peaucellier", "watt-six-bar", "six-bar", "jansen", "pantograph", "geared-five-bar")
+DRIVEN = ("quick-return", "jansen", "six-bar")
 
 
 def linkage(name):

@@ -69,11 +69,15 @@ def of_instance(instance: InProcess, check: StepCheck | None, c: structures.Fmu)
     made.state = ctypes.addressof(saved.state)
     made.steps, made.count = ctypes.addressof(check.steps), ctypes.addressof(check.count)
     made.every, made.first, made.at_rest = step_check.EVERY, step_check.FIRST, step_check.AT_REST
+    made.jump, made.share = step_check.JUMP, step_check.SHARE
     made.bases, made.rates, made.ports = (
         places.ctypes.data for places in (check.bases, check.rates, check.port)
     )
     made.n, made.n_ports = len(check.port), len(check.scales)
-    made.scales, made.size = check.scales.ctypes.data, ctypes.addressof(check.size)
+    made.scales, made.jumps, made.last = (
+        values.ctypes.data for values in (check.scales, check.jumps, check.last)
+    )
+    made.size = ctypes.addressof(check.size)
     scratch = np.zeros((2, len(instance.outputs)))
     made.before, made.halves = scratch[0].ctypes.data, scratch[1].ctypes.data
     check.changed = partial(_fill_check, made, check)
@@ -83,6 +87,7 @@ def of_instance(instance: InProcess, check: StepCheck | None, c: structures.Fmu)
 
 def _fill_check(c: structures.Check, check: StepCheck) -> None:
     c.errors, c.times, c.room = check.found.ctypes.data, check.times.ctypes.data, len(check.times)
+    c.weights = check.weights.ctypes.data
 
 
 def of_setter(setter: Setter, instance: InProcess, c: structures.Setter) -> object:

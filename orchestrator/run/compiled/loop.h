@@ -32,14 +32,15 @@ typedef struct {
 enum { DOUBLE, FLOAT, INT64, INT32, INT16, INT8, UINT64, UINT32, UINT16, UINT8, BOOL2, BOOL3 };
 
 /* Of an FMU whose steps are checked: step_check.py. `count` of `steps` steps were, with `errors`
- * (room, n_ports) at `times`; `bases`, `rates` and `ports` are of n outputs. */
+ * (room, n_ports) at `times`; `bases`, `rates`, `ports` and `last` are of n outputs, `scales` and
+ * `jumps` of n_ports. */
 typedef struct {
     void *get_state, *set_state, *state;
     int64_t *steps, *count;
     const int64_t *bases, *rates, *ports;
-    double *scales, *errors, *times, *size, *before, *halves;
+    double *scales, *jumps, *last, *errors, *times, *weights, *size, *before, *halves;
     int64_t every, first, n, n_ports, room;
-    double at_rest;
+    double at_rest, jump, share;
 } Check;
 
 typedef struct {

@@ -26,9 +26,9 @@ class Transfer(ctypes.Structure):
 class Check(ctypes.Structure):
     _fields_ = (
         *_all(_POINTER, "get_state set_state state steps count bases rates ports"),
-        *_all(_POINTER, "scales errors times size before halves"),
+        *_all(_POINTER, "scales jumps last errors times weights size before halves"),
         *_all(_INT, "every first n n_ports room"),
-        ("at_rest", _DOUBLE),
+        *_all(_DOUBLE, "at_rest jump share"),
     )
 
 

@@ -9,6 +9,8 @@ import pytest
 from matplotlib.patches import Polygon
 
 import hapticlink as hl
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.results import mechanism_drawing
 from tests.orchestrator.conftest import status
 
 
@@ -67,3 +69,15 @@ def test_the_terminal_ends_with_the_numbers_of_the_figures(
     assert f"F_drift {drift:.3g} N" in told
     closure = run.haptics["virtual_mechanism.closure_error"].max()
     assert f"loops close within {closure:.2g} m" in told
+
+
+@pytest.mark.parametrize(("scene", "reaches"), [("closed-loop", True), ("remote-centre", False)])
+def test_what_the_device_cannot_reach_is_shaded(scene: str, reaches: bool) -> None:
+    """The whole picture of the one is within 0.1 m of the device's middle; the posts of the other
+    stand beyond the reach of an arm, 0.95 (proximal + distal) + crank/2."""
+    found = open_scene.load(scene)
+    assert found.linkage is not None
+    start = [found.linkage.start.get(j.name, 0.0) for j in found.linkage.joint]
+    (axes,) = mechanism_drawing.figure(found, start).axes  # type: ignore[arg-type]
+    labels = axes.get_legend_handles_labels()[1]
+    assert ("outside the device's workspace" not in labels) == reaches

@@ -29,12 +29,7 @@ stiffness = [300.0, 300.0, 1.0]
 damping = [10.0, 10.0, 0.02]
 """
 K, B, GRIP_K, GRIP_B, BLOCK, ARM, OMEGA = 300.0, 10.0, 2000.0, 20.0, 2.0, 1.0, 2 * np.pi
-PLANT = {
-    "hand.timing": "continuous",
-    "coupling": "iterated",
-    "iteration.method": "newton",
-    "get_after_set": ["hand"],
-}
+PLANT = {"hand.timing": "continuous", "coupling": "iterated", "iteration.method": "newton"}
 
 
 def exact(kind: str, t: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hapticlink as hl
@@ -30,16 +31,41 @@ type = "prismatic"
 axis = 0.0
 child = "slider"
 damping = {damping}
+stiffness = {stiffness}
 
 [mechanism]
 substeps = {substeps}
 """
 
+DEAD_CENTRE = """
+title = "A slider turns a light crank over its dead centre"
+duration = 2.0
+haptics.rate = 1000
 
-def slider(folder: Path, z: float, substeps: int = 1) -> hl.Run:
-    """v' = -(b/m) v, with z = -b h/m at the communication step size."""
+[linkage]
+operational_point = { body = "slider" }
+start = { crank = 1.0, rod = -1.3, slide = 0.28 }
+start_velocity = { crank = 2.0 }
+body = [
+  { name = "crank", mass = 0.0, inertia = 1e-5 },
+  { name = "rod", mass = 1e-5, inertia = 1e-5 },
+  { name = "slider", mass = 1.0, inertia = 0.0 },
+]
+joint = [
+  { name = "crank", child = "crank" },
+  { name = "rod", parent = "crank", child = "rod", at_parent = [0.1, 0.0] },
+  { name = "slide", type = "prismatic", axis = 0.0, child = "slider" },
+]
+loop = [{ bodies = ["rod", "slider"], at = [[0.25, 0.0], [0.0, 0.0]] }]
+"""
+
+
+def slider(folder: Path, z: float, substeps: int = 1, spring: float = 0.0) -> hl.Run:
+    """v' = -(b/m) v - (k/m) x, with z = -b h/m and spring = h sqrt(k/m) at the communication step
+    size."""
     path = folder / "slider.toml"
-    path.write_text(SLIDER.format(damping=-z * 0.5 * 512, substeps=substeps))
+    given = {"damping": -z * 0.5 * 512, "stiffness": 0.5 * (512 * spring) ** 2}
+    path.write_text(SLIDER.format(substeps=substeps, **given))
     return hl.run(path)
 
 
@@ -48,12 +74,40 @@ def rk4(z: float) -> float:
 
 
 @pytest.mark.parametrize("z", [-0.5, -1.0, -2.0, -2.6])
-def test_the_largest_error_is_that_of_the_stability_function(tmp_path: Path, z: float) -> None:
-    """v decays, so that the first step that is checked errs most: |R(z) - R(z/2)^2| v_k / v_k+1."""
+def test_errors_are_those_of_the_stability_function(tmp_path: Path, z: float) -> None:
+    """v decays from 1: the first step errs most, and changes v most, so that the second is checked,
+    too."""
     found = slider(tmp_path, z).run["step_errors"]["virtual_mechanism"]
-    assert found["largest"] == pytest.approx(abs(1 - rk4(z / 2) ** 2 / rk4(z)), rel=1e-12)
-    assert found["time"] == (step_check.FIRST - 1) / 512
-    assert found["checked"] == 1 + (1024 - step_check.FIRST) // step_check.EVERY
+    apart, first = abs(rk4(z) - rk4(z / 2) ** 2), step_check.FIRST - 1
+    assert found["largest"] == pytest.approx(apart, rel=1e-12)
+    assert found["time"] == 0
+    assert found["checked"] == 3 + (1024 - step_check.FIRST) // step_check.EVERY
+    regular = sum(rk4(z) ** k for k in range(first, 1024, step_check.EVERY))
+    total = apart * (1 + rk4(z) + step_check.EVERY * regular)
+    assert found["sum"] == pytest.approx(total, rel=1e-9)
+
+
+def test_the_sum_is_what_errors_add_up_to(tmp_path: Path) -> None:
+    """A slider on a spring: v = cos(w t); e_k is 2/pi of its amplitude in the mean."""
+    run = slider(tmp_path, 0.0, spring=0.4)
+    v, t = run["haptics"]["virtual_mechanism.v"][:, 0], run["haptics"]["time"]
+    error = np.abs(v - np.cos(0.4 * 512 * t)).max()
+    assert run.run["step_errors"]["virtual_mechanism"]["sum"] == pytest.approx(
+        2 / np.pi * error, rel=0.1
+    )
+
+
+def test_a_short_episode_is_told(tmp_path: Path) -> None:
+    """A light crank passes its dead centre within three steps, and energy changes by a tenth."""
+    path = tmp_path / "dead.toml"
+    path.write_text(DEAD_CENTRE)
+    coarse, fine = hl.run(path), hl.run(path, {"mechanism.substeps": 50})
+    lost = [np.ptp(run["haptics"]["virtual_mechanism.energy"]) for run in (coarse, fine)]
+    assert lost[0] > 0.1 * coarse["haptics"]["virtual_mechanism.energy"][0] > 1e4 * lost[1]
+    assert [any("too long" in line for line in run.run["warnings"]) for run in (coarse, fine)] == [
+        True,
+        False,
+    ]
 
 
 def test_a_step_that_is_too_long_is_told_with_its_remedy(tmp_path: Path) -> None:
@@ -76,7 +130,7 @@ def test_results_do_not_depend_on_the_check(
     scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     checked = hl.run(scene, {"duration": 0.5}, out=tmp_path / "checked")
-    monkeypatch.setattr(step_check, "FIRST", step_check.EVERY)  # never due
+    monkeypatch.setattr(step_check.StepCheck, "possible", lambda description: False)
     plain = hl.run(scene, {"duration": 0.5}, out=tmp_path / "plain")
     assert checked.run["step_errors"]
     assert not plain.run["step_errors"]
