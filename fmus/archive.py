@@ -17,20 +17,21 @@ import sys
 import uuid
 import zipfile
 from collections.abc import Mapping
+from importlib.metadata import distribution
 from pathlib import Path
 from typing import BinaryIO
 
 import casadi as ca
-import pythonfmu
 
 from hapticlink.components.component import Component, Variable
-from hapticlink.fmus import python_slave
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.model_description import model_description
 from hapticlink.fmus.straight_line import program
 
-PYTHONFMU = Path(pythonfmu.__file__).parent
+PYTHONFMU = Path(str(distribution("pythonfmu").locate_file("pythonfmu")))
+"""Not where `import pythonfmu` finds it: after a Python FMU has run in this process, that is the
+FMU's own copy, whose folder is gone."""
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
@@ -66,7 +67,7 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
     for path in sorted((PYTHONFMU / "resources" / "binaries").rglob("*.*")):
         files[f"binaries/{path.parent.name}/{component.name}{path.suffix}"] = path.read_bytes()
 
-    slave = Path(python_slave.__file__).read_bytes()
+    slave = Path(__file__).with_name("python_slave.py").read_bytes()
     about = _about(component)
     content = {**files, "slave": slave, "about": json.dumps(about).encode(), "xml": describe("")}
     whole = digest(content)

@@ -1,6 +1,7 @@
 """The command `hapticlink`, and `python -m hapticlink.orchestrator`: signals are held before the
 imports, and from here to the end of the process."""
 
+import gc
 import signal
 
 from hapticlink.orchestrator.base import interrupt, standard_streams
@@ -8,6 +9,8 @@ from hapticlink.orchestrator.base import interrupt, standard_streams
 
 def main() -> None:
     standard_streams.ensure()
+    # Modules and figures are many objects that stay: searching them for cycles takes 5 % of a run.
+    gc.set_threshold(50_000)
     with interrupt.held(interrupt.end_process, after=signal.SIG_IGN):
         from hapticlink.orchestrator.base.process_end import leave_threads
         from hapticlink.orchestrator.commands import main as command

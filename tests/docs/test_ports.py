@@ -10,8 +10,6 @@ import hapticlink as hl
 from hapticlink.components.component import Variable
 from hapticlink.fmus.blocks import component
 from hapticlink.orchestrator.scene.blocks import blocks
-from hapticlink.orchestrator.system.fmu_files import settled
-from hapticlink.orchestrator.system.timeline import timeline
 from tests.docs.pages import ROOT
 
 WALL = {
@@ -38,10 +36,8 @@ Row = tuple[str, str, str, str]
 def declared() -> Iterator[Row]:
     for name, options in SCENES:
         scene = hl.scene(name, options)
-        time = timeline(scene)
         for block in blocks(scene):
-            step = time.seconds(time.clock(time.of[block.name]).longest)
-            made = component(block.made_by, settled(scene, block, time), step)
+            made = component(block.made_by, block.settings)
             for side, variables in (("input", made.inputs), ("output", made.outputs)):
                 yield from ((block.made_by, side, port(v), units(v)) for v in variables)
 

@@ -44,8 +44,6 @@ from hapticlink.fmus.native import compile_library, compiler
 from hapticlink.fmus.native.source import component_header
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene import blocks
-from hapticlink.orchestrator.system import fmu_files
-from hapticlink.orchestrator.system.timeline import timeline
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
 
@@ -59,12 +57,9 @@ ERROR = 3
 def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
     """Each block of the report's experiment as a Python and as a native FMU."""
     scene = open_scene.load("closed-loop", OPTIONS)
-    time, folder = timeline(scene), tmp_path_factory.mktemp("both")
-    made = {
-        b.name: component(b.made_by, fmu_files.settled(scene, b, time), H)
-        for b in blocks.blocks(scene)
-    }
-    made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"}, H)
+    folder = tmp_path_factory.mktemp("both")
+    made = {b.name: component(b.made_by, b.settings) for b in blocks.blocks(scene)}
+    made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"})
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
     made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
     return {n: (build(c, folder / "p"), build_native(c, folder / "n")) for n, c in made.items()}

@@ -38,6 +38,17 @@ def test_build_writes_one_fmu_a_block(bar: Path, tmp_path: Path) -> None:
     assert [p.name for p in (tmp_path / "fmus").iterdir()] == ["virtual_mechanism.fmu"]
 
 
+def test_a_process_that_has_run_an_fmu_builds_whole_ones(bar: Path, tmp_path: Path) -> None:
+    """Not with the modules that the first FMU has brought along, whose folder is gone."""
+    hl.explain(bar)  # the FMU of the run is in the cache
+    code = (
+        "import sys, hapticlink as hl\n"
+        "hl.run(sys.argv[1])\n"
+        "hl.run(hl.export(sys.argv[1], {'duration': 0.0371}, out='bar.ssp'))"
+    )
+    subprocess.run([sys.executable, "-c", code, str(bar)], cwd=tmp_path, check=True)
+
+
 class Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
