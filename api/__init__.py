@@ -5,8 +5,8 @@
     r = hl.run("closed-loop", {"graphics.rate": 10})
     r["virtual_mechanism.x"], r.time("virtual_mechanism.x")
 
-Scenes: `shipped`, `scene`, `explain`. Runs: `run`, `sweep`, `load`. Files: `build`, `export`.
-Before a hand is on the device: `stability`.
+Scenes: `shipped`, `scene`, `explain`. Runs: `run`, `RealTime`, `sweep`, `load`.
+Files: `build`, `export`. Before a hand is on the device: `stability`.
 Raised: `InputFault` for bad input, with all findings of a scene `SceneFault`; each is a `Fault`.
 """
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hapticlink.orchestrator.api import (
         Fault,
         InputFault,
+        RealTime,
         Run,
         RunInterrupted,
         Scene,
@@ -57,6 +58,7 @@ else:
 __all__ = [
     "Fault",
     "InputFault",
+    "RealTime",
     "Run",
     "RunInterrupted",
     "Scene",

@@ -18,8 +18,10 @@ from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Results, Table, load, size
 from hapticlink.orchestrator.run import crash_monitor
+from hapticlink.orchestrator.run.beside import SAMPLES, beside
 from hapticlink.orchestrator.run.event_loop import Outcome, Progress, run
 from hapticlink.orchestrator.run.open_fmus import isolated
+from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run_json import _ending, _story
 from hapticlink.orchestrator.scene.overrides import Options
@@ -67,6 +69,7 @@ def simulate(
     options: Options = (),
     progress: Progress | None = None,
     csv: bool = True,
+    real_time: RealTimeRun | None = None,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
@@ -76,7 +79,7 @@ def simulate(
     the tables stay in the binary form in which a run writes them.
     """
     with interrupt.held():
-        return _simulated(scene, Path(folder), options, progress, csv)
+        return _simulated(scene, Path(folder), options, progress, csv, real_time)
 
 
 def _simulated(
@@ -85,6 +88,7 @@ def _simulated(
     options: Options,
     progress: Progress | None,
     csv: bool,
+    real_time: RealTimeRun | None,
 ) -> Experiment:
     begin = perf_counter()
     read = open_scene.load(scene, options)
@@ -93,12 +97,15 @@ def _simulated(
         plan.check()
         build_time = perf_counter() - begin
         story = _story(read, plan)
+        if real_time:
+            clocks = dict.fromkeys(beside(plan)[0].values())
+            story["files"] += [f"{clock}_{SAMPLES}.csv" for clock in clocks]
         alone = isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path]
         risky = any(name not in alone for name in foreign)
         with RunFolder(folders.ensure(folder), story, bool(foreign), csv) as results:
             with crash_monitor.watched(folder) if risky else nullcontext():
-                outcome = run(plan, results, progress)
+                outcome = run(plan, results, progress, real_time)
             ending = _ending(system, outcome, build_time)
             try:
                 results.end(ending, _columns(system))

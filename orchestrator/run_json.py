@@ -164,6 +164,7 @@ def _ending(system: System, outcome: Outcome, built: float) -> dict[str, Any]:
         "held_outputs": outcome.held,
         "smaller_steps": outcome.smaller_steps,
         "in_python": outcome.in_python,
+        "real_time": outcome.real_time,
         "timings": {
             "build": built,
             "run": outcome.wall_time,

@@ -98,9 +98,15 @@ def _spring(spec: specs.SpringHand) -> Component:
     parameters = [Variable("stiffness", (3,), STIFFNESS, spec.stiffness, "to target path")]
     if spec.damping is not None:
         parameters.append(Variable("damping", (3,), DAMPING, spec.damping, "to target path"))
+    still = spec.target[0][1:] if isinstance(spec.target, tuple) and len(spec.target) == 1 else None
+    if still:
+        parameters.append(Variable("target", (3,), POSE, still, "pose that the spring pulls to"))
     block = Block(inputs=[_X, _V] if damped else [_X], parameters=parameters, outputs=[_F])
-    path = signal(spec.target, spec.interpolation, "hand.target")
-    target, rate = ca.vertsplit(path.at(block.t), 3)
+    signals = [] if still else [signal(spec.target, spec.interpolation, "hand.target")]
+    if still:
+        target, rate = block.p["target"], ca.SX(3, 1)
+    else:
+        target, rate = ca.vertsplit(signals[0].at(block.t), 3)
     F = block.p["stiffness"] * (target - block.u["x"])
     if damped:
         F += block.p["damping"] * (rate - block.u["v"])
@@ -112,7 +118,7 @@ def _spring(spec: specs.SpringHand) -> Component:
         step={},
         output={"F": F},
         documentation=hand.__doc__ or "",
-        signals=[path],
+        signals=signals,
     )
 
 
@@ -122,7 +128,8 @@ def hand(spec: specs.Hand) -> Component:
     Constant or profile: F = F(t) - B v; x is no input, and v only where there is damping.
     Arm: a mass that a spring and damper pull to a target path; F acts through the spring and damper
     of the grip, with the handle's x and v held over each step. It starts at the handle's x and v
-    with F = 0. Spring: F = K (x_t - x) + B (x_t' - v), without a mass.
+    with F = 0. Spring: F = K (x_t - x) + B (x_t' - v), without a mass; a target of one row is the
+    tunable parameter `target`, with x_t' = 0, which whoever runs the FMU can move.
     """
     if isinstance(spec, specs.ArmHand):
         return _arm(spec)

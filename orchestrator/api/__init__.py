@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hapticlink.orchestrator.api.files import build as build
     from hapticlink.orchestrator.api.files import export as export
+    from hapticlink.orchestrator.api.real_time import RealTime as RealTime
     from hapticlink.orchestrator.api.result import Run as Run
     from hapticlink.orchestrator.api.runs import RunInterrupted as RunInterrupted
     from hapticlink.orchestrator.api.runs import load as load
@@ -30,6 +31,8 @@ else:
         match name:
             case "build" | "export":
                 from hapticlink.orchestrator.api import files as room
+            case "RealTime":
+                from hapticlink.orchestrator.api import real_time as room
             case "Run":
                 from hapticlink.orchestrator.api import result as room
             case "run" | "load" | "RunInterrupted":

@@ -68,7 +68,7 @@ class Run(Results):
 
     def figures(self) -> dict[str, Figure]:
         """Matplotlib figures by name, as far as the scene has the signals: `mechanism`,
-        `trajectories`, `distance`, `forces`, `contact`, `constraints`, `energies`."""
+        `trajectories`, `distance`, `forces`, `contact`, `constraints`, `energies`, `real_time`."""
         from hapticlink.orchestrator.results import figures  # with casadi, slow to load
 
         return figures.figures(self)

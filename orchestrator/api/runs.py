@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.api.result import Run
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, Interrupted
@@ -14,6 +15,7 @@ from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folders, summary, tables
 from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -36,12 +38,15 @@ def run(
     out: str | Path | None = None,
     figures: bool = True,
     progress: Callable[[float], None] | None = None,
+    real_time: bool = False,
 ) -> Run:
     """Run a scene, changed by `options` (see `scene`).
 
     The results are returned, and with `out` also written to that folder: a CSV per rate, run.json,
     plan.txt and, where `figures` is true, figures. They replace those of an earlier run there from
     the first row on. `progress` is called with the simulated time (s) from time to time.
+    `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
+    (docs/real-time.md).
 
     Raises InputFault for invalid input, before anything runs. A fault during the run raises no
     exception: it is the `fault` of the returned Run, which has the results up to then. Ctrl-C
@@ -49,26 +54,40 @@ def run(
     are not read back; use `load` for them.
     """
     with interrupt.held():
+        read = open_scene.load(scene, options)
+        paced = RealTimeRun() if real_time else None
+        return run_paced(read, out, paced, figures, progress)
+
+
+def run_paced(
+    scene: Scene,
+    out: str | Path | None,
+    real_time: RealTimeRun | None,
+    figures: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """As `run`."""
+    with interrupt.held():
         if out is None:
             with temporary_folders.room() as room:
-                found = simulate(scene, room, options, progress).results
+                found = simulate(scene, room, (), progress, real_time=real_time).results
             warned = {**found.run, "warnings": list(summary.lines(found))}
             made = Run(None, warned, found.tables)
         else:
-            made = _in_folder(scene, Path(out), options, progress, figures)
+            made = _in_folder(scene, Path(out), progress, figures, real_time)
         if interrupt.came() or made.run["end"]["reason"] == "interrupted":
             raise RunInterrupted(made)
     return made
 
 
 def _in_folder(
-    scene: str | Path | Scene,
+    scene: Scene,
     folder: Path,
-    options: Options,
     progress: Callable[[float], None] | None,
     figures: bool,
+    real_time: RealTimeRun | None,
 ) -> Run:
-    ended = simulate(scene, folder, options, progress)
+    ended = simulate(scene, folder, (), progress, real_time=real_time)
     if ended.too_large(MOST):
         said = "%s: tables of more than %d bytes are not read back and drawn; load them yourself"
         logging.getLogger(__name__).warning(said, folder, MOST)

@@ -18,19 +18,20 @@ BENCHES = {
     "singular": "benchmarks.singular:bench",
     "local-model": "benchmarks.local_model:bench",
     "master": "benchmarks.master:bench",
+    "real-time": "benchmarks.real_time:bench",
 }
 
 
 def bench(
-    what: Literal["mechanism", "singular", "local-model", "master"],
+    what: Literal["mechanism", "singular", "local-model", "master", "real-time"],
     /,
     *,
     out: Out = None,
     quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
 ) -> int:
     """Benchmark the mechanism: run time against error, with the multibody codes that are installed;
-    errors over many rates on motions through singular poses; cost and error of the local model; and
-    the event loop, with the masters that are installed.
+    errors over many rates on motions through singular poses; cost and error of the local model; the
+    event loop, with the masters that are installed; and deadlines missed in real time.
 
     Writes a page with tables and figures to OUT (default results/<what>). An interrupted benchmark
     is continued by the same command.

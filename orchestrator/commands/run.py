@@ -16,6 +16,13 @@ Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than 
 Explain = Annotated[
     bool, Parameter(negative="", help="Print what would run when, from which samples; do not run.")
 ]
+RealTime = Annotated[
+    bool,
+    Parameter(
+        negative="",
+        help="Pace the haptic loop by the wall clock, with FMUs of other rates beside it.",
+    ),
+]
 
 
 def run(
@@ -27,6 +34,7 @@ def run(
     swap: Swap = None,
     figures: Figures = True,
     explain: Explain = False,
+    real_time: RealTime = False,
 ) -> int:
     """Run a scene; write CSV files, run.json, plan.txt, figures to OUT (default runs/<scene>)."""
     from hapticlink.orchestrator import api
@@ -39,7 +47,7 @@ def run(
     try:
         read = api.scene(scene, options(set, swap))
         with progress(read.title, read.duration) as told:
-            made = api.run(read, out=folder, figures=figures, progress=told)
+            made = api.run(read, out=folder, figures=figures, progress=told, real_time=real_time)
     except api.RunInterrupted as ended:
         made = ended.run
     if made.fault:

@@ -321,6 +321,9 @@ class InProcess(Instance):
     def dismiss(self) -> None:
         """Nothing to do in advance: `close` is quick."""
 
+    def abandon(self) -> None:
+        self._status = FATAL
+
     def _said(self) -> list[str]:
         return messages.newest(self._key)
 

@@ -47,6 +47,7 @@ class Instance(ABC):
         self.starts, self.policy, self.held = starts, policy or Faults(), 0
         self.good: Vector | None = None
         self.place = Place()
+        self._waiting: list[Callable[[], object]] = []
         self.bounds = Bounds(description, outputs)
         self._folder = folder or temporary_folders.new()
 
@@ -93,6 +94,20 @@ class Instance(ABC):
     @step_time.setter
     def step_time(self, seconds: float) -> None:
         self.place.step_time = seconds
+
+    # --- settings while it runs -----------------------------------------------------------
+
+    def before_step(self, setting: Callable[[], object]) -> None:
+        """Have a function that sets inputs or parameters called before the next step: FMI allows no
+        output to be read between such a call and a step (FMI 2.0.5 section 4.2.4)."""
+        self._waiting.append(setting)
+        self.place.waiting = 1
+
+    def settle(self) -> None:
+        """Call what waits for the step that comes now."""
+        waiting, self._waiting, self.place.waiting = self._waiting, [], 0
+        for setting in waiting:
+            setting()
 
     # --- what each kind does in its way, every call of which may raise FmuFault -----------
 
@@ -162,6 +177,10 @@ class Instance(ABC):
     @abstractmethod
     def dismiss(self) -> None:
         """Start closing without waiting for it."""
+
+    @abstractmethod
+    def abandon(self) -> None:
+        """The instance is in a call that does not return: it is not called again."""
 
     @abstractmethod
     def close(self) -> FmuFault | None:

@@ -170,6 +170,10 @@ class Isolated(Instance):
         except Died as how:
             self._lost = self._died(how)
 
+    def abandon(self) -> None:
+        if self._process is not None:
+            self._process.end()
+
     def close(self) -> FmuFault | None:
         process = self._process
         try:

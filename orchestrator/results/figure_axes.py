@@ -23,6 +23,8 @@ _ENDS = {
     "diverged": "the run diverged",
     "interrupted": "the run was interrupted",
     "running": "the last row so far",
+    "stopped": "it was stopped",
+    "reset": "it was reset",
 }
 
 MARGINS = {"left": 0.95, "right": 0.15, "bottom": 0.55, "top": 0.62}

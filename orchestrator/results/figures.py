@@ -21,6 +21,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.results import figure_axes, mechanism_drawing
 from hapticlink.orchestrator.results.figure_axes import framed, last_time, short, titled
 from hapticlink.orchestrator.results.force_figure import forces
+from hapticlink.orchestrator.results.real_time_figure import real_time
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
     DEVICE,
@@ -57,6 +58,8 @@ def figures(results: Results) -> dict[str, Figure]:
         drawn["constraints"] = _constraints(results, *counted)
     if generated := _generated(results):
         drawn["energies"] = _energies(results, generated)
+    if paced := real_time(results):
+        drawn["real_time"] = paced
     return drawn
 
 

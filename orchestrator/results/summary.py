@@ -12,6 +12,7 @@ from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.results import friction_speed
 from hapticlink.orchestrator.results.figure_axes import short
 from hapticlink.orchestrator.results.force_figure import wrenches
+from hapticlink.orchestrator.results.real_time_figure import finding
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import (
     DEVICE,
@@ -68,6 +69,8 @@ def lines(results: Results) -> Iterator[str]:
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
     for fmu, count in run["smaller_steps"].items():
         yield f"{fmu}: {count} steps were discarded and repeated with smaller ones"
+    if found := run.get("real_time"):
+        yield from _real_time(found)
     if (found := run["iterations"]) and found["unconverged"]:
         yield f"{found['unconverged']} of {found['steps']} iterated steps did not converge"
     for fmu, errors in run.get("step_errors", {}).items():
@@ -96,6 +99,20 @@ def _contacts(results: Results) -> Iterator[str]:
         from hapticlink.orchestrator.results import contact_warnings
 
         yield from contact_warnings.lines(results)
+
+
+def _real_time(found: Mapping[str, Any]) -> Iterator[str]:
+    """How a run in real time has kept its schedule."""
+    yield finding(found)
+    if moved := found["moved"]:
+        said = f"warning: the schedule was moved by {short(moved)} s in all"
+        yield f"{said}: the machine was too slow, or suspended"
+    for clock, samples in found["samples"].items():
+        if samples["late"]:
+            late = f"{samples['late']} of {samples['taken']} samples were late"
+            yield f"{clock}: {late}, at most by {short(1e3 * samples['largest_lateness'])} ms"
+    for fmu, why in found["in_loop"].items():
+        yield f"{fmu} ran in the haptic loop: {why}"
 
 
 LARGEST, SUM = 0.1, 0.1

@@ -27,6 +27,7 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
+from hapticlink.orchestrator.run.beside import Collect, collected
 from hapticlink.orchestrator.run.fixed_point import FixedPoint
 from hapticlink.orchestrator.run.metered import Feed, Metering, Move, Read, Sample, metered
 from hapticlink.orchestrator.run.parallel_steps import Finish, with_barriers
@@ -36,8 +37,8 @@ from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system import held_polynomials
 
 Bound = list[tuple["Instruction", Call]]
-Instruction = Operation | Metering | Finish
-"""An operation of a run: of its plan, of its meters, or a barrier."""
+Instruction = Operation | Metering | Finish | Collect
+"""An operation of a run: of its plan, of its meters, or of waiting for FMUs."""
 
 
 class Stop(Exception):
@@ -67,8 +68,10 @@ class Binder:
         """The instructions of a block with their calls. Not `judged`, outputs need not be
         finite."""
         simulation = self._simulation
-        taken = metered(operations, simulation.meters, judged)
-        return [(i, self.bind(i)) for i in with_barriers(taken, simulation.isolated)]
+        given = collected(operations, simulation.beside) if simulation.beside else operations
+        taken = metered(given, simulation.meters, judged)
+        waited = {fmu for fmu in simulation.isolated if fmu not in simulation.beside}
+        return [(i, self.bind(i)) for i in with_barriers(taken, waited)]
 
     def bind_all(self, operations: Iterable[Operation], judged: bool = True) -> list[Call]:
         """The calls of a block."""
@@ -96,10 +99,12 @@ class Binder:
                 return lambda tick: hold(share)
             case Finish(fmus):
                 return self._finish(fmus)
+            case Collect(clock):
+                return lambda tick: simulation.collect(clock, tick)
             case Set(fmu, now, derivatives):
                 return self._set(fmu, now, derivatives)
             case Step(fmu, dticks, part, parts):
-                return self._step(fmu, dticks, part, parts)
+                return self._live(fmu, self._step(fmu, dticks, part, parts))
             case Push(connection, ahead):
                 return self._push(connection, ahead)
             case Evaluate(connection, instant, 0):
@@ -153,6 +158,8 @@ class Binder:
         simulation = self._simulation
         step, seconds = simulation.instances[fmu].step, simulation.seconds
         size, check = seconds(dticks), simulation.step_checks.get(fmu)
+        if fmu in simulation.beside:  # what a check reads is the loop's
+            check = None
         valid = 0 if simulation.system.fmu[fmu].sampled else dticks
         if parts > 1:
             base = simulation.system.timeline.base / parts
@@ -172,6 +179,23 @@ class Binder:
             return checked
         return lambda tick: step(seconds(tick), seconds(tick + valid), size)
 
+    def _live(self, fmu: str, step: Call) -> Call:
+        """In real time an FMU takes settings that wait for it before its step; beside the loop, the
+        step is begun only."""
+        simulation, instance = self._simulation, self._simulation.instances[fmu]
+        if not simulation.pace:
+            return step
+        side = simulation.sides[simulation.beside[fmu]] if fmu in simulation.beside else None
+
+        def live(tick: int) -> None:
+            instance.settle()
+            if side:
+                side.start(instance, lambda: step(tick))
+            else:
+                step(tick)
+
+        return live
+
     def _push(self, connection: str, ahead: int) -> Call:
         """Pushes the source's sample into the hold; it arrives at the tick of the event. Sources
         that are adjacent in the signal vector are passed as a view, without a copy."""
@@ -180,8 +204,8 @@ class Binder:
         sources = simulation.signals.sources(simulation.system.connection[connection])
         view = simulation.signals.view(sources)
         if view is not None:
-            return lambda tick: hold.push(tick + ahead, view, tick)
-        return lambda tick: hold.push(tick + ahead, values[sources], tick)
+            return lambda tick: hold.push(tick + ahead, view, tick + simulation.late)
+        return lambda tick: hold.push(tick + ahead, values[sources], tick + simulation.late)
 
     def _evaluate(self, connection: str, ahead: float) -> Call:
         """Writes the hold's value `ahead` ticks after the event to the target's held input."""
@@ -192,7 +216,8 @@ class Binder:
         )
 
         def evaluate(tick: int) -> None:
-            view[:] = hold.value(tick, ahead)
+            late = simulation.late
+            view[:] = hold.value(tick + late, ahead - late)
 
         return evaluate
 
@@ -212,7 +237,8 @@ class Binder:
         seconds = simulation.seconds(width)
 
         def derive(tick: int) -> None:
-            found = np.stack([hold.value(tick, at) for at in instants])
+            late = simulation.late
+            found = np.stack([hold.value(tick + late, at - late) for at in instants])
             view[:] = found[0]
             derivatives, mean[:] = held_polynomials.split(found, seconds)
             derived[:] = derivatives.ravel()
@@ -234,7 +260,8 @@ class Binder:
         pairs = [(weight, float(ahead)) for weight, ahead in points]
 
         def blend(tick: int) -> None:
-            view[:] = sum(weight * hold.value(tick, ahead) for weight, ahead in pairs)
+            late = simulation.late
+            view[:] = sum(w * hold.value(tick + late, ahead - late) for w, ahead in pairs)
 
         return blend
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.fixed_point import Iterations
 from hapticlink.orchestrator.run.python_loop import PythonLoop
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, kinds
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.run.step_check import StepErrors
 from hapticlink.orchestrator.run.step_control import Steps
@@ -42,7 +44,7 @@ class Outcome:
     and call. isolated: why an FMU ran in a process of its own. held: how often outputs of an FMU
     were held since they were not finite. smaller_steps: number of steps repeated with smaller
     ones. in_python: the operations that were carried out in Python rather than in C, "everything"
-    if there was no compiled loop, with the reason.
+    if there was no compiled loop, with the reason. real_time: what became of a run in real time.
     """
 
     end_time: float = 0.0
@@ -64,12 +66,18 @@ class Outcome:
     steps: dict[str, Steps] = field(default_factory=dict)
     step_errors: dict[str, StepErrors] = field(default_factory=dict)
     in_python: dict[str, str] = field(default_factory=dict)
+    real_time: dict[str, Any] | None = None
 
 
-def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Outcome:
+def run(
+    plan: Plan,
+    results: RunFolder,
+    progress: Progress | None = None,
+    real_time: RealTimeRun | None = None,
+) -> Outcome:
     """Execute the plan to its end or to the first fault; rows up to then are in `results`.
 
-    progress is called with the simulated time (s) from time to time.
+    progress is called with the simulated time (s) from time to time. real_time: see RealTimeRun.
     """
     outcome = Outcome()
     simulation: Simulation | None = None
@@ -78,14 +86,21 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
         with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
             interrupt.check()
             simulation = Simulation(plan.system, results, stack)
+            if real_time:
+                stack.enter_context(real_time.of(plan, simulation))
             loop = _loop(plan, simulation)
             simulation.start()
+            if real_time:
+                loop.prepare(kinds(plan))
+                stack.enter_context(real_time.pace.undisturbed())
             begin = flushed = perf_counter()
 
             def turn(tick: int) -> None:
                 nonlocal flushed
                 time = plan.system.timeline.seconds(tick)
                 interrupt.check(time)
+                if real_time:
+                    real_time.turn(loop)
                 if perf_counter() - flushed > KEPT:
                     results.flush()
                     flushed = perf_counter()
@@ -101,6 +116,8 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
                 outcome.table_time = perf_counter() - begin - outcome.wall_time
     except Stop:
         outcome.reason = "stop_when"
+    except Ended as end:
+        outcome.reason = str(end)
     except AsksToEnd as end:
         outcome.reason, outcome.asked = "terminated", f"{end.fmu} {end.what}"
     except Fault as fault:
@@ -132,6 +149,7 @@ def run(plan: Plan, results: RunFolder, progress: Progress | None = None) -> Out
             outcome.steps = loop.steps()
             outcome.iterations = loop.iterations()
             outcome.in_python = loop.in_python
+            outcome.real_time = real_time.report() if real_time else None
             if outcome.fault is None and (why := _judged(outcome, simulation)):
                 outcome.reason, outcome.fault = "diverged", why
     if progress:

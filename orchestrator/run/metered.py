@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from hapticlink.orchestrator.plan.operations import Get, Operation, Set
+from hapticlink.orchestrator.run.beside import Collect
 from hapticlink.orchestrator.run.energy.meters import Meters
 
 
@@ -44,8 +45,8 @@ Metering = Read | Sample | Move | Feed
 
 
 def metered(
-    operations: Iterable[Operation], meters: Meters, judged: bool = True
-) -> Iterator[Operation | Metering]:
+    operations: Iterable[Operation | Collect], meters: Meters, judged: bool = True
+) -> Iterator[Operation | Metering | Collect]:
     """The operations, each followed by what the meters take of it. Not `judged`, outputs that are
     not finite are accepted."""
     for operation in operations:

@@ -10,6 +10,7 @@ from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 
 from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Operation, Set, Step
+from hapticlink.orchestrator.run.beside import Collect
 from hapticlink.orchestrator.run.metered import Feed, Metering
 
 
@@ -21,8 +22,8 @@ class Finish:
 
 
 def with_barriers(
-    operations: Iterable[Operation | Metering], isolated: Container[str]
-) -> Iterator[Operation | Metering | Finish]:
+    operations: Iterable[Operation | Metering | Collect], isolated: Container[str]
+) -> Iterator[Operation | Metering | Finish | Collect]:
     """The operations of a block, with a barrier after each group of concurrent steps."""
     stepping: list[str] = []
     for operation in operations:

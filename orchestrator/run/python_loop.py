@@ -4,8 +4,9 @@ reference of the compiled loop."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import (
     Event,
     Get,
@@ -19,6 +20,7 @@ from hapticlink.orchestrator.plan.operations import (
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.bind import Binder, Bound
 from hapticlink.orchestrator.run.fixed_point import Iterations, total
+from hapticlink.orchestrator.run.paced_events import PacedEvents, Points
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.step_control import Steps
 
@@ -37,16 +39,21 @@ class PythonLoop:
         self._plan, self._simulation, self.in_python = plan, simulation, in_python
         self._binder = Binder(simulation, self._calls, joined)
         self._bound: dict[Event | Part, list[Call]] = {}
+        self._paced = None
+        if simulation.pace:
+            self._paced = PacedEvents(plan.system.timeline, simulation.pace, simulation.sides)
         self._counts: Counter[Event | Part] = Counter()
         self.complete = 0
 
     def run(self, turn: Callable[[int], object]) -> None:
-        """Run all events; `turn` is called after each with its tick."""
-        for tick, event in self._plan:
+        """Run all events; `turn` is called after each with its tick, in real time every 20 ms."""
+        for tick, event in self._paced.run(turn) if self._paced else self._plan:
+            self._simulation.late = self._paced.late if self._paced else 0
             for call in self._calls(event):
                 call(tick)
             self.complete += 1
-            turn(tick)
+            if not self._paced:
+                turn(tick)
 
     def _calls(self, kind: Event | Part) -> list[Call]:
         """The calls of a kind of event, bound at its first occurrence."""
@@ -54,6 +61,40 @@ class PythonLoop:
         if (found := self._bound.get(kind)) is None:
             found = self._bound[kind] = self._binder.bind_all(self._plan.block(kind))
         return found
+
+    def prepare(self, kinds: Iterable[Event]) -> None:
+        """Bind kinds of events before they occur."""
+        for kind in kinds:
+            self._bound[kind] = self._binder.bind_all(self._plan.block(kind))
+
+    # --- changes in real time ---------------------------------------------------------------
+
+    @property
+    def _points(self) -> Points:
+        """The events of a run in real time."""
+        assert self._paced
+        return self._paced
+
+    def previous(self, clock: str) -> int:
+        """The communication point (ticks) at which the newest sample of a clock is."""
+        return self._points.point(clock, -1)
+
+    def current(self, clock: str) -> int:
+        """The communication point (ticks) that a clock goes to."""
+        return self._points.point(clock)
+
+    def patience(self, ns: int) -> None:
+        """Have `turn` called after that time each."""
+        self._points.patience(ns)
+
+    def change_rate(self, clock: str, starts: Sequence[int]) -> None:
+        """Replace the communication points of a clock, `previous` and `current` the first."""
+        self._points.change(clock, starts)
+
+    def change_hold(self, connection: str, hold: Hold) -> None:
+        """Replace a hold. Raises InputFault where this loop cannot."""
+        self._simulation.holds[connection] = hold
+        self._bound.clear()
 
     def _times(self) -> Mapping[Event | Part, int]:
         """How often each kind of event was begun."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
+
+import numpy as np
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.instance import Instance
@@ -12,11 +14,13 @@ from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.run.beside import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meters import Meters
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.open_fmus import instance, isolated
+from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.signals import SignalVector, Vector
 from hapticlink.orchestrator.run.step_check import StepCheck
 from hapticlink.orchestrator.system.system import Connection, System
@@ -30,10 +34,19 @@ class Simulation:
 
     setters, now_setters and derivative_setters set inputs of an FMU from the signals: with held
     values, with the newest outputs of the sources, and the derivatives of held values.
+
+    pace: the schedule of a run in real time. beside: the FMUs whose steps are then taken beside the
+    loop, each with its clock; `sides` and `arrivals`, tables of their samples, are by clock. late:
+    ticks by which the current event comes after its own.
     """
 
     def __init__(self, system: System, results: RunFolder, stack: ExitStack) -> None:
         self.system, self.signals = system, SignalVector(system)
+        self.pace: Pace | None = None
+        self.beside: Mapping[str, str] = {}
+        self.sides: Mapping[str, Side] = {}
+        self.arrivals: dict[str, Recorder] = {}
+        self.late = 0
         self.seconds = system.timeline.seconds
         self._results, self._stack = results, stack
         values = self.signals.values
@@ -92,6 +105,17 @@ class Simulation:
             view = values[self.signals.clock(clock.name)]
             made = self._results.recorder(clock.name, self.signals.columns(clock.name), view)
             self.recorders[clock.name] = self._stack.enter_context(made)
+        for side in self.sides:
+            made = self._results.recorder(f"{side}_{SAMPLES}", COLUMNS, np.zeros(len(COLUMNS)))
+            self.arrivals[side] = self._stack.enter_context(made)
+            made.row(0.0)  # the sample of t = 0 is there at once
+
+    def collect(self, clock: str, tick: int) -> None:
+        """Take over the sample that the FMUs beside the loop have left for a tick, `late`."""
+        late, arrived = self.seconds(self.late), self.arrivals[clock]
+        computing = self.sides[clock].collect(late)
+        arrived.view[:] = self.seconds(tick + self.late), late, computing
+        arrived.row(self.seconds(tick))
 
     def _derived(
         self, incoming: Iterable[Connection]

@@ -82,7 +82,7 @@ def _assign(
         c = replace(c, latency=latency, kind=next(named, kind(c, fmus)))
         iterated = rules.between_plants if _between_plants(c, fmus) else None
         hold = hold or iterated
-        reason = hold and _misfit(hold, c, fmus, rules.power, iterated is not None)
+        reason = hold and misfit(hold, c, fmus, rules.power, iterated is not None)
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
             hold = "foh" if iterated and c.kind != "table" else "zoh"
@@ -112,7 +112,7 @@ def _between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:
     return source.clock == target.clock and not source.sampled and not target.sampled
 
 
-def _misfit(
+def misfit(
     hold: str,
     c: Connection,
     fmus: Mapping[str, Fmu],

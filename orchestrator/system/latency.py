@@ -1,8 +1,9 @@
 """Latency (of computing or communication) and loss of samples on a connection.
 
-A sample stamped t is known to the target from t + latency on, rounded up to a tick. Where latencies
-differ, samples can overtake each other: one that arrives after a newer one is dropped. The sample
-of t = 0 is known at once, so that a run starts consistently.
+A sample stamped t is known to the target from t + latency on, rounded up to a tick; one that its
+source gives later than that, as in real time, from then on. Where latencies differ, samples can
+overtake each other: one that arrives after a newer one is dropped. The sample of t = 0 is known at
+once, so that a run starts consistently.
 """
 
 from __future__ import annotations
@@ -42,13 +43,15 @@ class Link:
             return -1
         return math.ceil((self._low + self._spread * Fraction(share)) / self._base)
 
-    def send(self, stamp: int, item: Any = None) -> None:
+    def send(self, stamp: int, item: Any = None, earliest: int = 0) -> None:
+        """Send a sample, which arrives at `earliest` (tick) or later."""
         late = self.draw()
         self.sent += 1
         if late < 0:
             self.lost += 1
             return
-        heapq.heappush(self._in_transit, (stamp + late, stamp, next(self._order), item))
+        arrival = max(stamp + late, earliest)
+        heapq.heappush(self._in_transit, (arrival, stamp, next(self._order), item))
 
     def arrived(self, tick: int) -> Iterator[tuple[int, int, Any]]:
         """(arrival, stamp, item) of each sample that has arrived by `tick` since the last call."""
@@ -70,7 +73,7 @@ class Late(Hold):
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         if self._started:
-            self.link.send(stamp, sample.copy())
+            self.link.send(stamp, sample.copy(), arrival)
         else:
             self.hold.push(stamp, sample, arrival)
             self._started = True

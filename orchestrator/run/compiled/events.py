@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Event, Firing
+from hapticlink.orchestrator.run.beside import Side
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.machine import PATIENCE, Machine
+from hapticlink.orchestrator.run.pace import Pace
 
 WINDOW = 4096
 """Communication points of a clock that the loop gets at a time."""
@@ -18,13 +21,19 @@ NEVER = 2**62
 
 
 class Events:
-    """Runs all events of a timeline. block: adds the operations of a kind of event, and returns
-    their indices."""
+    """Runs all events of a timeline, in real time where there is a pace. block: adds the operations
+    of a kind of event, and returns their indices."""
 
     def __init__(
-        self, machine: Machine, timeline: Timeline, block: Callable[[Event], tuple[int, int]]
+        self,
+        machine: Machine,
+        timeline: Timeline,
+        block: Callable[[Event], tuple[int, int]],
+        pace: Pace | None = None,
+        sides: Mapping[str, Side] = MappingProxyType({}),
     ) -> None:
         self._machine, self._timeline, self._block = machine, timeline, block
+        self._starts = [clock.starts for clock in timeline.clocks]
         n = len(timeline.clocks)
         self._clocks = (structures.Clock * n)()
         self._given = [0] * n
@@ -35,8 +44,13 @@ class Events:
         self._c = c = structures.Events()
         c.clocks, c.n_clocks, c.end = ctypes.addressof(self._clocks), n, timeline.end
         c.key, c.patience, c.at.op = self._key.ctypes.data, PATIENCE, -1
-        for i in range(n):
+        if pace:
+            pace.take(machine.library)
+            c.pace, c.since = ctypes.addressof(pace.c), pace.clock()
+        for i, clock in enumerate(timeline.clocks):
             self._next_window(i)
+            if clock.name in sides:
+                self._clocks[i].side = ctypes.addressof(sides[clock.name].c)
 
     @property
     def complete(self) -> int:
@@ -63,9 +77,24 @@ class Events:
                 machine.serve(code, c.at, c.tick)
         turn(c.tick)
 
+    def point(self, clock: str, ahead: int = 0) -> int:
+        """See Points."""
+        i = [c.name for c in self._timeline.clocks].index(clock)
+        return self._starts[i][self._given[i] + self._clocks[i].at + ahead]
+
+    def change(self, clock: str, starts: Sequence[int]) -> None:
+        """See Points."""
+        i = [c.name for c in self._timeline.clocks].index(clock)
+        self._starts[i], self._given[i], self._clocks[i].at = starts, 1, 0
+        self._next_window(i)
+
+    def patience(self, ns: int) -> None:
+        """See Points."""
+        self._c.patience = ns
+
     def _next_window(self, i: int) -> None:
         """The next communication points of clock i: the current one comes first."""
-        starts, clock = self._timeline.clocks[i].starts, self._clocks[i]
+        starts, clock = self._starts[i], self._clocks[i]
         first = self._given[i] + clock.at
         window = np.array(starts[first : first + WINDOW])
         if len(window) < 2:
@@ -81,10 +110,15 @@ class Events:
             for clock, k in zip(clocks, key[1:], strict=True)
             if k
         )
-        event = Event(bool(key[0]), tuple(fired))
+        self.add(Event(bool(key[0]), tuple(fired)))
+
+    def add(self, event: Event) -> None:
+        """Add a kind of event."""
+        fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
+        key = [event.first, *(fired.get(clock.name, 0) for clock in self._timeline.clocks)]
         first, last = self._block(event)
         self._kinds.append(event)
-        self._keys = np.concatenate([self._keys, self._key[None]])
+        self._keys = np.concatenate([self._keys, np.array([key], np.int64)])
         blocks = (structures.Block * len(self._kinds))(*self._blocks)
         blocks[-1].first, blocks[-1].last = first, last
         self._blocks = blocks

@@ -198,7 +198,7 @@ static void push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
 }
 
 /* Link.send, kept in the order of (arrival, stamp). */
-static int send(Link *k, const double *y, int64_t width, int64_t stamp) {
+static int send(Link *k, const double *y, int64_t width, int64_t stamp, int64_t from) {
     if (k->at_late == k->n_late) return DRAW;
     if (k->n == k->room) return GROW;
     const int64_t late = k->late[k->at_late++];
@@ -207,15 +207,16 @@ static int send(Link *k, const double *y, int64_t width, int64_t stamp) {
         k->lost++;
         return 0;
     }
+    const int64_t arrival = stamp + late > from ? stamp + late : from;
     int64_t i = k->n++;
     for (; i > 0; i--) {
         const int64_t a = k->arrivals[i - 1], s = k->stamps[i - 1];
-        if (a < stamp + late || (a == stamp + late && s <= stamp)) break;
+        if (a < arrival || (a == arrival && s <= stamp)) break;
         k->arrivals[i] = a;
         k->stamps[i] = s;
         memcpy(k->samples + i * width, k->samples + (i - 1) * width, width * sizeof *y);
     }
-    k->arrivals[i] = stamp + late;
+    k->arrivals[i] = arrival;
     k->stamps[i] = stamp;
     memcpy(k->samples + i * width, y, width * sizeof *y);
     return 0;
@@ -240,7 +241,7 @@ static void receive(Hold *h, int64_t tick) {
 }
 
 int hold_push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
-    if (h->link && h->link->started) return send(h->link, y, h->width, stamp);
+    if (h->link && h->link->started) return send(h->link, y, h->width, stamp, arrival);
     if (h->account && !account_has_room(h->account, 1)) return GROW;
     push(h, y, stamp, arrival);
     if (h->link) h->link->started = 1;

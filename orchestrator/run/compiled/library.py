@@ -39,11 +39,14 @@ def _loaded() -> ctypes.CDLL:
         "value": (pointer, pointer, integer, number, pointer),
         "sizes": (pointer,),
         "watch": (ctypes.c_int,),
+        "now": (),
+        "wait": (integer,),
         "python": (pointer,) * 3,
     }.items():
         function = found[f"hapticlink_{name}"]
         function.argtypes = arguments
         setattr(found, name, function)
+    found.now.restype = integer
     sizes = (ctypes.c_int64 * len(structures.ALL))()
     found.sizes(sizes)
     assert [*sizes] == [ctypes.sizeof(kind) for kind in structures.ALL]

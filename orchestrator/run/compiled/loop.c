@@ -148,7 +148,7 @@ static int step(Fmu *f, double time, double end, double size, At *at) {
     p->time = p->begin = time;
     p->size = size;
     p->end = end;
-    if (p->ended) return CALL;
+    if (p->ended || p->waiting) return CALL;
     if (f->get_state && (at->status = ((GetState)f->get_state)(f->fmu, f->state)) > WARNING)
         return UNSAVED;
     const int timed = !f->sparse || f->n_steps % EACH == 0;
@@ -203,6 +203,7 @@ static void compare(Check *c, const double *outputs, double time, double end, do
  * where there is no room left, or the FMU can be asked to repeat a step. */
 static int checked_step(Fmu *f, double time, double end, double size, At *at) {
     Check *c = f->check;
+    if (f->place->waiting) return CALL;
     const int regular = (*c->steps + 1) % c->every == c->first, jumped = moved(c, f->outputs);
     const int due = regular || jumped;
     if (due && (f->get_state || f->place->ended || *c->count == c->room)) return CALL;
@@ -282,7 +283,7 @@ static int compares(double value, int64_t comparison, double limit) {
 }
 
 static int evaluate(const Loop *l, Hold *h, int64_t tick, double ahead) {
-    return hold_value(h, l, tick, ahead, h->held);
+    return hold_value(h, l, tick + l->late, ahead - (double)l->late, h->held);
 }
 
 static int blend(const Loop *l, const Op *op, int64_t tick) {
@@ -290,7 +291,8 @@ static int blend(const Loop *l, const Op *op, int64_t tick) {
     double *value = hold_scratch(h), *sum = h->held;
     for (int64_t k = 0; k < h->n; k++) sum[k] = 0.0;
     for (int64_t i = op->b; i < op->c; i++) {
-        const int code = hold_value(h, l, tick, l->points[i][1], value);
+        const double ahead = l->points[i][1] - (double)l->late;
+        const int code = hold_value(h, l, tick + l->late, ahead, value);
         if (code) return code;
         for (int64_t k = 0; k < h->n; k++) sum[k] += l->points[i][0] * value[k];
     }
@@ -331,7 +333,7 @@ static int carry_out(Loop *l, int64_t tick, At *at) {
                 at);
             break;
         }
-        case PUSH: code = push(l, l->holds[op->a], tick + op->b, tick); break;
+        case PUSH: code = push(l, l->holds[op->a], tick + op->b, tick + l->late); break;
         case EVALUATE: code = evaluate(l, l->holds[op->a], tick, op->x); break;
         case BLEND: code = blend(l, op, tick); break;
         case SAMPLE: code = meter_sample(l->meters[op->a], l->values, tick + op->b); break;
@@ -347,28 +349,96 @@ static int carry_out(Loop *l, int64_t tick, At *at) {
     return DONE;
 }
 
+/* --- real time -------------------------------------------------------------------------------- */
+
+enum { BINS = 2304 };
+
+/* Bins of a histogram (ns): 64 to each power of two. */
+static int64_t bin(int64_t ns) {
+    if (ns < 64) return ns > 0 ? ns : 0;
+    const int64_t shift = 57 - __builtin_clzll((uint64_t)ns), i = 64 * shift + (ns >> shift);
+    return i < BINS ? i : BINS - 1;
+}
+
+static int64_t due(const Loop *l, const Pace *p, int64_t tick) {
+    return p->origin + (int64_t)(1e9 * seconds(l, tick));
+}
+
+/* Waits until a tick is due; PAUSE where Python is to have its turn first. */
+static int wait_for(const Loop *l, Events *e, int64_t tick) {
+    Pace *p = e->pace;
+    const int64_t until = due(l, p, tick);
+    for (int64_t time; (time = p->clock()) < until;) {
+        const int far = e->patience && until - time > e->patience;
+        const int64_t turn = far ? e->since + e->patience : INT64_MAX;
+        if (time >= turn || signal_came()) {
+            e->since = time;
+            return PAUSE;
+        }
+        p->wait(turn < until ? turn : until);
+    }
+    if (tick > p->reached) p->reached = tick;
+    return 0;
+}
+
+/* The haptic clock's event begins. */
+static void begin(const Loop *l, Events *e) {
+    Pace *p = e->pace;
+    p->begun = p->clock();
+    p->due = due(l, p, e->tick);
+    const int64_t late = p->begun - p->due;
+    p->lateness[bin(late)]++;
+    if (late > p->latest) p->latest = late;
+    if (late <= p->most) return;
+    p->origin += late;
+    p->moved += late;
+}
+
+/* It is complete; its deadline is the next one's beginning. */
+static void end(const Loop *l, Events *e, int64_t time) {
+    Pace *p = e->pace;
+    const int64_t took = time - p->begun, period = (int64_t)(1e9 * seconds(l, e->key[1] / 2));
+    p->steps[bin(took)]++;
+    if (took > p->longest) p->longest = took;
+    p->missed += time - p->due > period;
+    p->ticks++;
+}
+
 /* --- events ----------------------------------------------------------------------------------- */
 
-/* The next event: e->tick and e->key (whether it is the first; 2 dticks + final of each clock that
- * fires, 0 of the others). DONE after the last. */
-static int next_event(Events *e) {
+static int busy(const Clock *c) { return c->side && c->side->started != c->side->done; }
+
+static int awaited(const Clock *c) { return c->side && c->side->awaited; }
+
+/* The tick of the next event; past the end, that of the next haptic tick while steps are awaited, or
+ * INT64_MAX. */
+static int64_t next_tick(const Events *e) {
     int64_t tick = INT64_MAX;
-    for (int64_t i = 0; i < e->n_clocks; i++) {
-        Clock *c = e->clocks + i;
-        if (c->at + 1 >= c->n) {
-            e->at.what = i;
-            return STARTS;
-        }
-        if (c->starts[c->at] < tick) tick = c->starts[c->at];
-    }
-    if (tick > e->end) return DONE;
-    e->tick = tick;
-    e->key[0] = tick == 0;
+    int waits = 0;
     for (int64_t i = 0; i < e->n_clocks; i++) {
         const Clock *c = e->clocks + i;
-        const int64_t start = c->starts[c->at], after = start < tick + 1 ? c->starts[c->at + 1] : 0;
+        const int64_t start = c->starts[c->at];
+        if (awaited(c))
+            waits |= start <= e->end;
+        else if (start < tick)
+            tick = start;
+    }
+    if (tick <= e->end) return tick;
+    if (!waits) return INT64_MAX;
+    const int64_t reached = e->pace->reached > e->end ? e->pace->reached : e->end;
+    return reached + e->clocks->starts[e->clocks->at] - e->end;
+}
+
+/* The kind of the event at e->tick of those clocks that `fires` (2 dticks + final, from their `next`
+ * communication point): e->key. */
+static int found(Loop *l, Events *e) {
+    e->key[0] = e->tick == 0;
+    for (int64_t i = 0; i < e->n_clocks; i++) {
+        const Clock *c = e->clocks + i;
+        const int64_t start = c->starts[c->at], after = c->next > c->at ? c->starts[c->next] : 0;
         e->key[1 + i] = after ? 2 * (after - start) + (after > e->end) : 0;
     }
+    l->late = e->pace && e->pace->reached > e->tick ? e->pace->reached - e->tick : 0;
     const size_t width = (1 + e->n_clocks) * sizeof *e->key;
     for (e->kind = 0; e->kind < e->n_kinds; e->kind++)
         if (!memcmp(e->keys + e->kind * (1 + e->n_clocks), e->key, width)) break;
@@ -377,12 +447,72 @@ static int next_event(Events *e) {
     b->count++;
     e->at.op = b->first;
     e->at.last = b->last;
+    if (e->pace && e->key[1]) begin(l, e);
     return -1;
 }
 
+static int turn_is_due(Events *e, int64_t time) {
+    if (time - e->since < e->patience && !signal_came()) return 0;
+    e->since = time;
+    return 1;
+}
+
+/* An awaited step that is done: its clock's event, alone, `late` by now. */
+static int late_event(Loop *l, Events *e) {
+    for (int64_t i = 0; i < e->n_clocks; i++) {
+        Clock *c = e->clocks + i;
+        const int64_t start = c->starts[c->at];
+        if (!awaited(c) || busy(c) || start > e->end) continue;
+        e->tick = start;
+        c->next = c->at + 1;
+        while (c->side->longer && c->starts[c->next] <= e->pace->reached && c->next + 1 < c->n) c->next++;
+        return found(l, e);
+    }
+    return 0;
+}
+
+/* The next event: e->tick and e->key (whether it is the first; 2 dticks + final of each clock that
+ * fires, 0 of the others). DONE after the last. */
+static int next_event(Loop *l, Events *e) {
+    for (;;) {
+        for (int64_t i = 0; i < e->n_clocks; i++) {
+            Clock *c = e->clocks + i;
+            c->next = c->at;
+            if (c->at + 1 >= c->n) {
+                e->at.what = i;
+                return STARTS;
+            }
+        }
+        const int64_t tick = next_tick(e);
+        if (tick == INT64_MAX) return DONE;
+        if (e->pace) {
+            const int code = wait_for(l, e, tick);
+            const int late = code ? code : late_event(l, e);
+            if (late) return late;
+        }
+        int fires = 0;
+        for (int64_t i = 0; i < e->n_clocks; i++) {
+            Clock *c = e->clocks + i;
+            if (c->starts[c->at] != tick || tick > e->end || awaited(c)) continue;
+            if (busy(c)) {
+                c->side->awaited = 1;
+            } else {
+                c->next = c->at + 1;
+                fires = 1;
+            }
+        }
+        e->tick = tick;
+        if (fires) return found(l, e);
+        if (turn_is_due(e, e->pace->clock())) return PAUSE;
+    }
+}
+
 static void complete(Events *e) {
-    for (int64_t i = 0; i < e->n_clocks; i++)
-        if (e->key[1 + i]) e->clocks[i].at++;
+    for (int64_t i = 0; i < e->n_clocks; i++) {
+        Clock *c = e->clocks + i;
+        if (c->next > c->at && c->side) c->side->awaited = 0;
+        c->at = c->next;
+    }
     e->events++;
     e->at.op = -1;
 }
@@ -392,19 +522,21 @@ static void complete(Events *e) {
 EXPORT int hapticlink_events(Loop *l, Events *e) {
     for (;;) {
         if (e->at.op < 0) {
-            const int code = next_event(e);
+            const int code = next_event(l, e);
             if (code >= 0) return code;
         }
         const int code = carry_out(l, e->tick, &e->at);
         if (code != DONE) return code;
         complete(e);
-        const int64_t time = now();
-        if (time - e->since >= e->patience || signal_came()) {
-            e->since = time;
-            return PAUSE;
-        }
+        const int64_t time = e->pace ? e->pace->clock() : now();
+        if (e->pace && e->key[1]) end(l, e, time);
+        if (turn_is_due(e, time)) return PAUSE;
     }
 }
+
+EXPORT int64_t hapticlink_now(void) { return now(); }
+
+EXPORT void hapticlink_wait(int64_t until) { wait_until(until); }
 
 /* Whether to notice signals; Windows has none that Python would not notice. */
 EXPORT void hapticlink_watch(int on) { watch_signals(on); }
@@ -427,9 +559,11 @@ EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, 
 
 /* The sizes of the structures, in the order of `structures.py`. */
 EXPORT void hapticlink_sizes(int64_t *sizes) {
-    const int64_t found[] = {sizeof(Place), sizeof(Transfer), sizeof(Check), sizeof(Fmu), sizeof(Setter),
-                             sizeof(Link), sizeof(Tank), sizeof(Reader), sizeof(Queue),
-                             sizeof(Account), sizeof(Hold), sizeof(Meter), sizeof(Table), sizeof(Op), sizeof(Clock),
-                             sizeof(Block), sizeof(Loop), sizeof(At), sizeof(Events)};
+    const int64_t found[] = {
+        sizeof(Place), sizeof(Transfer), sizeof(Check),   sizeof(Fmu),  sizeof(Setter),
+        sizeof(Link),  sizeof(Tank),     sizeof(Reader),  sizeof(Queue), sizeof(Account),
+        sizeof(Hold),  sizeof(Meter),    sizeof(Table),   sizeof(Op),   sizeof(Side),
+        sizeof(Clock), sizeof(Pace),     sizeof(Block),   sizeof(Loop), sizeof(At),
+        sizeof(Events)};
     memcpy(sizes, found, sizeof found);
 }

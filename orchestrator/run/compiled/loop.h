@@ -12,10 +12,11 @@
 
 /* --- FMUs ------------------------------------------------------------------------------------- */
 
-/* Where an instance stands (s), shared with its Python object. */
+/* Where an instance stands (s), shared with its Python object. waiting: settings that it is to take
+ * before its next step. */
 typedef struct {
     double time, begin, size, end, step_time;
-    int64_t ended;
+    int64_t ended, waiting;
 } Place;
 
 /* A call of fmiXGet<Type> or fmiXSet<Type>: n numbers in `buffer` as the FMU has them, in `values`
@@ -179,11 +180,29 @@ enum {
     STOP_WHEN,   /* signal a, comparison b, limit x */
 };
 
-/* A window of a clock's communication points (ticks), at the current one. */
+/* The steps of a clock's FMUs that are taken beside the loop: beside.py. awaited: they were not done
+ * when their end came. longer: a step may go on to the first end that is not past. */
+typedef struct {
+    int64_t started, done, awaited, longer;
+} Side;
+
+/* A window of a clock's communication points (ticks), at the current one; `next` after its event. */
 typedef struct {
     const int64_t *starts;
-    int64_t n, at;
+    int64_t n, at, next;
+    Side *side;                           /* NULL where all steps are taken in the loop */
 } Clock;
+
+/* The schedule of a run in real time, and what became of it (ns): pace.py. */
+typedef struct {
+    int64_t (*clock)(void);
+    void (*wait)(int64_t until);
+    int64_t origin, most;                 /* when tick 0 is due; lateness that moves it */
+    int64_t reached, due, begun;          /* the last tick that was waited for; of the event */
+    int64_t ticks, missed, moved;
+    int64_t latest, longest;
+    int64_t *lateness, *steps;            /* histograms */
+} Pace;
 
 /* The operations of a kind of event, and how many of these there were. */
 typedef struct {
@@ -200,6 +219,7 @@ typedef struct {
     Meter **meters;
     Table *tables;
     double numerator, denominator;        /* of a tick (s) */
+    int64_t late;                         /* ticks by which the event comes after its own */
 } Loop;
 
 /* Where a sequence of operations stands, and what the loop returned for. */
@@ -215,6 +235,7 @@ typedef struct {
     int64_t n_kinds, kind;
     int64_t tick, events;                 /* events that are complete */
     int64_t patience, since;              /* ns after which, and from when, Python gets a turn */
+    Pace *pace;                           /* NULL: as fast as possible */
     At at;
 } Events;
 
@@ -238,6 +259,7 @@ enum {
 };
 
 int64_t now(void);
+void wait_until(int64_t time);
 void watch_signals(int on);
 int signal_came(void);
 void use_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
+from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import (
     Blend,
     Evaluate,
@@ -21,9 +23,17 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
+from hapticlink.orchestrator.run.beside import Collect
 from hapticlink.orchestrator.run.bind import Bound, Instruction, Stop
 from hapticlink.orchestrator.run.compiled import fmus, structures
-from hapticlink.orchestrator.run.compiled.holds import CompiledHold, can, fill_reader, parts, tanks
+from hapticlink.orchestrator.run.compiled.holds import (
+    CompiledHold,
+    CompiledTank,
+    can,
+    fill_reader,
+    parts,
+    tanks,
+)
 from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.meter import Meter
 from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
@@ -79,20 +89,33 @@ class Machine:
         return made
 
     def _make_holds(self) -> None:
-        simulation, signals = self._simulation, self._simulation.signals
-        system = simulation.system
+        simulation, system = self._simulation, self._simulation.system
         rolls_back = system.coupling == "iterated" or system.step_control is not None
         shared = tanks(simulation.holds.values(), rolls_back)
         for name, hold in simulation.holds.items():
-            own, connection = parts(hold).own, system.connection[name]
+            own = parts(hold).own
             tank = shared.get(id(getattr(own, "tank", None)))
             if not can(hold, rolls_back) or (hasattr(own, "tank") and tank is None):
                 continue
-            values = signals.values[signals.hold(name)]
-            sources = signals.sources(connection)
-            loop = ctypes.addressof(self.loop)
-            simulation.holds[name] = CompiledHold(self.library, loop, hold, sources, values, tank)
+            simulation.holds[name] = self._made(name, hold, tank)
         simulation.springs[:] = [shared.get(id(tank), tank) for tank in simulation.springs]
+
+    def _made(self, name: str, hold: Hold, tank: CompiledTank | None = None) -> CompiledHold:
+        signals = self._simulation.signals
+        sources = signals.sources(self._simulation.system.connection[name])
+        values, loop = signals.values[signals.hold(name)], ctypes.addressof(self.loop)
+        return CompiledHold(self.library, loop, hold, sources, values, tank)
+
+    def change_hold(self, name: str, hold: Hold) -> None:
+        """Replace the hold of a connection. Raises InputFault where the old or the new one has no
+        C."""
+        for each in (hold, self._simulation.holds[name]):
+            if not isinstance(each, CompiledHold) and not can(each, rolls_back=False):
+                kind = type(parts(each).own).__name__
+                raise InputFault(f"hold of {name}: there is no C for {kind}: take `reset`")
+        self._simulation.holds[name] = made = self._made(name, hold)
+        self._kept.append(made)
+        self._holds[self._index("hold", name, lambda at: made)] = made.address
 
     # --- records --------------------------------------------------------------------------
 
@@ -134,6 +157,8 @@ class Machine:
                 return structures.GET, at, isinstance(instruction, Get)
             case Set(fmu, now, False) if (at := self._setter(fmu, now)) is not None:
                 return structures.SET, at
+            case Step(fmu) if fmu in simulation.beside:
+                return None
             case Step(fmu, dticks, part, parts) if (at := self._fmu(fmu)) is not None:
                 size = float(dticks * (system.timeline.base / parts))
                 over = 0 if system.fmu[fmu].sampled and parts == 1 else dticks
@@ -173,6 +198,10 @@ class Machine:
                 return "the FMU takes derivatives of its inputs"
             case Set(_, _, True):
                 return "the FMU takes derivatives of its inputs"
+            case Step(fmu) if fmu in self._simulation.beside:
+                return "the FMU runs beside the loop, in a thread"
+            case Collect():
+                return "its FMUs run beside the loop, in a thread"
             case Push(connection) | Evaluate(connection) | Blend(connection):
                 kind = type(parts(self._simulation.holds[connection]).own).__name__
                 return f"there is no C for {kind}, or none that takes samples back"
@@ -266,6 +295,7 @@ class Machine:
         instruction, call = self._bound[at.op]
         simulation = self._simulation
         if code == structures.CALL:
+            simulation.late = self.loop.late
             call(tick)
         elif code == structures.STOP:
             raise Stop

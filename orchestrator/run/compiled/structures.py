@@ -119,8 +119,20 @@ class Op(ctypes.Structure):
     _fields_ = (*_all(_INT, "code a b c d"), ("x", _DOUBLE))
 
 
+class Side(ctypes.Structure):
+    _fields_ = (*_all(_INT, "started done awaited longer"),)
+
+
 class Clock(ctypes.Structure):
-    _fields_ = (("starts", _POINTER), *_all(_INT, "n at"))
+    _fields_ = (("starts", _POINTER), *_all(_INT, "n at next"), ("side", _POINTER))
+
+
+class Pace(ctypes.Structure):
+    _fields_ = (
+        *_all(_POINTER, "clock wait"),
+        *_all(_INT, "origin most reached due begun ticks missed moved latest longest"),
+        *_all(_POINTER, "lateness steps"),
+    )
 
 
 class Block(ctypes.Structure):
@@ -131,6 +143,7 @@ class Loop(ctypes.Structure):
     _fields_ = (
         *_all(_POINTER, "points values ops fmus setters holds meters tables"),
         *_all(_DOUBLE, "numerator denominator"),
+        ("late", _INT),
     )
 
 
@@ -144,13 +157,14 @@ class Events(ctypes.Structure):
         *_all(_INT, "n_clocks end"),
         *_all(_POINTER, "keys key kinds"),
         *_all(_INT, "n_kinds kind tick events patience since"),
+        ("pace", _POINTER),
         ("at", At),
     )
 
 
 ALL = (
     Place, Transfer, Check, Fmu, Setter, Link, Tank, Reader, Queue, Account, Hold,
-    Meter, Table, Op, Clock, Block, Loop, At, Events,
+    Meter, Table, Op, Side, Clock, Pace, Block, Loop, At, Events,
 )  # fmt: skip
 
 (

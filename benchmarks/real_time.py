@@ -1,0 +1,126 @@
+"""The report's experiment in real time, beside an empty timer loop of the same rate.
+
+The empty loop is the loop in C without an operation, in a thread of the same process: what it
+misses is the machine's.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import tempfile
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results.figure_axes import short
+from hapticlink.orchestrator.results.real_time_figure import real_time
+from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.events import Events
+from hapticlink.orchestrator.run.compiled.library import load
+from hapticlink.orchestrator.run.pace import Pace
+from hapticlink.orchestrator.run.real_time import RealTimeRun
+
+SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 3
+NEVER = 2**62
+Report = Mapping[str, Any]
+
+
+class EmptyLoop:
+    """A loop of RATE Hz without an operation, in a thread."""
+
+    def __init__(self, seconds: float) -> None:
+        self.library, self.pace = load(), Pace()
+        self.loop = structures.Loop(numerator=1.0, denominator=float(RATE))
+        ticks = round(seconds * RATE)
+        clock = Clock("timer", range(ticks + 3))
+        timeline = Timeline(Fraction(1, RATE), ticks, (clock,))
+        events: Any = Events
+        self._events = events(self, timeline, lambda event: (0, 0), self.pace)
+        self._events.patience(NEVER)
+        self._thread: Thread | None = None
+
+    def code(self, at: object, run: Callable[..., int], *arguments: int) -> int:
+        """What a function of the loop returns."""
+        return run(*arguments)
+
+    def start(self, *_: object) -> None:
+        """Start, once."""
+        if self._thread is None:
+            self.pace.c.origin = self.pace.now()
+            self._thread = Thread(target=self._events.run, args=(lambda tick: None,))
+            self._thread.start()
+
+    def report(self) -> Report:
+        """What became of it, once it has ended."""
+        assert self._thread
+        self._thread.join()
+        return self.pace.report()
+
+
+def bench(folder: Path, quick: bool, told: Callable[[str, int, int], object], command: str) -> None:
+    """Write the page and its figure to `folder`."""
+    seconds = QUICK if quick else SECONDS
+    empty = EmptyLoop(seconds)
+    load_average = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    options = ["packaging=native", f"duration={seconds}", f"haptics.rate={RATE}"]
+    with tempfile.TemporaryDirectory() as room:
+        results = simulate(
+            SCENE,
+            room,
+            options,
+            lambda time: told(SCENE, int(time), seconds),
+            real_time=RealTimeRun(empty.start),
+        ).results
+    assert results.run["fault"] is None, results.run["fault"]
+    beside = empty.report()
+    folder.mkdir(parents=True, exist_ok=True)
+    curves = {"lateness of an empty loop": beside["histograms"]["lateness"]}
+    figure = real_time(results, curves, f"an empty loop beside it misses {missed(beside)}")
+    assert figure
+    figure.savefig(folder / "real_time.png", dpi=150)
+    (folder / "README.md").write_text(
+        page(results.run["real_time"], beside, seconds, load_average, command)
+    )
+
+
+def missed(report: Report) -> str:
+    return f"{report['deadlines_missed'] or 'none'}"
+
+
+def page(ours: Report, empty: Report, seconds: int, load: float, command: str) -> str:
+    """The page: deadlines missed by both loops, and the table of their times."""
+    rows = {
+        "step time of the haptic loop": ours["step_time"],
+        "lateness of the haptic loop": ours["lateness"],
+        "lateness of the empty loop": empty["lateness"],
+    }
+    samples = ours["samples"]["graphics"]
+    lines = [
+        "# Real time",
+        "",
+        f"In {seconds} s at {RATE} Hz the haptic loop of `{SCENE}` with native FMUs missed "
+        f"{missed(ours)} of {ours['ticks']} deadlines, an empty timer loop beside it "
+        f"{missed(empty)} of {empty['ticks']}.",
+        "",
+        "![Share of ticks whose step time and lateness exceed a time](real_time.png)",
+        "",
+        f"Made by `{command}`, on {platform.system()} {platform.release()} with {os.cpu_count()} "
+        f"cores and a load average of {load:.1f} before. Milliseconds; the deadline of a tick is "
+        f"the next one, {short(1e3 * ours['period'])} ms after it was due. Rows are recorded, the "
+        f"graphics side runs in a thread: {samples['late']} of its {samples['taken']} samples were "
+        f"late, at most by {short(1e3 * samples['largest_lateness'])} ms.",
+        "",
+        f"| | {' | '.join(ours['lateness'])} |",
+        "|---|" + "--:|" * len(ours["lateness"]),
+        *(
+            f"| {name} | {' | '.join(short(1e3 * value) for value in row.values())} |"
+            for name, row in rows.items()
+        ),
+        "",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,239 @@
+"""Runs a scene in real time, and changes it while it runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.api import runs
+from hapticlink.orchestrator.api.result import Run
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.frames import Frames
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.fmi.capabilities import varies_step
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.run.energy.meter import Energy
+from hapticlink.orchestrator.run.make_holds import make_hold
+from hapticlink.orchestrator.run.python_loop import PythonLoop
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
+from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system import held_polynomials
+from hapticlink.orchestrator.system.assign_holds import misfit
+from hapticlink.orchestrator.system.ports import names
+from hapticlink.orchestrator.system.system import Connection
+
+TURN = 20_000_000
+"""ns between two turns."""
+
+
+class RealTime:
+    """A scene that runs in real time and is watched and changed meanwhile, as by a page on which a
+    mouse is the hand.
+
+    `scene` and `options` are those of `hl.scene`. `run` calls its `turn` with this object about
+    every 20 ms, between two events of the haptic loop, which waits for it: a turn has to be short.
+    Everything else is for a turn to use. What a change acts on is the running FMUs, holds and
+    clocks themselves; run.json lists the changes with their times (`changes` of `real_time`).
+    """
+
+    def __init__(self, scene: str | Path | Scene, options: Options = ()) -> None:
+        self._scene = open_scene.load(scene, options)
+        self._schedule: Callable[[Callable[..., object]], RealTimeRun] = RealTimeRun
+        self.paused = False
+        """Whether time stands still; turns go on."""
+
+    def run(self, turn: Callable[[RealTime], object], out: str | Path | None = None) -> Run:
+        """Run the scene to its duration, or until `stop`; results as of `hl.run`. After a `reset`
+        they are those from then on."""
+        self._called = turn
+        while True:
+            self._until: int | None = None
+            self._again = False
+            self._settings: dict[str, tuple[list[Scalar], Callable[[Any], object]]] = {}
+            self._connections: dict[str, Connection] = {}
+            self._run = self._schedule(self._turn)
+            made = runs.run_paced(self._scene, out, self._run)
+            if not self._again:
+                return made
+
+    # --- to read ----------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """The simulated time of the newest haptic event (s)."""
+        haptics = self._simulation.system.timeline.clocks[0].name
+        return self._simulation.seconds(self._loop.previous(haptics))
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """The newest sample of an output, `fmu.port`, that the haptic loop has: its entries in the
+        order of their indices. Raises InputFault for an unknown name."""
+        scalars = self._scalars(name, "output")
+        fmu = name.partition(".")[0]
+        places = [self._simulation.signals.scalar(fmu, s.name) for s in scalars]
+        return self._simulation.signals.values[places]
+
+    def energies(self) -> dict[str, Energy]:
+        """The energies (J) of each connection that carries power, until now."""
+        return self._simulation.meters.energies()
+
+    def report(self) -> dict[str, Any]:
+        """Step times, lateness, deadlines missed and late samples until now, as in run.json."""
+        return self._run.report()
+
+    # --- to change --------------------------------------------------------------------------
+
+    def set(self, name: str, value: ArrayLike) -> None:
+        """Set an input that nothing feeds, or a tunable parameter, `fmu.port`, from the FMU's next
+        step on; entries in the order of their indices, in the FMU's units. Raises InputFault for
+        other names and for values of another number or that are not finite."""
+        fmu = name.partition(".")[0]
+        if name not in self._settings:
+            scalars = [*self._scalars(name, "input", "parameter")]
+            self._require_free(name, scalars)
+            instance = self._simulation.instances[fmu]
+            self._settings[name] = scalars, instance.connect(scalars, range(len(scalars)))
+        scalars, set_from = self._settings[name]
+        values = np.array(value, np.float64).ravel()
+        if len(values) != len(scalars) or not np.isfinite(values).all():
+            raise InputFault(f"{name} = {values.tolist()}: give {len(scalars)} finite numbers")
+        self._simulation.instances[fmu].before_step(lambda: set_from(values))
+
+    def hold(self, name: str, hold: str | None = None, delay: float | None = None) -> None:
+        """Give connections another hold, or another constant latency `delay` (s); they are named
+        as in [holds] of a scene. A hold begins anew with the newest sample of its source. Raises
+        InputFault where it does not fit, or cannot be changed while the scene runs."""
+        if hold is not None and hold not in HOLDS:
+            raise InputFault(unknown("hold", hold, HOLDS))
+        system = self._simulation.system
+        found = [c for c in system.connections if name in names(c) and c.hold]
+        if not found:
+            every = [key for c in system.connections if c.hold for key in names(c)]
+            raise InputFault(unknown("connection with a hold", name, every))
+        changed = [self._with(self._connections.get(c.name, c), hold, delay) for c in found]
+        for connection in changed:
+            made = make_hold(connection, system, self._simulation.signals, {})
+            self._loop.change_hold(connection.name, made)
+            self._connections[connection.name] = connection
+            sample = self._simulation.signals.values[self._simulation.signals.sources(connection)]
+            stamp = self._loop.previous(system.fmu[connection.source].clock)
+            self._simulation.holds[connection.name].push(stamp, sample, stamp)
+        self._note(f"hold of {name}: {changed[0].hold}, delay {delay or 0.0:g} s")
+
+    def rate(self, clock: str, rate: float) -> None:
+        """Change the rate (Hz) of a clock other than the haptic one, such as `graphics`, from the
+        end of its current step on; steps then end on haptic ticks. Raises InputFault where an FMU
+        cannot vary its step, and for a rate that is not between 0 and the haptic one."""
+        timeline = self._simulation.system.timeline
+        haptics, *others = timeline.clocks
+        if clock not in [c.name for c in others]:
+            raise InputFault(unknown("clock", clock, [c.name for c in others]))
+        fixed = [f.name for f in self._simulation.system.fmus if f.clock == clock]
+        fixed = [f for f in fixed if not varies_step(self._simulation.system.fmu[f].description)]
+        if fixed:
+            raise InputFault(f"rate of {clock}: {fixed[0]} takes steps of one size only")
+        period = 1 / (exact(rate) * timeline.base) if rate > 0 else Fraction(0)
+        if period < haptics.longest:
+            raise InputFault(f"rate of {clock} = {rate} Hz: give a rate up to that of the haptics")
+        first, begun, tick = self._loop.previous(clock), self._loop.current(clock), haptics.longest
+
+        def at(i: int) -> int:
+            return (
+                (first, begun)[i] if i < 2 else math.ceil((begun + (i - 1) * period) / tick) * tick
+            )
+
+        count = max(math.ceil((timeline.end - begun) / period), 0) + 4
+        self._loop.change_rate(clock, Frames(at, count, 1))
+        self._note(f"rate of {clock}: {rate:g} Hz")
+
+    # --- time ---------------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        """Let time stand still after this turn."""
+        self.paused = True
+
+    def resume(self) -> None:
+        """Let time go on."""
+        self.paused, self._until = False, None
+
+    def step(self, ticks: int = 1) -> None:
+        """Go on for a number of haptic ticks, then pause."""
+        self.paused, self._until = True, self._run.pace.c.ticks + ticks
+
+    def reset(self, options: Options = ()) -> None:
+        """Begin anew at t = 0, with the scene changed by `options`. Raises what `hl.scene` does."""
+        self._scene = open_scene.load(self._scene, options)
+        self._again = True
+        raise Ended("reset")
+
+    def stop(self) -> None:
+        """End the run."""
+        raise Ended("stopped")
+
+    # ------------------------------------------------------------------------------------------
+
+    def _turn(self, simulation: Simulation, loop: PythonLoop) -> None:
+        self._simulation, self._loop = simulation, loop
+        pace = self._run.pace
+        begun, stepping = pace.now(), self._until is not None
+        if stepping and pace.c.ticks < (self._until or 0):
+            return
+        self._until = None
+        self._called(self)
+        while self.paused and self._until is None:
+            pace.wait(pace.now() + TURN)
+            interrupt.check(self.time)
+            self._called(self)
+        loop.patience(TURN if self._until is None else 0)
+        if self.paused or stepping:
+            pace.c.origin += pace.now() - begun
+
+    def _scalars(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
+        fmu, _, port = name.partition(".")
+        fmus = self._simulation.system.fmu
+        if fmu not in fmus:
+            raise InputFault(unknown("FMU", fmu, fmus))
+        if found := fmus[fmu].description.port(port, *causalities):
+            return found
+        every = [s.port for s in fmus[fmu].description.scalars if s.causality in causalities]
+        raise InputFault(f"{fmu}: {unknown(' or '.join(causalities), port, dict.fromkeys(every))}")
+
+    def _require_free(self, name: str, scalars: Iterable[Scalar]) -> None:
+        fmu = name.partition(".")[0]
+        fed = {s.name: c.name for c in self._simulation.system.into(fmu) for s in c.inputs}
+        for scalar in scalars:
+            if scalar.name in fed:
+                raise InputFault(f"{name} is fed by a connection, {fed[scalar.name]}")
+            if scalar.causality == "parameter" and scalar.variability != "tunable":
+                raise InputFault(f"{name} is not tunable: change the scene, with `reset`")
+
+    def _with(self, c: Connection, hold: str | None, delay: float | None) -> Connection:
+        """The connection with another hold or latency."""
+        system = self._simulation.system
+        latency = c.latency if delay is None else Latency(min=delay) if delay else None
+        new = replace(c, hold=hold or c.hold, latency=latency)
+        why = misfit(new.hold or "", new, system.fmu, system.power, False)
+        if system.coupling == "iterated" or system.step_control:
+            why = "steps are repeated"
+        if "spring" in (HOLDS[c.hold or ""].needs, HOLDS[new.hold or ""].needs):
+            why = "holds of a spring share its energy: take `reset`"
+        if held_polynomials.order(system, c) or held_polynomials.order(system, new):
+            why = "the FMU takes derivatives of its inputs: take `reset`"
+        if why:
+            raise InputFault(f"hold of {c.name} = {new.hold}: {why}")
+        return new
+
+    def _note(self, text: str) -> None:
+        self._run.changes.append((self.time, text))

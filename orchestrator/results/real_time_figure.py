@@ -1,0 +1,65 @@
+"""The share of haptic ticks whose step time or lateness exceeds a time, with the deadline."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hapticlink.orchestrator.results.figure_axes import short, titled
+from hapticlink.orchestrator.results.tables import Results
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Histogram = Sequence[tuple[float, int]]
+"""Upper ends (s) of bins, and their counts."""
+LEAST = 1e-7
+"""Times (s) below it are drawn there."""
+
+
+def real_time(
+    results: Results, curves: Mapping[str, Histogram] | None = None, more: str = ""
+) -> Figure | None:
+    """The figure of a run in real time, with further `curves` by their labels and `more` said in
+    its title; None for others."""
+    found = results.run.get("real_time")
+    if not found or not found["ticks"]:
+        return None
+    title = "; ".join(filter(None, (finding(found), more)))
+    figure, axes = titled(results, title, "time (ms)", "share of ticks that exceed it")
+    histograms = found["histograms"]
+    own = {"step time": histograms["step_time"], "lateness": histograms["lateness"]}
+    for (label, histogram), style in zip(
+        {**own, **(curves or {})}.items(), ("-", "--", ":", "-."), strict=False
+    ):
+        axes.step(*exceedance(histogram), style, where="post", label=label)
+    axes.axvline(1e3 * found["period"], color="k", lw=1)
+    axes.annotate(
+        "deadline",
+        (1e3 * found["period"], 0.5),
+        (3, 0),
+        xycoords=("data", "axes fraction"),
+        textcoords="offset points",
+        rotation=90,
+    )
+    axes.set(xscale="log", yscale="log")
+    axes.legend(fontsize="small")
+    return figure
+
+
+def finding(found: Mapping[str, Any]) -> str:
+    """What a run in real time shows, in a sentence."""
+    missed = f"{found['deadlines_missed'] or 'none'} of {found['ticks']} deadlines missed"
+    largest = (1e3 * found[name]["max"] for name in ("step_time", "lateness"))
+    step, late = map(short, largest)
+    rate = short(1 / found["period"])
+    return f"{rate} Hz in real time: {missed}; largest step time {step} ms, lateness {late} ms"
+
+
+def exceedance(histogram: Histogram) -> tuple[np.ndarray, np.ndarray]:
+    """Times (ms), and the share of the values above each."""
+    times, counts = np.array(histogram, dtype=np.float64).reshape(-1, 2).T
+    above = 1.0 - np.cumsum(counts) / counts.sum()
+    return 1e3 * np.maximum(np.append(LEAST, times), LEAST), np.append(1.0, above)

@@ -1,0 +1,148 @@
+"""The wall clock of a run in real time: its schedule, and what became of it.
+
+The event of tick k is due at origin + t_k. Of the events of the haptic clock, lateness is the time
+from there to the event's beginning, step time that from its beginning to its completion; a deadline
+is missed where it is complete after the next one is due. Where an event begins more than MOST after
+it was due, as after the machine was suspended, the schedule moves instead of being caught up with.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.run.compiled import structures
+
+MOST = 100_000_000
+"""ns by which an event may be late before the schedule moves."""
+BINS, EXACT = 2304, 64
+"""Bins of a histogram; those below EXACT ns are of 1 ns, above there are 64 to each power of 2."""
+SWITCH = 5e-4
+"""Time (s) for which another Python thread may keep the interpreter from the loop."""
+_CLOCK, _WAIT = ctypes.CFUNCTYPE(ctypes.c_int64), ctypes.CFUNCTYPE(None, ctypes.c_int64)
+
+
+class Pace:
+    """Schedule and statistics of a run; the compiled loop works on `c`.
+
+    clock: time (ns) of a clock that is never set back; wait: waits until a time of that clock, or
+    shorter. By default those of the machine.
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], int] | None = None,
+        wait: Callable[[int], object] | None = None,
+    ) -> None:
+        self.clock, self.wait = clock or time.perf_counter_ns, wait or self._sleep
+        self._injected = clock is not None
+        self.lateness, self.steps = np.zeros(BINS, np.int64), np.zeros(BINS, np.int64)
+        self.c = structures.Pace(most=MOST)
+        self.c.lateness, self.c.steps = self.lateness.ctypes.data, self.steps.ctypes.data
+
+    def now(self) -> int:
+        """Time of the clock (ns)."""
+        return self.clock()
+
+    def _sleep(self, until: int) -> None:
+        time.sleep(max(until - self.clock(), 0) * 1e-9)
+
+    def take(self, library: ctypes.CDLL) -> None:
+        """Give the compiled loop a clock: by default its own, which this object then uses, too."""
+        if self._injected:
+            self._calls: tuple[Any, Any] = _CLOCK(self.clock), _WAIT(self.wait)
+        else:
+            self.clock, self.wait = library.now, library.wait
+            self._calls = library.now, library.wait
+        pointers = (ctypes.cast(call, ctypes.c_void_p).value for call in self._calls)
+        self.c.clock, self.c.wait = pointers
+
+    def due(self, seconds: float) -> int:
+        """When the event of a simulated time is due (ns)."""
+        origin: int = self.c.origin
+        return origin + int(1e9 * seconds)
+
+    def begin(self, seconds: float) -> None:
+        """The haptic clock's event of a simulated time begins."""
+        c = self.c
+        c.begun, c.due = self.clock(), self.due(seconds)
+        late = c.begun - c.due
+        self.lateness[_bin(late)] += 1
+        c.latest = max(c.latest, late)
+        if late > c.most:
+            c.origin += late
+            c.moved += late
+
+    def end(self, period: float) -> None:
+        """It is complete; the next one is `period` (s) after it."""
+        c, time = self.c, self.clock()
+        took = time - c.begun
+        self.steps[_bin(took)] += 1
+        c.longest = max(c.longest, took)
+        c.missed += time - c.due > int(1e9 * period)
+        c.ticks += 1
+
+    @contextmanager
+    def undisturbed(self) -> Iterator[None]:
+        """Start now; within the context no collection of garbage looks through what there is
+        already, and other threads of Python hand over soon."""
+        before = sys.getswitchinterval()
+        gc.freeze()
+        sys.setswitchinterval(SWITCH)
+        self.c.origin = self.clock()
+        try:
+            yield
+        finally:
+            sys.setswitchinterval(before)
+            gc.unfreeze()
+
+    def report(self) -> dict[str, Any]:
+        """What run.json says, in s."""
+        c = self.c
+        return {
+            "reproducible": False,
+            "ticks": c.ticks,
+            "deadlines_missed": c.missed,
+            "moved": c.moved * 1e-9,
+            "step_time": quantiles(self.steps, c.longest),
+            "lateness": quantiles(self.lateness, c.latest),
+            "histograms": {"step_time": _counts(self.steps), "lateness": _counts(self.lateness)},
+        }
+
+
+def quantiles(bins: NDArray[np.int64], largest: int) -> dict[str, float]:
+    """Quantiles (s) of a histogram, each the upper end of its bin, at most 1.6 % above it, and the
+    largest value (ns) in s."""
+    below = bins.cumsum()
+    shares = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999}
+    found = {
+        name: 1e-9 * min(_upper(int(np.searchsorted(below, share * below[-1]))), largest)
+        for name, share in shares.items()
+    }
+    return found | {"max": 1e-9 * largest}
+
+
+def _bin(ns: int) -> int:
+    if ns < EXACT:
+        return max(ns, 0)
+    shift = ns.bit_length() - 7
+    return min(EXACT * shift + (ns >> shift), BINS - 1)
+
+
+def _upper(i: int) -> int:
+    """The upper end (ns) of a bin."""
+    shift = max(i // EXACT - 1, 0)
+    return ((i - EXACT * shift + 1) << shift) - 1
+
+
+def _counts(bins: NDArray[np.int64]) -> list[tuple[float, int]]:
+    """The upper end (s) and the count of each bin that is not empty."""
+    return [(1e-9 * _upper(int(i)), int(bins[i])) for i in np.flatnonzero(bins)]

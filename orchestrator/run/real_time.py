@@ -1,0 +1,94 @@
+"""A run in real time: its pace, the FMUs beside the loop, and who has a turn every 20 ms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import islice
+from typing import Any
+
+from hapticlink.orchestrator.plan.operations import Event
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.run import beside
+from hapticlink.orchestrator.run.beside import ThreadWorker, Worker
+from hapticlink.orchestrator.run.pace import Pace
+from hapticlink.orchestrator.run.python_loop import PythonLoop
+from hapticlink.orchestrator.run.simulation import Simulation
+
+MANY = 4096
+"""Events among which the kinds are looked for that are bound before the run."""
+
+
+class Ended(Exception):
+    """Raised in a turn to end the run, with the reason for run.json."""
+
+
+class RealTimeRun:
+    """What makes a run one in real time.
+
+    turn: called about every 20 ms between two events, with the simulation and the loop. clock, wait
+    and worker: as of Pace and `sides`, of the machine by default. changes: time (s) and text of
+    what was changed during the run.
+    """
+
+    def __init__(
+        self,
+        turn: Callable[[Simulation, PythonLoop], object] | None = None,
+        clock: Callable[[], int] | None = None,
+        wait: Callable[[int], object] | None = None,
+        worker: Callable[[], Worker] = ThreadWorker,
+    ) -> None:
+        self.pace, self._turn, self._worker = Pace(clock, wait), turn, worker
+        self.changes: list[tuple[float, str]] = []
+        self._abandoned: list[str] = []
+        self._in_loop: dict[str, str] = {}
+
+    @contextmanager
+    def of(self, plan: Plan, simulation: Simulation) -> Iterator[None]:
+        """Context of the run of a simulation, which has no loop yet; threads end with it."""
+        self._simulation = simulation
+        simulation.pace = self.pace
+        simulation.beside, self._in_loop = beside.beside(plan)
+        now = self.pace.now
+        simulation.sides = beside.sides(plan, simulation.beside, now, self._worker)
+        try:
+            yield
+        finally:
+            left = (side.close() for side in simulation.sides.values())
+            self._abandoned = [name for name in left if name]
+
+    def turn(self, loop: PythonLoop) -> None:
+        """Raises FmuFault where an FMU beside the loop hangs, and whatever the turn raises."""
+        simulation = self._simulation
+        for side in simulation.sides.values():
+            side.require(simulation.system.faults.timeout)
+        if self._turn:
+            self._turn(simulation, loop)
+
+    def report(self) -> dict[str, Any]:
+        """What run.json says, in s."""
+        simulation = self._simulation
+        haptics = simulation.system.timeline.clocks[0]
+        return self.pace.report() | {
+            "period": simulation.seconds(haptics.longest),
+            "beside": dict(simulation.beside),
+            "in_loop": self._in_loop,
+            "samples": {
+                clock: {"taken": side.samples, "late": side.late, "largest_lateness": side.latest}
+                for clock, side in simulation.sides.items()
+            },
+            "changes": self.changes,
+            "abandoned": self._abandoned,
+        }
+
+
+def kinds(plan: Plan) -> set[Event]:
+    """The kinds of events that are likely: those at the beginning, and the same at the end of the
+    run."""
+    found = {moment.event for moment in islice(plan, MANY)}
+    for event in [*found]:
+        alone = (event._replace(firings=(firing,)) for firing in event.firings)
+        for kind in (event, *alone) if not event.first else ():
+            last = tuple(firing._replace(final=True) for firing in kind.firings)
+            found |= {kind, kind._replace(firings=last)}
+    return found

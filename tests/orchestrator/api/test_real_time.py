@@ -1,0 +1,174 @@
+"""`hl.RealTime`: a scene is read and changed while it runs, by a clock that goes on only while
+somebody waits for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
+from hapticlink.orchestrator.run.real_time import RealTimeRun
+from tests.orchestrator.foreign_fmus import python_fmu, scene
+from tests.orchestrator.wall_clock import MS, WallClock
+
+try:
+    load()
+    LOOPS = ["python", "compiled"]
+except Unavailable:
+    LOOPS = ["python"]
+Turn = Callable[[hl.RealTime], object]
+
+
+@pytest.fixture(params=LOOPS, autouse=True)
+def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv(CHOICE, request.param)
+    return str(request.param)
+
+
+def ran(name: str, turn: Turn, *options: str, clock: WallClock | None = None) -> hl.Run:
+    live, by = hl.RealTime(name, options), clock or WallClock()
+
+    def schedule(turn: Callable[..., object]) -> RealTimeRun:
+        by.time = 0
+        return by.run(turn)
+
+    live._schedule = schedule
+    return live.run(turn)
+
+
+def once(at: float, change: Turn) -> Turn:
+    """A turn that changes the scene at the first turn at or after a time (s)."""
+    done: list[float] = []
+
+    def turn(live: hl.RealTime) -> None:
+        if live.time >= at and not done:
+            done.append(live.time)
+            change(live)
+
+    return turn
+
+
+def test_outputs_are_read_and_a_parameter_is_set_from_the_next_step_on() -> None:
+    read: dict[float, np.ndarray] = {}
+    change = once(0.1, lambda live: live.set("hand.wrench", (1.0, 2.0, 0.5)))
+
+    def turn(live: hl.RealTime) -> None:
+        read[live.time] = live["hand.F"]
+        change(live)
+
+    made = ran("closed-loop", turn, "duration=0.2")
+    wrench, times = made["hand.F"], made.time("hand.F")
+    for time, value in read.items():
+        assert np.array_equal(wrench[times == time][0], value)
+    after = times > min(t for t in read if t >= 0.1)
+    assert np.array_equal(np.unique(wrench[after], axis=0), [[1.0, 2.0, 0.5]])
+    assert not (wrench[~after] == [1.0, 2.0, 0.5]).all(axis=1).any()
+
+
+def test_a_spring_hand_pulls_to_where_it_is_moved() -> None:
+    """F = K (target - x), as whoever holds a mouse has it."""
+    hand = "hand={ type = 'spring', stiffness = [50.0, 50.0, 0.1], target = [[0, 0.1, 0, 0]] }"
+    change = once(0.1, lambda live: live.set("hand.target", (0.3, 0.1, 0.0)))
+    made = ran("closed-loop", change, hand, "duration=0.2")
+    pull = made["hand.F"] / [50.0, 50.0, 0.1] + made["haptic_device.x_true"]
+    moved = np.abs(pull[:, 0] - 0.3) < 1e-9
+    assert np.allclose(pull[~moved], [0.1, 0.0, 0.0], rtol=0, atol=1e-12)
+    assert np.allclose(pull[moved], [0.3, 0.1, 0.0], rtol=0, atol=1e-12)
+    assert moved.sum() > 40
+
+
+def test_an_input_of_an_fmu_beside_the_loop_is_set_before_its_next_step(tmp_path: Path) -> None:
+    one, two = python_fmu(tmp_path, "One"), python_fmu(tmp_path, "Two", "self.y = self.u")
+    text = '[[fmu]]\nname = "{}"\npath = "{}"\n'
+    text = text.format("one", one) + text.format("two", two) + "rate = 32\n"
+    path = scene(tmp_path, text, 512, 0.25)
+    made = ran(str(path), once(0.07, lambda live: live.set("two.u", 3.0)))
+    found = dict(zip(made.time("two.y"), made["two.y"], strict=True))
+    assert found == {k / 32: 0.0 if k < 4 else 3.0 for k in range(9)}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda live: live.set("hand.wrench", (1.0, 2.0)), "give 3 finite numbers"),
+        (lambda live: live.set("hand.wrench", (1.0, 2.0, np.nan)), "give 3 finite numbers"),
+        (lambda live: live.set("hand.wrong", 1.0), "no input or parameter 'wrong'"),
+        (lambda live: live.set("controller.x_D", np.zeros(3)), "is fed by a connection"),
+        (lambda live: live.set("haptic_device.x_start", np.zeros(3)), "is not tunable"),
+        (lambda live: live["hands.F"], "did you mean 'hand'"),
+        (lambda live: live.hold("virtual_environment.P_c", "zohh"), "did you mean 'zoh'"),
+        (lambda live: live.hold("virtual_environment.P_c", "pspm"), "spring"),
+        (lambda live: live.hold("hand.F", "foh"), "connection with a hold"),
+        (lambda live: live.rate("haptics", 100.0), "clock 'haptics'"),
+        (lambda live: live.rate("graphics", 600.0), "up to that of the haptics"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_and_changes_nothing(change: Turn, said: str) -> None:
+    def turn(live: hl.RealTime) -> None:
+        with pytest.raises(hl.InputFault, match=said):
+            change(live)
+        live.stop()
+
+    made = ran("closed-loop", turn, "duration=0.2")
+    assert made.fault is None
+    assert made.run["end"]["reason"] == "stopped"
+    assert made.run["real_time"]["changes"] == []
+
+
+def test_a_hold_is_changed_and_begins_with_the_newest_sample() -> None:
+    """From the change on, the controller gets what a run with the other hold gives it: here the
+    pose of a mechanism at the graphics rate, held and delayed by interpolation."""
+    change = once(0.5, lambda live: live.hold("virtual_mechanism.x", "foh", delay=0.0))
+    options = ("duration=1.0", "hold=zoh", "graphics.rate=32")
+    made = ran("closed-loop-direct", change, *options)
+    zoh = ran("closed-loop-direct", lambda live: None, *options)
+    ((time, text),) = made.run["real_time"]["changes"]
+    assert (0.5 <= time < 0.55, text) == (True, "hold of virtual_mechanism.x: foh, delay 0 s")
+    same = (made["controller.F_drift"] == zoh["controller.F_drift"]).all(axis=1)
+    frames = np.arange(0, 1.0, 1 / 32)
+    second = frames[frames > time][0]  # until then foh has only one sample
+    times = made.time("controller.F_drift")
+    assert same[times <= second].all()
+    assert not same[times > second].all()
+
+
+def test_a_rate_is_changed_from_the_end_of_the_step_on() -> None:
+    made = ran("closed-loop", once(0.1, lambda live: live.rate("graphics", 64.0)), "duration=0.3",
+               "graphics.rate=32")  # fmt: skip
+    want = [*(k / 32 for k in range(4)), *(k / 64 for k in range(8, 20))]
+    assert made.graphics["time"].tolist() == want
+    assert made.run["real_time"]["samples"]["graphics"]["late"] == 0
+
+
+def test_time_stands_still_in_a_pause_and_goes_on_by_steps() -> None:
+    seen: list[float] = []
+    clock = WallClock()
+
+    def turn(live: hl.RealTime) -> None:
+        seen.append(live.time)
+        if len(seen) == 2:
+            live.pause()
+        if 5 <= len(seen) < 8:
+            live.step(3)
+        if len(seen) == 10:
+            live.resume()
+
+    made = ran("closed-loop", turn, "duration=0.2", clock=clock)
+    ticks = np.array(seen) * 512
+    assert (ticks[1:5] == ticks[1]).all()
+    assert np.array_equal(np.diff(ticks[4:10]), [3, 3, 3, 0, 0])
+    assert made.run["real_time"]["deadlines_missed"] == 0
+    assert clock.time >= int(102e9 / 512) + 5 * 20 * MS
+    assert np.array_equal(made.haptics["time"], np.arange(103) / 512)
+
+
+def test_a_reset_begins_anew_with_changed_options() -> None:
+    turn = once(0.05, lambda live: live.reset({"hold": "foh"}))
+    made = ran("closed-loop", turn, "duration=0.1")
+    assert made.run["end"]["reason"] == "duration"
+    assert np.array_equal(made.haptics["time"], np.arange(52) / 512)
+    assert "foh" in made.run["holds"].values()

@@ -1,0 +1,246 @@
+"""Runs in real time, by a clock that goes on only while somebody waits for it, so that counters and
+stamps are exact; and threads that are real, of which no time is asserted."""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import summary
+from hapticlink.orchestrator.results.figures import figures
+from hapticlink.orchestrator.results.real_time_figure import exceedance
+from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.run import beside, pace
+from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
+from hapticlink.orchestrator.run.pace import Pace
+from hapticlink.orchestrator.run.real_time import RealTimeRun
+from tests.orchestrator.foreign_fmus import python_fmu, scene
+from tests.orchestrator.wall_clock import MS, WallClock
+
+try:
+    load()
+    LOOPS = ["python", "compiled"]
+except Unavailable:
+    LOOPS = ["python"]
+HAPTIC, GRAPHICS = Fraction(1, 512), Fraction(1, 60)
+FAST = ("duration=0.3", "graphics.rate=60")
+Made = tuple[dict[str, Any], dict[str, bytes]]
+
+
+def made(folder: Path, clock: WallClock | None, *options: str, scene: str = "closed-loop") -> Made:
+    """The run.json and the tables of a run, in real time if there is a clock."""
+    run = simulate(scene, folder, options, real_time=clock and clock.run()).run
+    assert run["fault"] is None
+    return run, {path.name: path.read_bytes() for path in folder.glob("*.csv")}
+
+
+@pytest.fixture(params=LOOPS)
+def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv(CHOICE, request.param)
+    return str(request.param)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["coupling=jacobi", "hold=foh"],
+        ["graphics.align=tick", "delays.virtual_mechanism.x=0.01"],
+        ["coupling=gauss-seidel-plants"],
+    ],
+    ids=lambda options: options[0],
+)
+def test_a_run_whose_samples_are_in_time_writes_the_bytes_of_any_run(
+    tmp_path: Path, loop: str, options: list[str]
+) -> None:
+    _, plain = made(tmp_path / "plain", None, *FAST, *options)
+    run, paced = made(tmp_path / "paced", WallClock(lambda k: 15 * MS), *FAST, *options)
+    told = run["real_time"]
+    assert not told["reproducible"]
+    assert (told["ticks"], told["deadlines_missed"], told["moved"]) == (154, 0, 0.0)
+    assert told["lateness"]["max"] == told["step_time"]["max"] == 0.0
+    in_loop = "gauss-seidel-plants" in options[0]
+    assert ("virtual_environment" in told["in_loop"]) == in_loop
+    if not in_loop:
+        paced.pop("graphics_samples.csv")
+        assert told["samples"]["graphics"] == {"taken": 17, "late": 0, "largest_lateness": 0.0}
+    assert paced == plain
+
+
+def late_samples(computing: Callable[[int], int], until: Fraction) -> list[tuple[float, float]]:
+    """Stamp and arrival of each sample: a step begins where the one before it arrives, and ends at
+    the first frame that is not past by then; it arrives there, or at the first haptic tick after it
+    is computed."""
+    found: list[tuple[float, float]] = []
+    begun, frame, stamp, k = Fraction(0), 0, Fraction(0), 0
+    while stamp <= until:
+        frame = max(frame + 1, math.floor(begun / GRAPHICS) + 1)
+        stamp = frame * GRAPHICS
+        done = begun + Fraction(computing(k), 10**9)
+        begun = stamp if done <= stamp else math.ceil(done / HAPTIC) * HAPTIC
+        found.append((float(stamp), float(begun)))
+        k += 1
+    return [row for row in found if row[0] <= until]
+
+
+@pytest.mark.parametrize("hold", ["zoh", "smooth", "passive"])
+def test_late_samples_arrive_with_their_stamps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str
+) -> None:
+    """Steps of 3, 25, 50, 3, ... ms at 60 Hz; both loops write the same bytes."""
+    runs = []
+
+    def computing(k: int) -> int:
+        return (3, 25, 50)[k % 3] * MS
+
+    options = (*FAST, f"hold={hold}", "delays.virtual_mechanism.x=0.004")
+    for choice in LOOPS:
+        monkeypatch.setenv(CHOICE, choice)
+        out = tmp_path / choice
+        run, tables = made(out, WallClock(computing), *options, scene="closed-loop-direct")
+        for key in ("timings", "in_python"):
+            run.pop(key)
+        runs.append((run, tables))
+        samples = read_table(out / "graphics_samples.csv")
+        want = np.array([(0.0, 0.0), *late_samples(computing, 153 * HAPTIC)])
+        assert np.allclose(samples.rows[:, :2], want, rtol=0, atol=1e-12)
+        assert np.allclose(samples["lateness"], want[:, 1] - want[:, 0], rtol=0, atol=1e-12)
+        assert samples["computing"][1:3].tolist() == [0.003, 0.025]
+        assert np.allclose(read_table(out / "graphics.csv")["time"], want[:, 0])
+        told = run["real_time"]["samples"]["graphics"]
+        assert (told["taken"], told["late"]) == (len(want) - 1, (np.diff(want) > 0).sum())
+        assert told["largest_lateness"] == samples["lateness"].max() > 0.03
+    assert all(each == runs[0] for each in runs)
+
+
+def test_deadlines_that_are_missed_are_counted(tmp_path: Path, loop: str) -> None:
+    """A tick that begins 3 ms late is complete after the next is due; one that begins 0.25 s late
+    moves the schedule."""
+    clock = WallClock(late={101 * MS: 3 * MS, 205 * MS: 250 * MS})
+    told = made(tmp_path, clock, *FAST)[0]["real_time"]
+    assert told["lateness"]["max"] == told["moved"] == 0.25
+    assert told["deadlines_missed"] == 2
+    assert told["lateness"]["p50"] == 0.0
+    assert sum(count for _, count in told["histograms"]["lateness"]) == told["ticks"] == 154
+    assert clock.time == 250 * MS + int(153e9 / 512)
+
+
+def test_quantiles_are_within_a_bin_of_those_of_the_numbers() -> None:
+    numbers = np.random.default_rng(1).lognormal(9.0, 2.0, 4000).astype(int)
+    bins = np.zeros(pace.BINS, np.int64)
+    for number in numbers.tolist():
+        bins[pace._bin(number)] += 1
+    found = pace.quantiles(bins, numbers.max())
+    for name, share in {"p50": 0.5, "p99": 0.99, "p99.9": 0.999}.items():
+        exact = np.quantile(numbers, share, method="inverted_cdf") * 1e-9
+        assert exact <= found[name] <= exact * (1 + 1 / 64)
+    assert found["max"] == numbers.max() * 1e-9
+
+
+def test_a_schedule_waits_by_the_clock_of_the_machine(tmp_path: Path, loop: str) -> None:
+    """A run of 0.1 s does not end before that."""
+    began = Pace().now()
+    run = simulate("closed-loop", tmp_path, ["duration=0.11"], real_time=RealTimeRun()).run
+    assert Pace().now() - began > 100 * MS
+    assert run["real_time"]["samples"]["graphics"]["taken"] == 3
+
+
+BODY = """
+        if self.steps == 3:
+            {}
+        self.y = time + size"""
+FMU = '[[fmu]]\nname = "slow"\npath = "Slow.fmu"\nrate = 64\n{}\n[faults]\ntimeout = {}\n'
+
+
+def beside_the_loop(folder: Path, body: str, more: str = "", timeout: float = 60.0) -> Path:
+    """A scene with an FMU beside an empty haptic loop, of which the third step does something."""
+    python_fmu(folder, "Slow", BODY.format(body).strip())
+    one = '[[fmu]]\nname = "one"\npath = "One.fmu"\n'
+    python_fmu(folder, "One")
+    return scene(folder, one + FMU.format(more, timeout), 512, 0.2)
+
+
+def threads() -> list[str]:
+    return [t.name for t in threading.enumerate() if t.name == "hapticlink-beside"]
+
+
+@pytest.mark.parametrize("isolate", ["", "isolate = true"])
+def test_a_fault_beside_the_loop_ends_the_run_and_its_threads(
+    tmp_path: Path, loop: str, isolate: str
+) -> None:
+    path = beside_the_loop(tmp_path, "raise ValueError('three')", isolate)
+    run = simulate(path, tmp_path / "out", (), real_time=RealTimeRun()).run
+    assert run["end"]["reason"] == "fault"
+    assert "slow: " in run["fault"]["message"]
+    assert "three" in run["fault"]["message"]
+    rows = read_table(tmp_path / "out" / "haptics.csv")["time"]
+    assert rows[-1] == run["end"]["time"] >= 3 / 64 - 1 / 512
+    assert not threads()
+
+
+def test_an_fmu_that_hangs_beside_the_loop_is_named(
+    tmp_path: Path, loop: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is in its step when the run ends, and is not called again; the loop went on meanwhile."""
+    monkeypatch.setattr(beside, "GRACE", 0.01)
+    path = beside_the_loop(tmp_path, "__import__('time').sleep(0.5)", timeout=0.05)
+    run = simulate(path, tmp_path / "out", (), real_time=RealTimeRun()).run
+    assert "slow: has not returned from its step within 0.05 s" in run["fault"]["message"]
+    assert run["real_time"]["abandoned"] == ["slow"]
+    rows = read_table(tmp_path / "out" / "haptics.csv")["time"]
+    assert np.array_equal(rows, np.arange(len(rows)) / 512)
+    for thread in threading.enumerate():
+        if thread.name == "hapticlink-beside":
+            thread.join()
+
+
+def test_a_step_that_is_not_done_at_the_end_is_waited_for(tmp_path: Path, loop: str) -> None:
+    clock = WallClock(lambda k: 100 * MS if k == 16 else 0)
+    run, _ = made(tmp_path, clock, *FAST)
+    samples = read_table(tmp_path / "graphics_samples.csv")
+    assert samples["time"][-1] == read_table(tmp_path / "graphics.csv")["time"][-1] == 17 / 60
+    assert samples["arrival"][-1] > run["end"]["time"] == 153 / 512
+
+
+@pytest.mark.parametrize("how", ["interrupted", "stop_when"])
+def test_a_run_that_ends_early_leaves_its_rows_and_no_thread(
+    tmp_path: Path, loop: str, how: str
+) -> None:
+    def turn(simulation: object, loop: object) -> None:
+        if how == "interrupted" and not came:
+            came.append(1)
+            signal.raise_signal(signal.SIGINT)
+
+    came: list[int] = []
+    options = ["duration=0.2"]
+    options += ["stop_when='haptic_device.x[1] < 1e9'"] if how == "stop_when" else []
+    ended = simulate("closed-loop", tmp_path, options, real_time=RealTimeRun(turn))
+    assert ended.outcome.reason == how
+    assert len(ended.results.haptics["time"]) >= 1
+    assert (tmp_path / "graphics_samples.csv").exists()
+    assert not threads()
+
+
+def test_the_figure_shows_the_share_of_ticks_above_each_time() -> None:
+    times, shares = exceedance([(0.0, 1), (2e-3, 2), (5e-3, 1)])
+    assert np.allclose(times, [1e-4, 1e-4, 2.0, 5.0])
+    assert np.allclose(shares, [1.0, 0.75, 0.25, 0.0])
+
+
+def test_a_run_says_how_it_has_kept_its_schedule(tmp_path: Path) -> None:
+    clock = WallClock(lambda k: 25 * MS, {205 * MS: 250 * MS})
+    found = simulate("closed-loop", tmp_path, FAST, real_time=clock.run()).results
+    said = [*summary.lines(found)]
+    assert "512 Hz in real time: 1 of 154 deadlines missed; largest step time 0 ms" in said[0]
+    assert said[1].startswith("warning: the schedule was moved by 0.25 s")
+    assert "graphics: " in said[2]
+    assert "samples were late, at most by " in said[2]
+    assert "real_time" in figures(found)
