@@ -28,7 +28,7 @@ from hapticlink.components.component import (
 from hapticlink.components.control import impedance, teleoperation, topology
 from hapticlink.components.ports import Spring
 
-_DRIFT = Spring("x_S", "x_D", stiffness="K_pc", damping="B_pc", set_velocity="v_S")
+_DRIFT = Spring("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_drift")
 """F_drift between the operational point and the handle."""
 
 

@@ -85,13 +85,17 @@ class Machine:
         shared = tanks(simulation.holds.values(), rolls_back)
         for name, hold in simulation.holds.items():
             own, connection = parts(hold).own, system.connection[name]
-            tank = shared.get(id(getattr(own, "tank", None)))
-            if not can(hold, rolls_back) or (hasattr(own, "tank") and tank is None):
+            needed = getattr(own, "tank", None)
+            tank = shared.get(id(needed))
+            if not can(hold, rolls_back) or (needed and tank is None):
                 continue
             values = signals.values[signals.hold(name)]
             sources = signals.sources(connection)
             loop = ctypes.addressof(self.loop)
             simulation.holds[name] = CompiledHold(self.library, loop, hold, sources, values, tank)
+        compiled = [h for h in simulation.holds.values() if isinstance(h, CompiledHold)]
+        for hold in compiled:
+            hold.join(compiled)
         simulation.springs[:] = [shared.get(id(tank), tank) for tank in simulation.springs]
 
     # --- records --------------------------------------------------------------------------
