@@ -45,7 +45,7 @@ def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variabl
             coupled or spec.damping is not None
         ),
         Variable("F_hand", (3,), WRENCH, description="wrench of the hand"): spec.impedance,
-        Variable("F_env", (3,), WRENCH, description="wrench of all contacts"): spec.contact,
+        Variable("F_env", (3,), WRENCH, description="wrench of contacts and others"): spec.contact,
         Variable("M", (3, 3), INERTIA, IDENTITY, "inertia of the device"): bool(
             spec.impedance or law
         ),
