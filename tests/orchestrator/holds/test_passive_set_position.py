@@ -12,12 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.results.tracking import tracking
+from hapticlink.orchestrator.run.make_holds import make_holds
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.system.built import built
 from tests.orchestrator.foreign_fmus import python_fmu_of, run
 
 Vector = NDArray[np.float64]
@@ -198,6 +202,15 @@ def test_where_no_spring_is_set_or_half_of_one_it_is_refused(
 def test_a_near_end_that_is_late_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SceneFault, match="near end of its spring must be read unheld"):
         simulate("closed-loop-direct", tmp_path, ["hold=pspm", "delays.controller.x_D=0.004"])
+
+
+def test_a_near_end_that_is_an_angle_is_known_as_one() -> None:
+    """Its tank unwraps what it reads (tests of the tank have what becomes of it)."""
+    options = ["hold=pspm", "kinds.haptic_device.x=angle"]
+    with built(open_scene.load("closed-loop-direct", options)) as system:
+        _, (tank,) = make_holds(system, SignalVector(system))
+    assert isinstance(tank, EnergyTank)
+    np.testing.assert_allclose(tank.near.turns, [0.0, 0.0, 2 * np.pi])
 
 
 MOVES = """
