@@ -123,7 +123,7 @@ class Coupling:
         return worst
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(1, 9),
@@ -142,6 +142,6 @@ def test_the_coupling_gives_both_sides_no_more_than_it_got(
     coupling = Coupling(stiffness, damping, every, latency, wrapped)
     coupling.y[2] = np.pi - 0.01  # on the edge of its turn
     coupling.x[:] = coupling.y + generator.normal(size=N) * generator.choice([0.0, 0.1])
-    worst = coupling.run(generator, 300, against)
+    worst = coupling.run(generator, 200, against)
     scale = abs(coupling.near) + abs(coupling.far)
     assert worst <= 1e-9 * (1.0 + scale)
