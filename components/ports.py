@@ -29,8 +29,9 @@ class Spring:
 
         F = stiffness (set_position - position) + damping (set_velocity - velocity)
 
-    entry by entry. set_position and set_velocity are inputs, position is an input or an output,
-    stiffness and damping are parameters in the units of these; "" stands for none.
+    entry by entry. set_position and set_velocity are inputs, position and velocity are inputs or
+    outputs, stiffness and damping are parameters in the units of these, force is the output that
+    is F, which acts with - on the far end; "" stands for none.
     """
 
     set_position: str
@@ -38,3 +39,5 @@ class Spring:
     stiffness: str
     damping: str = ""
     set_velocity: str = ""
+    velocity: str = ""
+    force: str = ""

@@ -38,6 +38,7 @@ def _virtual_mechanism(
     contacts: Contacts | None = None,
     length_scale: float | None = None,
     local_model: bool = False,
+    felt: bool = False,
 ) -> Component:
     from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 
@@ -48,6 +49,7 @@ def _virtual_mechanism(
         contacts,
         length_scale=length_scale,
         frame_s=FRAME if local_model else None,
+        felt=felt,
     )
 
 

@@ -28,7 +28,7 @@ from hapticlink.components.component import (
 from hapticlink.components.control import impedance, teleoperation, topology
 from hapticlink.components.ports import Spring
 
-_DRIFT = Spring("x_S", "x_D", stiffness="K_pc", damping="B_pc", set_velocity="v_S")
+_DRIFT = Spring("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_drift")
 """F_drift between the operational point and the handle."""
 
 
@@ -45,7 +45,7 @@ def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variabl
             coupled or spec.damping is not None
         ),
         Variable("F_hand", (3,), WRENCH, description="wrench of the hand"): spec.impedance,
-        Variable("F_env", (3,), WRENCH, description="wrench of all contacts"): spec.contact,
+        Variable("F_env", (3,), WRENCH, description="wrench of contacts and others"): spec.contact,
         Variable("M", (3, 3), INERTIA, IDENTITY, "inertia of the device"): bool(
             spec.impedance or law
         ),

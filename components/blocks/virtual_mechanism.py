@@ -76,8 +76,10 @@ def virtual_mechanism(
     step_s: float | None = None,
     length_scale: float | None = None,
     frame_s: float | None = None,
+    felt: bool = False,
 ) -> Component:
     """The FMU `virtual_mechanism`. With `directions` it has its own Lambda_inv and P_c as outputs;
+    `felt`, the efforts of others (further hands, motors on joints) are in F_env, as contacts are;
     with frame_s (s) it is the local model (B.15), with D, W, w and J_h as inputs, held for a frame.
 
     The parameter `step_size` starts at step_s (s), and `frame_size` at frame_s: defaults depend on
@@ -89,7 +91,8 @@ def virtual_mechanism(
     independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
-    parts = _Parts(linkage, mechanism, directions, contacts, frame_s)
+    felt = felt and bool(further_points.inputs(linkage) + joint_ports.inputs(linkage))
+    parts = _Parts(linkage, mechanism, directions, contacts, frame_s, felt)
     defaults = StepDefaults(linkage, mechanism, contacts, step_s, frame_s)
     block = _block(parts, defaults, length_scale)
     defaults.define(block.p)
@@ -99,12 +102,19 @@ def virtual_mechanism(
     model = LinkageModel(linkage, block.p, *at, tabled, block.t, block.x.get("deflection"))
     space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
     applied = space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
-    applied += further_points.efforts(model, block.u) + joint_ports.efforts(model, block.u)
+    others = further_points.efforts(model, block.u) + joint_ports.efforts(model, block.u)
+    applied += others
     energy = model.kinetic_energy + forces.energy(model)
     output: dict[str, ca.SX] = {}
     touching = _touching(parts, block, space, output)
     pushed = touching.efforts() if touching else ca.SX(model.q.numel(), 1)
     energy += touching.energy if touching else 0
+    if touching or felt:
+        J_h = space.terms.J_h
+        acceleration = J_h @ space.response(pushed + (others if felt else 0))[0]
+        output["F_env"] = contact_forces.equivalent_wrench(
+            space.Lambda_inv, space.open_mobility(J_h), acceleration, block.p["length_scale"]
+        )
     qdd, multipliers = space.motion(applied + pushed)
     output |= {
         "x": model.x_h,
@@ -163,6 +173,7 @@ class _Parts:
     directions: Directions | None
     contacts: Contacts | None
     frame_s: float | None
+    felt: bool
 
     @property
     def touches(self) -> bool:
@@ -194,12 +205,13 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
     if linkage.closed and parts.mechanism.diagnostics:
         outputs += closure_diagnostics.outputs()
     memory = [*states(linkage), *friction.states(linkage)]
-    if parts.touches or directions:
+    if parts.touches or parts.felt or directions:
         length = directions.length_scale if directions else length_scale
         parameters.append(length_parameter(linkage, length))
+    if parts.touches or parts.felt:
+        outputs.append(contact_forces.wrench_output())
     if parts.touches:
         parameters += joint_limits.parameters(linkage)
-        outputs.append(contact_forces.wrench_output())
     if contacts:
         parameters += contact_forces.contact_parameters(linkage, contacts)
         outputs.append(contact_forces.gap_output())
@@ -251,13 +263,7 @@ def _touching(
         found.append(JointLimits(space))
     if not found:
         return None
-    touching = AllOneSidedForces(found)
-    J_h = space.terms.J_h
-    felt = J_h @ space.response(touching.efforts())[0]
-    output["F_env"] = contact_forces.equivalent_wrench(
-        space.Lambda_inv, space.open_mobility(J_h), felt, block.p["length_scale"]
-    )
-    return touching
+    return AllOneSidedForces(found)
 
 
 def _step(

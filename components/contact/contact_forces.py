@@ -95,7 +95,7 @@ def detection_parameters(
 
 
 def wrench_output() -> Variable:
-    text = "wrench of all contacts and joint limits at operational point"
+    text = "wrench of contacts, joint limits and others at the operational point"
     return Variable("F_env", (3,), WRENCH, description=text)
 
 

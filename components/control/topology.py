@@ -16,7 +16,9 @@ def constraint_wrench(pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX) ->
 
     pull = k_j e + b_j edot (m/s2, m/s2, rad/s2) is the acceleration of the device along the
     constrained directions: k_j and b_j are per kilogram of the device's inertia along them. The map
-    is symmetric and positive semidefinite, does no work on free motion and does not depend on L.
+    is symmetric and positive semidefinite. For exact null directions it does no work on free motion
+    and does not depend on L; directions below `rank_tolerance` that still move are counted, too,
+    and there it does both (docs/theory.md has the size).
     The pseudoinverse takes bounded work for any rank, since for a projector P
 
         (P A P)^+ = (P A P + I - P)^-1 P.

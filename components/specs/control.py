@@ -51,4 +51,5 @@ class Controller:
     topology: Topology | bool = True
     """Topology controller; true for its defaults."""
     contact: bool = False
-    """Whether contacts are felt: F_env enters the impedance law. Needs [contacts]."""
+    """Whether contacts are felt: F_env enters the impedance law. Needs [contacts]. With further
+    hands or efforts on joints it always does, with all that acts beside the hand."""

@@ -227,7 +227,11 @@ class RealTime:
         why = misfit(new.hold or "", new, system.fmu, system.power, False)
         if system.coupling == "iterated" or system.step_control:
             why = "steps are repeated"
-        if "spring" in (HOLDS[c.hold or ""].needs, HOLDS[new.hold or ""].needs):
+        spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.springs)
+        on_force = spring and any(
+            HOLDS[d.hold].needs == "spring" for d in system.connections if d.hold
+        )
+        if on_force or "spring" in (HOLDS[c.hold or ""].needs, HOLDS[new.hold or ""].needs):
             why = "holds of a spring share its energy: take `reset`"
         if held_polynomials.order(system, c) or held_polynomials.order(system, new):
             why = "the FMU takes derivatives of its inputs: take `reset`"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.api.result import Run
@@ -15,6 +16,7 @@ from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folders, summary, tables
 from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -71,13 +73,19 @@ def run_paced(
         if out is None:
             with temporary_folders.room() as room:
                 found = simulate(scene, room, (), progress, real_time=real_time).results
-            warned = {**found.run, "warnings": list(summary.lines(found))}
+            warned = found.run | _told(found)
             made = Run(None, warned, found.tables)
         else:
             made = _in_folder(scene, Path(out), progress, figures, real_time)
         if interrupt.came() or made.run["end"]["reason"] == "interrupted":
             raise RunInterrupted(made)
     return made
+
+
+def _told(results: Results) -> dict[str, Any]:
+    """What run.json says of the results: warnings, and the energy at the user's port."""
+    port = user_port(results)
+    return {"user_port": port and port.told, "warnings": list(summary.lines(results))}
 
 
 def _in_folder(
@@ -95,10 +103,10 @@ def _in_folder(
     found = ended.results
     if not ended.outcome.published:
         return Run(None, found.run, found.tables)
-    warnings = {"warnings": list(summary.lines(found))}
-    run = found.run | warnings
+    told = _told(found)
+    run = found.run | told
     try:
-        run = folders.add(folder, (), warnings)
+        run = folders.add(folder, (), told)
         if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
             run = folders.add(folder, _explained(ended))
             run = folders.add(folder, _drawn(ended, found) if figures else ())

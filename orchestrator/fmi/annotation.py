@@ -101,13 +101,17 @@ class _Ports:
 
     def spring(self, element: Element) -> Spring:
         needed = "set_position position stiffness"
-        found = Spring(**_attributes(element, needed, "damping set_velocity"))
+        found = Spring(**_attributes(element, needed, "damping set_velocity velocity force"))
         size = len(self._entries(found.set_position, "input"))
         self._entries(found.position, "input", "output", size=size)
         for parameter in filter(None, (found.stiffness, found.damping)):
             self._entries(parameter, "parameter", size=size)
         if found.set_velocity:
             self._entries(found.set_velocity, "input", size=size)
+        if found.velocity:
+            self._entries(found.velocity, "input", "output", size=size)
+        if found.force:
+            self._entries(found.force, "output", size=size)
         return found
 
     def _entries(self, name: str, *causalities: str, size: int = 0) -> list[Scalar]:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank, total
 from hapticlink.orchestrator.holds.hold import Hold
 
 Vector = NDArray[np.float64]
@@ -43,7 +44,7 @@ class Account(Hold):
     coming step at the target's present velocity, and with the acceleration of the last step as
     well (m, rad); largest, the larger magnitude of the last two samples; swing, the running maximum
     of the difference between the source's mean over an interval between stamps and a sample held
-    during it (N, N.m).
+    during it (N, N.m); beta, the trust in the prediction.
     """
 
     needs = "power"
@@ -64,6 +65,9 @@ class Account(Hold):
         self._v = self._gain = np.zeros(context.size)
         self._steps = 0
         self.largest, self.swing = np.zeros(context.size), np.zeros(context.size)
+        self.beta = np.ones(context.size)
+        self.tank: EnergyTank | None = None  # of a spring-damper, on whose far side it is
+        self._promised, self._promise = 0.0, (0.0, -1)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._new.append((stamp, sample.copy()))
@@ -75,7 +79,26 @@ class Account(Hold):
             self._account(tick)
             self._predict(2 * ahead)
             self._held = self.sample + self.correction(fresh)
+            if self.tank:
+                self._share(self.tank, tick)
         return self._held
+
+    def _share(self, tank: EnergyTank, tick: int) -> None:
+        """Limit the held effort to the energy available in the tank, and set that aside."""
+        promise, since = self._promise
+        if since == tick:
+            tank.available += promise
+            self._promised -= promise
+        furthest = np.abs(self.predicted) + np.abs(self.predicted_steady)
+        self._held, promise = tank.shared(self._held, self.predicted, furthest, self.beta)
+        self._promised += promise
+        self._promise = promise, tick
+
+    @property
+    def credit(self) -> float:
+        """The energy (J) that the far side has put in until now, with what was set aside for it."""
+        work = self._work + self._held * (self.displacement() - self._x)
+        return self._promised - total(work)
 
     @property
     def generated(self) -> Vector:

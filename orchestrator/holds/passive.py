@@ -18,7 +18,8 @@ at most r. Then the energy really generated, m, is at most P, and a step adds at
 where P <= 0, m' <= P + (r - c) |dx| <= 0; where P > 0, c >= r and m' <= m. So m <= 0 throughout. A
 difference R larger than the r so far generates at most (R - r) W until it is known, W the distance
 from a stamp until then, so that m <= R W at any time. Each step outside the premises generates at
-most (R + C) |dx| in addition, C the largest c.
+most (R + C) |dx| in addition, C the largest c, and each other one while beta < 1 at most
+(1 - beta) C |dx|, since m' <= m + (r - beta c) |dx|.
 
 With a latency the premises extend over it: |x - x(t_n)| is then the path length since t_n, as
 several samples may be in transit, and W grows with it. The theorem does not cover lost or overtaken
@@ -26,8 +27,9 @@ samples, whose effect the target cannot know.
 
 No hold is passive without such premises. m' - m = (F_held - mean) dx, and mean and dx are only
 determined after F_held is chosen: for any choice, even 0, one of mean = F_n +- r with one of
-dx = +-d generates r d or more, at every step. Where a step goes against the prediction, beta is
-halved (a friction that reverses the target is too large); after that it grows by a tenth a step.
+dx = +-d generates r d or more, at every step. Where a step goes back by more than a hundredth of
+the prediction, beta is halved (a friction that reverses the target is too large); after that it
+grows by a tenth a step. A smaller step back has been stopped, as a friction may, and leaves beta.
 """
 
 from __future__ import annotations
@@ -37,15 +39,19 @@ import numpy as np
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account, Vector
 
+STOPPED = 0.01
+"""A step back by less than this part of the predicted displacement counts as none: a friction that
+just stops the target is not too large."""
+
 
 class Passive(Account):
     def __init__(self, context: HoldContext) -> None:
         super().__init__(context)
-        self.beta = np.ones(context.size)
         self._last_predicted = np.zeros(context.size)
 
     def correction(self, fresh: bool) -> Vector:
-        reversed_ = self.motion * self._last_predicted < 0.0
+        ahead = self._last_predicted
+        reversed_ = self.motion * ahead < -STOPPED * (ahead * ahead)
         self.beta = np.where(reversed_, self.beta / 2, np.minimum(1.1 * self.beta, 1.0))
         self._last_predicted = self.predicted
         bound = self.generated + self.swing * self.travelled  # P

@@ -30,6 +30,7 @@ from hapticlink.orchestrator.results.tracking import (
     of_block,
     tracking,
 )
+from hapticlink.orchestrator.results.user_port import UserPort, user_port
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,6 +57,8 @@ def figures(results: Results) -> dict[str, Figure]:
         drawn["contact"] = _contact(results, contact)
     if counted := constrained(results):
         drawn["constraints"] = _constraints(results, *counted)
+    if port := user_port(results):
+        drawn["user_port"] = _port(results, port)
     if generated := _generated(results):
         drawn["energies"] = _energies(results, generated)
     if paced := real_time(results):
@@ -158,6 +161,16 @@ def _constraints(results: Results, table: Table, name: str) -> Figure:
     axes.step(time, count, where="post")
     if most < 10:
         axes.set_yticks(range(most + 2))
+    return figure
+
+
+def _port(results: Results, port: UserPort) -> Figure:
+    peak = 1e3 * port.told["peak"]
+    title = f"The rendering generates at most {short(peak)} mJ beyond what the hand put in"
+    label = "energy generated at the user's port (mJ)"
+    figure, axes = titled(results, title, "time (s)", label)
+    axes.plot(port.time_s, 1e3 * port.generated_J)
+    axes.axhline(0, color="0.4", lw=0.8)
     return figure
 
 

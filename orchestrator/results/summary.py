@@ -21,6 +21,7 @@ from hapticlink.orchestrator.results.tracking import (
     of_block,
     pose_error,
 )
+from hapticlink.orchestrator.results.user_port import user_port
 
 
 def ending(results: Results) -> str:
@@ -48,6 +49,21 @@ def numbers(results: Results) -> Iterator[str]:
     if found := wrenches(results):
         peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())
         yield f"largest forces: {'; '.join(peaks)}"
+    if port := user_port(results):
+        told = port.told
+        yield (
+            f"energy at the user's port beyond what the hand put in: at most "
+            f"{short(1e3 * told['peak'])} mJ at {told['time_of_peak']:.3g} s, "
+            f"{short(1e3 * told['generated'])} mJ at the end"
+        )
+    across = results.run.get("energies", "none")
+    for name, energy in across.items() if across != "none" else ():
+        if max(energy["peak"], abs(energy["generated"])) < NOTHING:
+            continue
+        yield (
+            f"held {name} generated at most {short(1e3 * energy['peak'])} mJ at a time, "
+            f"{short(1e3 * energy['generated'])} mJ in the end"
+        )
     table = of_block(results, CLOSURE)
     if table and len(table["time"]):
         yield f"loops close within {table[CLOSURE].max():.2g} m"
@@ -115,6 +131,8 @@ def _real_time(found: Mapping[str, Any]) -> Iterator[str]:
         yield f"{fmu} ran in the haptic loop: {why}"
 
 
+NOTHING = 1e-9
+"""Energy (J) that is not worth a line."""
 LARGEST, SUM = 0.1, 0.1
 """Bounds of the relative error of a step, which may be an impact, and of the sum over all steps of
 the mechanism (`step_check`); the controller takes back what would add up in the device."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +9,10 @@ import numpy as np
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-from hapticlink.orchestrator.holds.hold import Hold, Vector
+from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.holds.restorable import Restorable
+from hapticlink.orchestrator.run import spring_holds
 from hapticlink.orchestrator.run.checked_hold import CheckedHold
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -28,6 +28,7 @@ def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], 
     spring-damper."""
     shared: dict[SetSpring, EnergyTank] = {}
     holds = {c.name: make_hold(c, system, signals, shared) for c in system.connections if c.hold}
+    spring_holds.join_sides(holds, shared, system, signals)
     return holds, [*shared.values()]
 
 
@@ -60,7 +61,7 @@ def make_hold(
         hold = Late(hold, Link(connection.latency, system.timeline.base))
     if further := beside(connection, system.fmu):
         places = [signals.scalar(connection.source, s.name) for s in further]
-        hold = WithFurther(hold, _reader(signals, places))
+        hold = spring_holds.WithFurther(hold, spring_holds.reader(signals, places))
     return hold
 
 
@@ -82,21 +83,6 @@ def _turns(connection: Connection, system: System) -> dict[int, float]:
     if next(held, kind(of, system.fmu)) != "angle":
         return {}
     return {len(connection.inputs) + i: turn for i, turn in turns(of, system.fmu).items()}
-
-
-class WithFurther(Hold):
-    """Appends the source's derivative or integral to each sample, so that both have the same
-    latency."""
-
-    def __init__(self, hold: Hold, further: Reader) -> None:
-        self.hold, self.further = hold, further
-        self.link: Link | None = getattr(hold, "link", None)
-
-    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        self.hold.push(stamp, np.concatenate([sample, self.further()]), arrival)
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        return self.hold.value(tick, ahead)
 
 
 def _context(
@@ -121,27 +107,7 @@ def _context(
         of = spring(connection, system.springs)
         assert of is not None
         if of not in shared:
-            shared[of] = _set_point(of, system, signals)
+            shared[of] = spring_holds.tank(of, system, signals)
         row = of.ports.index(f"{connection.target}.{connection.target_port}")
         tank = shared[of], row
     return HoldContext(size, system.timeline.seconds, moved, moving, tank)
-
-
-def _set_point(of: SetSpring, system: System, signals: SignalVector) -> EnergyTank:
-    fmu, _, name = of.position.partition(".")
-    unit = system.fmu[fmu]
-    near = next((c for c in system.into(fmu) if c.target_port == name), None)
-    places = signals.sources(near) if near else signals.port(unit, name)
-    timeline = system.timeline
-    stiffness = np.array(of.stiffness)
-    return EnergyTank(
-        stiffness,
-        np.array(of.damping) if of.damping else np.zeros_like(stiffness),
-        _reader(signals, places),
-        timeline.seconds(timeline.clock(unit.clock).longest),
-        timeline.seconds,
-    )
-
-
-def _reader(signals: SignalVector, places: Sequence[int]) -> Reader:
-    return Reader(signals, places, np.ones(len(places)))

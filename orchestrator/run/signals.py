@@ -1,5 +1,6 @@
 """All signals of a run in one vector: outputs by clock and FMU, then held values, then the
-derivatives and means of held values that vary within a step."""
+derivatives and means of held values that vary within a step, then the energies that the far sides
+of springs have put in."""
 
 from __future__ import annotations
 
@@ -41,7 +42,8 @@ class SignalVector:
                     span = slice(end, end + order * len(connection.inputs))
                     self._of_derivatives[connection.name] = span
                     end = span.stop + len(connection.inputs)
-        self.values = np.zeros(end)
+        self._credits = end
+        self.values = np.zeros(end + len(system.springs))
 
     def fmu(self, name: str) -> slice:
         return self._of_fmu[name]
@@ -63,6 +65,10 @@ class SignalVector:
         if span.stop:
             return list(range(span.stop, span.stop + len(connection.inputs)))
         return self.places(connection)
+
+    def credit(self, spring: int) -> int:
+        """Index of the energy that the far side of a spring has put into it."""
+        return self._credits + spring
 
     def scalar(self, fmu: str, variable: str) -> int:
         return self._of_scalar[fmu, variable]

@@ -68,6 +68,8 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
     if scene.controller:
         parts = ("controller", "directions", "linkage")
         settings = {part: getattr(scene, part) for part in parts}
+        if others(scene):
+            settings["controller"] = replace(scene.controller, contact=True)
         found.append(BlockPlan("controller", "haptics", settings))
     if scene.device:
         found.append(BlockPlan("haptic_device", "haptics", {"device": scene.device}))
@@ -77,7 +79,9 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
             settings["directions"] = scene.directions
         if scene.contacts:
             settings["contacts"] = scene.contacts
-        if scene.contacts or scene.linkage.limited:
+        if scene.controller and others(scene):
+            settings["felt"] = True
+        if scene.contacts or scene.linkage.limited or settings.get("felt"):
             settings["length_scale"] = scene.directions.length_scale
         if scene.local_model:
             settings["local_model"] = True
@@ -126,6 +130,13 @@ def directions_from_graphics(scene: Scene) -> bool:
     scene requests beside the mobility."""
     wanted = topology(scene) or (impedance(scene) and scene.mechanism.directions)
     return scene.directions_from == "graphics" and wanted
+
+
+def others(scene: Scene) -> bool:
+    """Whether others than the hand act on the mechanism: hands at further points, or efforts on its
+    joints."""
+    linkage = scene.linkage
+    return bool(linkage and (linkage.point or any("effort" in j.ports for j in linkage.joint)))
 
 
 def contacts_from_graphics(scene: Scene) -> bool:

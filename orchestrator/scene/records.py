@@ -168,6 +168,12 @@ class SetSpring:
     """Damping, entry by entry; by default 0."""
     set_velocity: str = ""
     """The input that sets the velocity of the far end; by default it is 0."""
+    velocity: str = ""
+    """Of a sampled FMU, the velocity of the near end, an input or an output of it; by default the
+    difference of two positions."""
+    force: str = ""
+    """The output that is F, which acts with - on the FMU that sets the far end: with it the energy
+    that either side puts in is available to both."""
 
     @property
     def ports(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from hapticlink.orchestrator.study.cases import RATES, VARIABLE
 from hapticlink.orchestrator.sweep.row import METRIC, Row
 
 COLUMNS = (*RATES, VARIABLE)
-COUPLING, MODELLING, ENERGY = "coupling_1s_mm", "modelling_1s_mm", "held_energy_generated_J"
+COUPLING, MODELLING, ENERGY = "coupling_1s_mm", "modelling_1s_mm", "held_energy_peak_J"
 APART = 42.0, 1.0
 """Tracking errors (mm, the length of a link, and rad) from which on a run counts as unstable."""
 

@@ -18,6 +18,7 @@ from hapticlink.orchestrator.results.tracking import (
     of_block,
     pose_error,
 )
+from hapticlink.orchestrator.results.user_port import user_port
 
 Row = dict[str, Any]
 
@@ -42,10 +43,14 @@ def measure(experiment: Experiment) -> Row:
         **_largest(results, "closure_max_m", "virtual_mechanism.closure_error"),
         **_switches(results),
         **_folded(results),
+        **_port(results),
     }
     if generated:
+        peaks = {n: outcome.energies[n].peak for n in generated}
         found["held_energy_generated_J"] = sum(generated.values())
+        found["held_energy_peak_J"] = sum(peaks.values())
         found |= {f"generated_J {name}": energy for name, energy in generated.items()}
+        found |= {f"peak_J {name}": energy for name, energy in peaks.items()}
     calls = outcome.calls
     found |= {f"steps {name}": counts.get("step", 0) for name, counts in calls.items()}
     return found | {"run_time_s": outcome.wall_time}
@@ -91,9 +96,19 @@ def _folded(results: Results) -> Row:
     return {"folded_frames": count} if frames else {}
 
 
+def _port(results: Results) -> Row:
+    if (port := user_port(results)) is None:
+        return {}
+    return {"port_generated_J": port.told["generated"], "port_peak_J": port.told["peak"]}
+
+
 def _switches(results: Results) -> Row:
-    """How often the number of constrained directions changes."""
+    """How often the number of constrained directions changes, and how long it is above its
+    least."""
     if (found := constrained(results)) is None:
         return {}
     table, signal = found
-    return {"switches": int(np.count_nonzero(np.diff(table[signal])))}
+    count = table[signal]
+    more = 100 * float((count > count.min()).mean()) if len(count) else 0.0
+    switches = int(np.count_nonzero(np.diff(count)))
+    return {"switches": switches, "more_constrained_percent": more}

@@ -86,7 +86,7 @@ def _assign(
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
             hold = "foh" if iterated and c.kind != "table" else "zoh"
-        yield replace(c, hold=hold, kind=c.kind if hold and c.kind != "none" else None)
+        yield replace(c, hold=hold, kind=c.kind if c.kind != "none" else None)
 
 
 def _with_springs(

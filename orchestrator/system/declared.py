@@ -25,13 +25,12 @@ def springs(fmus: Iterable[Fmu], connections: Collection[Connection]) -> Iterato
     for fmu in fmus:
         for declared in fmu.description.springs:
             if not {(fmu.name, declared.stiffness), (fmu.name, declared.damping)} & fed:
-                velocity = declared.set_velocity
+                ports = ("set_position", "position", "set_velocity", "velocity", "force")
+                given = {port: getattr(declared, port) for port in ports}
                 yield SetSpring(
-                    set_position=f"{fmu.name}.{declared.set_position}",
-                    position=f"{fmu.name}.{declared.position}",
                     stiffness=_values(fmu, declared.stiffness),
                     damping=_values(fmu, declared.damping),
-                    set_velocity=f"{fmu.name}.{velocity}" if velocity else "",
+                    **{port: f"{fmu.name}.{name}" for port, name in given.items() if name},
                 )
 
 

@@ -11,6 +11,15 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.system import Connection, Fmu
 
+_KINDS = {
+    "set_position": ("input",),
+    "position": ("input", "output"),
+    "set_velocity": ("input",),
+    "velocity": ("input", "output"),
+    "force": ("output",),
+}
+"""The ports of a spring, and what they may be."""
+
 
 def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     """The spring whose set position or set velocity a connection feeds; None if there is none."""
@@ -52,10 +61,9 @@ def unfit(scene: Scene, units: Mapping[str, Fmu]) -> Iterator[Problem]:
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]
         size = _size(s.set_position, units, "input")
-        for end in ("set_position", "position", "set_velocity"):
+        for end, kinds in _KINDS.items():
             port = getattr(s, end)
-            kinds = ("input", "output") if end == "position" else ("input",)
-            if not port and end == "set_velocity":
+            if not port:
                 continue
             if not (entries := _size(port, units, *kinds)):
                 yield ("spring", i, end), f"there is no {' or '.join(kinds)} {port}"

@@ -15,7 +15,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SOURCES = ("loop.h", "loop.c", "holds.c", "energy_account.c", "platform.c", "python_errors.c")
+SOURCES = (
+    "loop.h", "loop.c", "holds.c", "energy_account.c", "energy_tank.c", "platform.c",
+    "python_errors.c",
+)  # fmt: skip
 # No contraction: a fused multiply-add rounds once where Python rounds twice.
 FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", "-g0", "-fvisibility=hidden", "-ffp-contract=off")
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")

@@ -127,6 +127,29 @@ static void predict(Account *a, const Loop *l, double step) {
     }
 }
 
+/* Account.credit */
+double account_credit(const Account *a, const Loop *l) {
+    double *x = vector(a, NOW), work = 0.0;
+    reading(&a->displacement, l->values, x);
+    for (int64_t k = 0; k < a->n; k++)
+        work += vector(a, WORK)[k] + vector(a, HELD)[k] * (x[k] - vector(a, X)[k]);
+    return a->promised - work;
+}
+
+/* Account._share */
+static void share(Account *a, int64_t tick) {
+    if (a->since == tick) {
+        a->tank->available += a->promise;
+        a->promised -= a->promise;
+    }
+    a->promise = tank_share(
+        a->tank, vector(a, HELD), vector(a, PREDICTED), vector(a, STEADY),
+        a->passive ? vector(a, BETA) : NULL
+    );
+    a->promised += a->promise;
+    a->since = tick;
+}
+
 static double generated(const Account *a, int64_t k) {
     const double moved = vector(a, X)[k] - vector(a, X_STAMP)[k];
     return vector(a, WORK)[k] - vector(a, IDEAL)[k] - vector(a, SAMPLE_)[k] * moved;
@@ -143,11 +166,13 @@ static double travelled(const Account *a, int64_t k) {
     return length;
 }
 
+static const double STOPPED = 0.01; /* passive.STOPPED */
+
 /* Passive.correction */
 static double passive(const Account *a, int64_t k) {
     double *beta = vector(a, BETA) + k, *last = vector(a, LAST) + k;
     const double predicted = vector(a, PREDICTED)[k], swing = vector(a, SWING)[k];
-    if (vector(a, MOTION)[k] * *last < 0.0)
+    if (vector(a, MOTION)[k] * *last < -STOPPED * (*last * *last))
         *beta /= 2;
     else
         *beta = 1.1 * *beta > 1.0 ? 1.0 : 1.1 * *beta;
@@ -180,6 +205,7 @@ void account_value(Account *a, const Loop *l, int64_t tick, double ahead, double
             if (!a->passive && fresh) *correction = nearly(a, k);
             held[k] = vector(a, SAMPLE_)[k] + (a->passive ? passive(a, k) : *correction);
         }
+        if (a->tank) share(a, tick);
     }
     memcpy(value, held, a->n * sizeof *value);
 }

@@ -104,49 +104,6 @@ static void mean_value(Hold *h, double *value) {
     memcpy(value, held, h->n * sizeof *value);
 }
 
-/* --- passive set position --------------------------------------------------------------------- */
-
-static void tank_fill(Tank *t, const double *x, double over) {
-    const double *y = t->modulated, *w = t->modulated + t->n;
-    double spring = 0.0, damper = 0.0;
-    for (int64_t k = 0; k < t->n; k++) {
-        const double moved = x[k] - t->x[k];
-        spring += t->stiffness[k] * moved * (t->x[k] + moved / 2 - y[k]);
-        damper += t->damping[k] * moved * (moved / over - w[k]);
-    }
-    t->available += spring + damper;
-}
-
-static void tank_modulate(Tank *t, const Loop *l, int64_t tick) {
-    if (tick <= t->tick) return;
-    const double *y = t->newest, *w = t->newest + t->n;
-    double *x = t->at, stored = 0.0, moving = 0.0;
-    for (int64_t k = 0; k < t->n; k++) {
-        x[k] = l->values[t->where[k]];
-        const double error = y[k] - x[k];
-        stored += t->stiffness[k] * (error * error);
-        moving += t->damping[k] * (w[k] * w[k]);
-    }
-    stored /= 2;
-    if (t->tick < 0)
-        t->available = stored;
-    else
-        tank_fill(t, x, seconds(l, (double)(tick - t->tick)));
-    const double needed = stored + t->period / 4 * moving;
-    const double left = 0.0 > t->available ? 0.0 : t->available;
-    if (needed <= left) {
-        memcpy(t->modulated, t->newest, 2 * t->n * sizeof *x);
-    } else {
-        const double share = sqrt(left / needed);
-        for (int64_t k = 0; k < t->n; k++) {
-            t->modulated[k] = x[k] + share * (y[k] - x[k]);
-            t->modulated[t->n + k] = share * w[k];
-        }
-    }
-    t->tick = tick;
-    memcpy(t->x, x, t->n * sizeof *x);
-}
-
 /* --- all kinds -------------------------------------------------------------------------------- */
 
 static void take(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
@@ -171,6 +128,7 @@ static void take(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     case MEAN: mean_push(h, y, stamp); return;
     case PASSIVE_SET_POSITION:
         memcpy(h->tank->newest + h->row * h->n, y, h->n * sizeof *y);
+        if (h->width > h->n) tank_credit(h->tank, y[h->n]);
         return;
     case OBSERVED: account_push(h->account, y, stamp, arrival); return;
     }

@@ -29,7 +29,7 @@ from hapticlink.orchestrator.holds.smooth import Smooth
 from hapticlink.orchestrator.holds.zero_order import Latest, ZeroOrder
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.energy.bonds import Reader
-from hapticlink.orchestrator.run.make_holds import WithFurther
+from hapticlink.orchestrator.run.spring_holds import WithFurther
 from hapticlink.orchestrator.system.latency import Late, Link
 
 KINDS: Mapping[type[Hold], tuple[int, int]] = {
@@ -53,20 +53,22 @@ class Parts(NamedTuple):
     angles: Unwrapped | None
     link: Link | None
     further: Reader | None
+    far: tuple[Account, Vector] | None
+    """The account on the far side of the spring that it sets, and where its energy is written."""
 
 
 def parts(hold: Hold) -> Parts:
     """The parts of a hold that `make_hold` has made; `own` is a wrapper that has no C where one is
     left."""
-    further, link, angles = None, None, None
+    further, link, angles, far = None, None, None, None
     if isinstance(hold, WithFurther):
-        further, hold = hold.further, hold.hold
+        further, far, hold = hold.further, hold.account, hold.hold
     if isinstance(hold, Late):
         link, hold = hold.link, hold.hold
     if isinstance(hold, Unwrapped):
         angles = hold
         hold = hold.hold
-    return Parts(hold, angles, link, further)
+    return Parts(hold, angles, link, further, far)
 
 
 def can(hold: Hold, rolls_back: bool) -> bool:
@@ -110,16 +112,20 @@ class CompiledTank(State):
     """An energy tank in C."""
 
     def __init__(self, tank: EnergyTank) -> None:
-        n = len(tank.stiffness)
-        super().__init__(_words(structures.Tank) + 6 * n)
-        assert isinstance(tank.position, Reader)
-        self._kept = tuple(map(np.ascontiguousarray, (tank.stiffness, tank.damping)))
-        self._where = tank.position.where
+        n, near = len(tank.stiffness), tank.near
+        super().__init__(_words(structures.Tank) + 8 * n)
+        assert isinstance(near.position, Reader)
+        self._kept = tuple(map(np.ascontiguousarray, (tank.stiffness, tank.damping, near.turns)))
+        self._readers = near.position, near.velocity
         c = self.structure(structures.Tank)
-        c.n, c.tick, c.period = n, -1, tank.period
-        c.stiffness, c.damping = (a.ctypes.data for a in self._kept)
-        c.where = self._where.ctypes.data
-        c.newest, c.modulated, c.x, c.at = (self.place(k * n) for k in (2, 2, 1, 1))
+        c.n, c.tick, c.period, c.sampled = n, -1, near.period, near.sampled
+        c.stiffness, c.damping, c.turns = (a.ctypes.data for a in self._kept)
+        c.where = near.position.where.ctypes.data
+        if near.velocity:
+            assert isinstance(near.velocity, Reader)
+            c.velocity = near.velocity.where.ctypes.data
+        c.newest, c.modulated = self.place(2 * n), self.place(2 * n)
+        c.x, c.moved, c.force, c.withheld = (self.place(n) for _ in range(4))
 
 
 class Grown:
@@ -143,7 +149,7 @@ class CompiledAccount:
 
     def __init__(self, hold: Account) -> None:
         n = len(hold.sample)
-        self.c = c = structures.Account(n=n, tick=-1, passive=isinstance(hold, Passive))
+        self.c = c = structures.Account(n=n, tick=-1, since=-1, passive=isinstance(hold, Passive))
         self._vectors = np.zeros((18, n))
         self._vectors[16] = 1.0 if c.passive else 0.0  # beta, or no correction
         c.vectors = self._vectors.ctypes.data
@@ -181,7 +187,8 @@ class CompiledHold(Hold, State):
         held: Vector,
         tank: CompiledTank | None = None,
     ) -> None:
-        own, angles, link, further = parts(hold)
+        self.own, angles, link, further, self.far = parts(hold)
+        own = self.own
         n, (code, depth) = len(held), KINDS[type(own)]
         places = [*sources, *(further.where if further else ())]
         width, turned = len(places), len(angles.angles) if angles else 0
@@ -189,7 +196,7 @@ class CompiledHold(Hold, State):
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
         self._sources, self._further = np.array(places, np.intp), further
         self._held, self._tank = held, tank
-        c = self.structure(structures.Hold)
+        self._c = c = self.structure(structures.Hold)
         c.kind, c.n, c.width, c.depth = code, n, width, depth
         c.samples, c.vectors = self.place(depth * width), self.place(8 * n)
         c.sources, c.held = self._sources.ctypes.data, held.ctypes.data
@@ -207,11 +214,21 @@ class CompiledHold(Hold, State):
         if isinstance(own, Account):
             self._account = CompiledAccount(own)
             c.account = ctypes.addressof(self._account.c)
+            self._account.c.tank = tank.words.ctypes.data if tank else None
         self._room = 0
         self.grow()
         if tank and isinstance(own, PassiveSetPosition):
             c.tank, c.row = tank.words.ctypes.data, own.row
         self.address: int = ctypes.addressof(c)
+
+    def join(self, holds: Iterable[CompiledHold]) -> None:
+        """Find the account on the far side of the spring that it sets among `holds`."""
+        if self.far:
+            observer, credit = self.far
+            accounts = {id(h.own): h._account for h in holds}
+            account = accounts[id(observer)]
+            assert account
+            self._c.far, self._c.credit = ctypes.addressof(account.c), credit.ctypes.data
 
     def draw(self) -> None:
         """Draw the next latencies."""
@@ -256,7 +273,7 @@ def tanks(holds: Iterable[Hold], rolls_back: bool) -> dict[int, CompiledTank]:
     shared: dict[int, tuple[EnergyTank, list[Hold]]] = {}
     for hold in holds:
         own = parts(hold).own
-        if isinstance(own, PassiveSetPosition):
+        if isinstance(own, PassiveSetPosition | Account) and own.tank:
             shared.setdefault(id(own.tank), (own.tank, []))[1].append(hold)
     return {
         key: CompiledTank(tank)

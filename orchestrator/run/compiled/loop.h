@@ -84,13 +84,13 @@ typedef struct {
     int64_t n, room;
 } Link;
 
-/* Of a spring-damper: energy_tank.py. */
+/* Of a spring-damper: energy_tank.py. `velocity` is NULL where the near end has none. */
 typedef struct {
-    int64_t n, tick;
-    const double *stiffness, *damping;
-    const int64_t *where;
-    double period, available;
-    double *newest, *modulated, *x, *at;   /* (2, n), (2, n), (n,), (n,) */
+    int64_t n, tick, sampled;
+    const double *stiffness, *damping, *turns;
+    const int64_t *where, *velocity;
+    double period, available, needed, credited;
+    double *newest, *modulated, *x, *moved, *force, *withheld; /* (2, n), (2, n), (n,) */
 } Tank;
 
 /* factor board[where] + offset; factor is NULL where it is 1 and offset 0. */
@@ -114,6 +114,9 @@ typedef struct {
     Reader displacement, velocity;
     double *vectors;
     Queue path, until, fresh;
+    Tank *tank;                           /* of a spring on whose far side it is, or NULL */
+    double promised, promise;
+    int64_t since;                        /* of the promise */
 } Account;
 
 /* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
@@ -135,6 +138,8 @@ typedef struct {
     Tank *tank;
     int64_t row;
     Account *account;
+    const Account *far;                   /* on the far side of the spring that it sets, or NULL */
+    double *credit;                       /* where what that has put in belongs */
 } Hold;
 
 enum {
@@ -267,6 +272,12 @@ int exception_left(void);
 double *hold_scratch(const Hold *h); /* (2, n) */
 int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
 int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+void tank_credit(Tank *t, double total);
+void tank_modulate(Tank *t, const Loop *l, int64_t tick);
+double tank_share(
+    Tank *t, double *effort, const double *predicted, const double *steady, const double *beta
+);
+double account_credit(const Account *a, const Loop *l);
 int account_has_room(const Account *a, int64_t samples);
 void account_push(Account *a, const double *sample, int64_t stamp, int64_t arrival);
 void account_value(Account *a, const Loop *l, int64_t tick, double ahead, double *value);

@@ -94,10 +94,14 @@ class Machine:
         shared = tanks(simulation.holds.values(), rolls_back)
         for name, hold in simulation.holds.items():
             own = parts(hold).own
-            tank = shared.get(id(getattr(own, "tank", None)))
-            if not can(hold, rolls_back) or (hasattr(own, "tank") and tank is None):
+            needed = getattr(own, "tank", None)
+            tank = shared.get(id(needed))
+            if not can(hold, rolls_back) or (needed and tank is None):
                 continue
             simulation.holds[name] = self._made(name, hold, tank)
+        compiled = [h for h in simulation.holds.values() if isinstance(h, CompiledHold)]
+        for hold in compiled:
+            hold.join(compiled)
         simulation.springs[:] = [shared.get(id(tank), tank) for tank in simulation.springs]
 
     def _made(self, name: str, hold: Hold, tank: CompiledTank | None = None) -> CompiledHold:

@@ -63,10 +63,10 @@ class Link(ctypes.Structure):
 
 class Tank(ctypes.Structure):
     _fields_ = (
-        *_all(_INT, "n tick"),
-        *_all(_POINTER, "stiffness damping where"),
-        *_all(_DOUBLE, "period available"),
-        *_all(_POINTER, "newest modulated x at"),
+        *_all(_INT, "n tick sampled"),
+        *_all(_POINTER, "stiffness damping turns where velocity"),
+        *_all(_DOUBLE, "period available needed credited"),
+        *_all(_POINTER, "newest modulated x moved force withheld"),
     )
 
 
@@ -84,6 +84,9 @@ class Account(ctypes.Structure):
         *_all(Reader, "displacement velocity"),
         ("vectors", _POINTER),
         *_all(Queue, "path until fresh"),
+        ("tank", _POINTER),
+        *_all(_DOUBLE, "promised promise"),
+        ("since", _INT),
     )
 
 
@@ -99,7 +102,7 @@ class Hold(ctypes.Structure):
         ("unwrapped", _INT),
         *_all(_POINTER, "link tank"),
         ("row", _INT),
-        ("account", _POINTER),
+        *_all(_POINTER, "account far credit"),
     )
 
 

@@ -172,3 +172,13 @@ def test_a_reset_begins_anew_with_changed_options() -> None:
     assert made.run["end"]["reason"] == "duration"
     assert np.array_equal(made.haptics["time"], np.arange(52) / 512)
     assert "foh" in made.run["holds"].values()
+
+
+def test_the_hold_of_a_force_whose_energy_another_hold_shares_is_not_changed() -> None:
+    def turn(live: hl.RealTime) -> None:
+        with pytest.raises(hl.InputFault, match="share its energy"):
+            live.hold("virtual_mechanism.F_drift", "zoh")
+        live.stop()
+
+    ends = (f"holds.controller.{end}=pspm" for end in ("x_S", "v_S"))
+    ran("closed-loop-direct", turn, "holds.virtual_mechanism.F_drift=passive", *ends)

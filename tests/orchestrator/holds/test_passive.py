@@ -113,6 +113,35 @@ def test_passive_makes_nothing_at_any_sample_where_the_way_is_foreseen(
             longest = 0.0 if known else max(longest, abs(moved) * max(step, every))
 
 
+@pytest.mark.parametrize(("reversals", "apart"), [(0, 1), (1, 1), (8, 1), (60, 3)])
+def test_a_step_back_by_a_nanometre_costs_next_to_nothing(reversals: int, apart: int) -> None:
+    """A spring of 1000 N/m on a steady motion, renewed every fifth tick; some steps go back by 1
+    nm. What these make is theirs, (R + C) |dx|, and not that of the steps after them."""
+    steps = np.full(400, 1e-4)
+    steps[50 : 50 + apart * reversals : apart] = -1e-9
+    made, swing = {}, 0.0
+    for name in ("zoh", "passive"):
+        now = np.zeros(1)
+        context = HoldContext(1, displacement=lambda at=now: at, velocity=lambda: np.full(1, 1e-4))  # type: ignore[misc]
+        hold = HOLDS[name](context)
+        work = ideal = peak = force = at_sample = 0.0
+        for tick, step in enumerate(steps):
+            if tick % 5 == 0:
+                fresh = -1000.0 * float(now[0])
+                ideal += (force + fresh) / 2 * (float(now[0]) - at_sample)
+                force, at_sample = fresh, float(now[0])
+                hold.push(tick, np.array([fresh]), tick)
+                peak = max(peak, work - ideal)
+            held = float(hold.value(tick, 0.5)[0])
+            work += held * step
+            now[:] += step
+            swing = max(swing, abs(held))
+        made[name] = peak
+    first = 0.5 * 1000.0 * (5e-4) ** 2  # while no swing is known
+    assert made["zoh"] > 50 * first
+    assert made["passive"] <= first + reversals * 2 * swing * 1e-9
+
+
 @pytest.mark.parametrize("name", ["zoh", "passive", "nepce"])
 def test_no_hold_withstands_a_motion_that_waits_for_its_force(name: str) -> None:
     """A source within +-1 and a motion that goes whichever way makes more, once the force is held:

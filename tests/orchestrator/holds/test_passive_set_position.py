@@ -12,11 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.results.tracking import tracking
+from hapticlink.orchestrator.run.make_holds import make_holds
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.system.built import built
 from tests.orchestrator.foreign_fmus import python_fmu_of, run
 
 Vector = NDArray[np.float64]
@@ -27,8 +32,9 @@ def held(
     stiffness: Vector, damping: Vector, longest: int, position: Callable[[], Vector]
 ) -> tuple[Hold, Hold]:
     """The holds of set position and set velocity."""
-    shared = EnergyTank(stiffness, damping, position, longest * TICK, lambda tick: tick * TICK)
     n = len(stiffness)
+    near = NearEnd(position, np.zeros(n), longest * TICK, lambda tick: tick * TICK)
+    shared = EnergyTank(stiffness, damping, near)
     first, second = (HOLDS["pspm"](HoldContext(n, tank=(shared, row))) for row in (0, 1))
     return first, second
 
@@ -101,7 +107,8 @@ def test_a_set_position_that_pumps_a_mass_pumps_nothing() -> None:
 
     def swing(name: str) -> float:
         x, v, y = np.array([0.05]), 0.0, np.zeros(1)
-        shared = EnergyTank(np.array([100.0]), np.zeros(1), lambda: x, TICK, lambda t: t * TICK)
+        near = NearEnd(lambda: x, np.zeros(1), TICK, lambda t: t * TICK)
+        shared = EnergyTank(np.array([100.0]), np.zeros(1), near)
         hold = HOLDS[name](HoldContext(1, tank=(shared, 0)))
         cos, sin, largest = np.cos(10 * TICK), np.sin(10 * TICK), 0.0
         for tick in range(10000):
@@ -119,26 +126,61 @@ def test_a_set_position_that_pumps_a_mass_pumps_nothing() -> None:
     assert swing("pspm") <= start * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("rate", [10, 30])
-def test_the_controllers_spring_creates_nothing_in_the_loop(tmp_path: Path, rate: int) -> None:
-    """F_drift on the handle, from the run's own signals. Beside the spring-damper's work there is
-    what the controller makes by sampling it, F held over a step: 1/2 K dx^2 + B (dx/T - v) dx."""
-    gains = np.array([100.0, 100.0, 0.1]), np.array([20.0, 20.0, 0.02])
+K, B = np.array([100.0, 100.0, 0.1]), np.array([20.0, 20.0, 0.02])
+"""Gains of closed-loop-direct."""
+
+
+@pytest.mark.parametrize(("rate", "sensing"), [(10, "ideal"), (30, "ideal"), (30, "encoders")])
+def test_the_controllers_spring_creates_one_steps_surplus_at_most(
+    tmp_path: Path, rate: int, sensing: str
+) -> None:
+    """F_drift on the handle, from the run's own signals. Sampling F makes 1/2 K dx^2 + B (dx/T - v)
+    dx a step: the sum of these is large, and the hold lets through one of them. The work on the
+    true handle differs by the force's changes times the encoders' error."""
     sets = ("virtual_mechanism.x -> controller.x_S", "virtual_mechanism.v -> controller.v_S")
-    made = {}
+    made, steps, true = {}, {}, {}
     for hold in ("zoh", "pspm"):
         options = [f"hold={hold}", f"graphics.rate={rate}", "controller.bias=none"]
+        options += [f"sensing={sensing}"]
         found = simulate("closed-loop-direct", tmp_path / hold, options).results
         assert [found.run["holds"][name] for name in sets] == [hold, hold]
-        force, x, v = (
+        force, x, v, handle = (
             found.haptics[name]
-            for name in ("controller.F_drift", "haptic_device.x", "haptic_device.v")
+            for name in (
+                "controller.F_drift",
+                *(f"haptic_device.{n}" for n in ("x", "v", "x_true")),
+            )
         )
         dx = np.diff(x, axis=0)
-        sampled = (gains[0] / 2 * dx + gains[1] * (dx * 512.0 - v[:-1])) * dx
-        made[hold] = float((force[:-1] * dx - sampled).sum(axis=1).cumsum().max())
+        surplus = ((K / 2 * dx + B * (dx * 512.0 - v[:-1])) * dx).sum(axis=1)
+        steps[hold] = surplus
+        made[hold] = float((force[:-1] * dx).sum(axis=1).cumsum().max())
+        work = (force[:-1] * np.diff(handle, axis=0)).sum(axis=1).cumsum()
+        error = np.abs(handle - x)
+        bound = (np.abs(np.diff(force, axis=0)) * error[1:]).sum(axis=1).cumsum()
+        bound += (np.abs(force[1:]) * error[1:]).sum(axis=1) + np.abs(force[0]) @ error[0]
+        true[hold] = float((work - bound).max())
     assert made["zoh"] > 1e-3
-    assert made["pspm"] <= 1e-12
+    assert made["pspm"] <= steps["pspm"].max() + 1e-12
+    assert true["pspm"] <= steps["pspm"].max() + 1e-12
+
+
+@pytest.mark.parametrize("rate", [30, 60])
+def test_both_sides_share_what_either_puts_in(tmp_path: Path, rate: int) -> None:
+    """A mechanism that starts at speed pulls the handle along: the coupling gives both together no
+    more than it got, at every sample, and the handle follows. The work on the mechanism is the
+    energy that it gained, which no meter of the run tells."""
+    options = ["hold=passive", f"graphics.rate={rate}", "controller.bias=full"]
+    options += ["hand.wrench=[0.0, 0.0, 0.0]", "linkage.start_velocity.shoulder1=4.0"]
+    options += [f"holds.controller.{end}=pspm" for end in ("x_S", "v_S")]
+    found = simulate("closed-loop-direct", tmp_path, options).results
+    force, x = (found.haptics[n] for n in ("controller.F_drift", "haptic_device.x_true"))
+    near = np.concatenate([[0.0], (force[:-1] * np.diff(x, axis=0)).sum(axis=1).cumsum()])
+    frames = found.graphics["time"]
+    energy = found.graphics["virtual_mechanism.energy"]
+    net = np.interp(frames, found.haptics["time"], near) + energy - energy[0]
+    assert net.max() <= 1e-9
+    assert tracking(found)[1].max() < 5.0
 
 
 @pytest.mark.parametrize(
@@ -160,6 +202,15 @@ def test_where_no_spring_is_set_or_half_of_one_it_is_refused(
 def test_a_near_end_that_is_late_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SceneFault, match="near end of its spring must be read unheld"):
         simulate("closed-loop-direct", tmp_path, ["hold=pspm", "delays.controller.x_D=0.004"])
+
+
+def test_a_near_end_that_is_an_angle_is_known_as_one() -> None:
+    """Its tank unwraps what it reads (tests of the tank have what becomes of it)."""
+    options = ["hold=pspm", "kinds.haptic_device.x=angle"]
+    with built(open_scene.load("closed-loop-direct", options)) as system:
+        _, (tank,) = make_holds(system, SignalVector(system))
+    assert isinstance(tank, EnergyTank)
+    np.testing.assert_allclose(tank.near.turns, [0.0, 0.0, 2 * np.pi])
 
 
 MOVES = """

@@ -32,7 +32,15 @@ def run(scene: str, out: Path, *options: str) -> tables.Results:
 
 def test_an_early_end_stands_in_every_title(tmp_path: Path) -> None:
     found = drawn(run("closed-loop", tmp_path, "stop_when='virtual_mechanism.x[1]<0.044'"))
-    drawings = {"mechanism", "trajectories", "distance", "forces", "constraints", "energies"}
+    drawings = {
+        "mechanism",
+        "trajectories",
+        "distance",
+        "forces",
+        "constraints",
+        "energies",
+        "user_port",
+    }
     assert drawings == set(found)
     for axes in found.values():
         assert "until stop_when ended the run at 0." in axes.get_title().replace("\n", " ")

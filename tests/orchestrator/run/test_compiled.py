@@ -63,6 +63,17 @@ def test_every_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str) 
     assert sum(link["lost"] for link in run["links"].values())
 
 
+@pytest.mark.parametrize("hold", ["passive", "nepce"])
+def test_a_tank_that_both_sides_share(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str
+) -> None:
+    options = [f"hold={hold}", "graphics.rate=30", "duration=0.5"]
+    options += [f"holds.controller.{end}=pspm" for end in ("x_S", "v_S")]
+    for late in ([], ["delays.controller.x_S={ min = 0.001, max = 0.05, loss = 0.2, seed = 3 }"]):
+        _, left = both("closed-loop-direct", tmp_path, monkeypatch, *options, *late)
+        assert not left
+
+
 @pytest.mark.parametrize(
     "options",
     [

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.manifolds import Unwrapped
 from hapticlink.orchestrator.run.compiled import structures
@@ -63,7 +63,9 @@ class Pair:
 
     def _made(self, name: str, wrapped: str, moves: bool) -> Hold:
         reader = Reader(self.signals, self.position, np.ones(SIZE))  # type: ignore[arg-type]
-        tank = EnergyTank(np.array([40.0, 3.0, 7.0]), np.full(SIZE, 0.5), reader, 0.02, seconds)
+        turns, sampled = np.array([0.0, 0.0, 2 * np.pi * (wrapped == "angle")]), wrapped == "late"
+        near = NearEnd(reader, turns, 0.02, seconds, reader if moves else None, sampled)
+        tank = EnergyTank(np.array([40.0, 3.0, 7.0]), np.full(SIZE, 0.5), near)
         needed = (tank, 0) if HOLDS[name].needs == "spring" else None
         scale = np.array([2.0, -1.0, 0.5])
         x, v = (Reader(self.signals, at, scale) for at in (self.position, self.velocity))  # type: ignore[arg-type]

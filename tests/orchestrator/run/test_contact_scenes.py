@@ -127,6 +127,19 @@ def test_a_second_hand_holds_its_point(tmp_path: Path) -> None:
     np.testing.assert_allclose(step, (speed[1:] + speed[:-1]) / 2, atol=1e-4)
 
 
+def test_the_first_hand_feels_the_second(tmp_path: Path) -> None:
+    """The handle accelerates as the operational point does under the other hand's force alone, from
+    the first tick on."""
+    point = "linkage.point=[{name='left', body='link4', at=[0.02, 0.0]}]"
+    options = ["duration=0.05", point, "hands.left={wrench=[0.5, 0.0, 0.0]}"]
+    rows = simulate("closed-loop", tmp_path, [*options, "hand.wrench=[0.0, 0.0, 0.0]"])
+    mechanism, handle = (
+        rows.results.haptics[name] for name in ("virtual_mechanism.v", "haptic_device.v_true")
+    )
+    assert mechanism[1, 0] * 512.0 > 0.1
+    np.testing.assert_allclose(handle[1], mechanism[1], rtol=1e-4)
+
+
 def test_contact_rows_are_never_mixed(tmp_path):
     """A default hold that extrapolates leaves them as sampled, and run.json says so."""
     experiment = simulate("enclosure", tmp_path / "run", ["hold=foh", "duration=0.2"])

@@ -115,7 +115,7 @@ def test_the_page_names_the_hold_of_the_least_error(
                 "coupling_1s_mm": error,
                 "coupling_max_mm": error,
                 "modelling_1s_mm": error,
-                "held_energy_generated_J": -0.002,
+                "held_energy_peak_J": -0.002,
             }
         )
     text = page.write(tmp_path, rows).read_text()
