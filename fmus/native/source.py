@@ -10,14 +10,16 @@ from collections.abc import Iterable
 import casadi as ca
 
 from hapticlink.components.component import Component
+from hapticlink.fmus.one_pass import one_pass
 
 
 def component_header(component: Component) -> str:
     """Sizes, names, start values and functions; the same text for the same component.
 
-    The functions are `static`, so that their names (initialize, step, output) cause no conflict.
+    The functions are `static`, so that their names (initialize, output, advance) cause no conflict.
     """
-    text = functions((component.initialize, component.step, component.output))
+    parts = one_pass(component)
+    text = functions(parts.functions)
     settable = (*component.inputs, *component.parameters)
     fixed = [False] * len(component.start_inputs)
     fixed += [v.variability == "fixed" for v in component.parameters for _ in v.names]
@@ -28,6 +30,7 @@ def component_header(component: Component) -> str:
         "N_P": len(component.start_parameters),
         "N_Y": sum(v.size for v in component.outputs),
         "N_X": sum(v.size for v in component.states),
+        "N_Z": parts.n_shared,
         "SUBSTEPS": component.substeps,
         "SAMPLED": int(component.timing == "sampled"),
         # Working memory that the functions need to call the look-ups of tables.

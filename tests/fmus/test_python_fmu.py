@@ -63,7 +63,7 @@ def test_an_exception_inside_a_step_is_a_discard(opened):
     at = opened("spring")
     fmu = Named(at).start()
     slave = living_slaves()[-1]
-    slave._evaluate_step = None
+    slave._evaluate = [None]
     with pytest.raises(FMICallException) as raised:
         fmu.step(0.0, 0.1)
     assert raised.value.status == DISCARD
@@ -111,7 +111,7 @@ def test_only_pythonfmu_and_the_slave_can_be_imported_from_resources(opened):
         p.name for p in resources.iterdir() if p.is_dir()
     }
     module = (resources / "slavemodule.txt").read_text().strip()
-    assert importable == {"pythonfmu", module}
+    assert importable == {"pythonfmu", module, f"{module}_slave"}
     assert module.startswith("hapticlink_")
 
 
@@ -136,11 +136,12 @@ def test_a_damaged_fmu_is_found_out(fmus, tmp_path):
     with session(fmus["spring"]) as at:
         folder = Path(at.folder) / "resources"
         module = (folder / "slavemodule.txt").read_text().strip()
-        text = (folder / f"{module}.py").read_text()
+        text = (folder / f"{module}_slave.py").read_text()
         broken = text.replace("part[:] = array.array", "array.array")
         assert broken != text
-        (folder / f"{module}.py").unlink()
-        (folder / f"{module}_broken.py").write_text(broken)
+        (folder / f"{module}_broken_slave.py").write_text(broken)
+        entry = (folder / f"{module}.py").read_text().replace(module, f"{module}_broken")
+        (folder / f"{module}_broken.py").write_text(entry)
         (folder / "slavemodule.txt").write_text(f"{module}_broken\n")
         archive = shutil.make_archive(str(tmp_path / "spring"), "zip", at.folder)
     findings = check_fmu(Path(archive).rename(tmp_path / "spring.fmu"))
