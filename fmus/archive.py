@@ -79,7 +79,13 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
 
     slave = Path(python_slave.__file__).read_bytes()
     about = _about(component) | {"n_shared": parts.n_shared}
-    content = {**files, "slave": slave, "module": _MODULE.encode(), "about": json.dumps(about).encode(), "xml": describe("")}
+    content = {
+        **files,
+        "slave": slave,
+        "module": _MODULE.encode(),
+        "about": json.dumps(about).encode(),
+        "xml": describe(""),
+    }
     whole = digest(content)
     module, guid = f"hapticlink_{whole[:16]}", f"{{{uuid.UUID(whole[:32])}}}"
     files |= {

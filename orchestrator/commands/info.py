@@ -132,10 +132,7 @@ def _needs(scene: Any, time: Timeline) -> None:
         say(f"  {title}")
         for row in rows[title]:
             ports = sum(row.cost.inputs.values()), sum(row.cost.outputs.values())
-            say(
-                f"    {row.name}: {row.cost.step} operations, "
-                f"{ports[0]} + {ports[1]} signals"
-            )
+            say(f"    {row.name}: {row.cost.step} operations, {ports[0]} + {ports[1]} signals")
         operations, signals = (sum(getattr(r, k) for r in rows[title]) for k in _PER_TICK)
         say(f"    a haptic tick: {operations:.0f} operations, {signals:.0f} signals")
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
+import os
 import shutil
 import subprocess
 import sys
@@ -124,6 +126,38 @@ def test_nothing_is_left_behind(fmus, monkeypatch, tmp_path):
     assert check_fmu(fmus["spring"]) == []
     assert list(tmp_path.iterdir()) == []
     assert living_slaves() == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_an_instance_leaves_less_than_2_kb(opened):
+    """pythonfmu itself leaves a list. FMPy's own objects are left out: fmi2Instantiate directly."""
+    at = opened("spring")
+    kept = at.instance()
+    guid, uri = at.description.guid.encode(), Path(at.folder, "resources").as_uri().encode()
+    instantiate, free = kept.dll.fmi2Instantiate, kept.dll.fmi2FreeInstance
+    instantiate.restype, free.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
+
+    def lives(count: int) -> None:
+        for _ in range(count):
+            one = instantiate(b"one", 1, guid, uri, ctypes.byref(kept.callbacks), 0, 0)
+            assert one
+            free(one)
+        gc.collect()
+
+    def classes() -> int:
+        return sum(isinstance(o, type) and o.__name__ == "HapticlinkSlave"
+                   and o.__module__ == type(living_slaves()[0]).__module__
+                   for o in gc.get_objects())  # fmt: skip
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    lives(100)
+    before, objects = resident(), len(gc.get_objects())
+    lives(1000)
+    assert classes() == 1
+    assert len(gc.get_objects()) - objects <= 1000 * 1.1
+    assert resident() - before < 1000 * 2000
 
 
 def living_slaves() -> list:
