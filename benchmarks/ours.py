@@ -129,11 +129,14 @@ def _compiled(step: ca.Function, folder: Path) -> Path:
     """A shared library with `run`, kept under the hash of its source."""
     folder.mkdir(parents=True, exist_ok=True)
     sizes = f"#define ARGUMENTS {step.sz_arg()}\n#define RESULTS {step.sz_res()}\n"
-    source = sizes + '#include "fmi2Functions.h"\n' + functions([step]) + _DRIVER
-    library = folder / f"{hashlib.sha256(source.encode()).hexdigest()[:16]}.so"
+    main, pieces = functions([step])
+    texts = [sizes + '#include "fmi2Functions.h"\n' + main + _DRIVER, *pieces]
+    library = folder / f"{hashlib.sha256(''.join(texts).encode()).hexdigest()[:16]}.so"
     if not library.exists():
-        text, made = library.with_suffix(".c"), library.with_suffix(".part")
-        text.write_text(source)
-        compile_library(text, made).rename(library)
-        text.unlink()
+        files = [library.with_suffix(f".{k}.c") for k in range(len(texts))]
+        for file, text in zip(files, texts, strict=True):
+            file.write_text(text)
+        compile_library(files, library.with_suffix(".part")).rename(library)
+        for file in files:
+            file.unlink()
     return library

@@ -13,7 +13,7 @@ The outputs of a *continuous* block (a plant) are those at the end of its step. 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -156,7 +156,8 @@ def pack(variables: Iterable[Variable], values: Mapping[str, ca.SX]) -> ca.SX:
 
 @dataclass(frozen=True)
 class Component:
-    """A complete block. `step` is called `substeps` times for each communication step. springs:
+    """A complete block. `step` is called `substeps` times for each communication step; where there
+    is a `substep`, which leaves discrete memory as it is, it replaces all but the last. springs:
     spring-dampers whose set positions are inputs. look_ups: those that the functions
     call. state_notes: by the name of a state, the cause to report if it is not finite."""
 
@@ -171,6 +172,7 @@ class Component:
     step: ca.Function
     output: ca.Function
     substeps: int = 1
+    substep: ca.Function | None = None
     documentation: str = ""
     springs: tuple[Spring, ...] = ()
     look_ups: tuple[LookUp, ...] = ()
@@ -229,6 +231,7 @@ class Block:
         step: Mapping[str, ca.SX] | ca.SX,
         output: Mapping[str, ca.SX],
         substeps: int = 1,
+        memory: Collection[str] = (),
         documentation: str = "",
         state_notes: Mapping[str, str] | None = None,
         springs: Iterable[Spring] = (),
@@ -238,13 +241,17 @@ class Block:
         """The component with the given expressions: step and output in this block's symbols,
         initial in u and p only; signals are those over time that they read.
 
+        memory: states that change only in the last of several substeps.
         shared: common subexpressions of step and initial have been eliminated already; doing so
         again would take most of the time to build a large graph. Raises ValueError where names or
         shapes do not match the declared variables.
         """
         x, u, p, t, h = self.x.vector, self.u.vector, self.p.vector, self.t, self.h
         x1 = pack(self.x.variables, step) if isinstance(step, Mapping) else ca.densify(step)
+        is_memory = [v.name in memory for v in self.x.variables for _ in range(v.size)]
+        kept = ca.vertcat(*(x[i] if held else x1[i] for i, held in enumerate(is_memory)))
         once, options = {"cse": not shared}, {"cse": True}
+        names = ["x", "u", "p", "t", "h"]
         return Component(
             name=name,
             description=description,
@@ -256,9 +263,7 @@ class Block:
             initialize=ca.Function(
                 "initialize", [u, p], [pack(self.x.variables, initial)], ["u", "p"], ["x0"], once
             ),
-            step=ca.Function(
-                "step", [x, u, p, t, h], [x1], ["x", "u", "p", "t", "h"], ["x1"], once
-            ),
+            step=ca.Function("step", [x, u, p, t, h], [x1], names, ["x1"], once),
             output=ca.Function(
                 "output",
                 [x, u, p, t],
@@ -268,6 +273,9 @@ class Block:
                 options,
             ),
             substeps=substeps,
+            substep=ca.Function("substep", [x, u, p, t, h], [kept], names, ["x1"], once)
+            if substeps > 1 and memory
+            else None,
             documentation=documentation,
             state_notes=state_notes or {},
             springs=tuple(springs),

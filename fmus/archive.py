@@ -5,7 +5,8 @@ Python file of the model, leaves sys.path and sys.modules changed, and writes fi
 with dates and a random GUID, whereas the same component has to give the same bytes here.
 
 Each load of an FMU adds its resources/ to sys.path permanently. Therefore the only modules in it
-are pythonfmu's own copy and the slave, whose name contains a hash of the content.
+are pythonfmu's own copy, the slave and the one that imports it, whose names contain a hash of the
+content.
 """
 
 from __future__ import annotations
@@ -27,11 +28,21 @@ from hapticlink.components.component import Component, Variable
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.model_description import model_description
+from hapticlink.fmus.one_pass import one_pass
 from hapticlink.fmus.straight_line import program
 
 PYTHONFMU = Path(str(distribution("pythonfmu").locate_file("pythonfmu")))
 """Not where `import pythonfmu` finds it: after a Python FMU has run in this process, that is the
 FMU's own copy, whose folder is gone."""
+_MODULE = """import ctypes
+
+from {}_slave import HapticlinkSlave
+
+# pythonfmu 0.7 releases a reference to this dictionary for each instance, without having taken one.
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+"""
+"""The module that pythonfmu executes again for each instance: a class that it defined would be
+another one each time, which is never released (60 kB)."""
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
@@ -54,13 +65,13 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
     def describe(guid: str) -> bytes:
         return model_description(component, guid, stop_time=stop_time, step_size=step_size)
 
-    functions = (component.initialize, component.step, component.output)
-    texts = {name: f.serialize() for name, f in zip(_ROLES, functions, strict=True)}
+    parts = one_pass(component)
+    texts = {f.name(): f.serialize() for f in parts.functions}
     files = {
         "documentation/index.html": documentation(component),
         "model.png": icon(component.timing),
         "resources/functions.casadi.json": json.dumps(texts).encode(),
-        "resources/functions.txt": program(functions, component.look_ups).encode(),
+        "resources/functions.txt": program(parts.functions, component.look_ups).encode(),
     }
     for path in sorted(PYTHONFMU.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
@@ -68,14 +79,21 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
         files[f"binaries/{path.parent.name}/{component.name}{path.suffix}"] = path.read_bytes()
 
     slave = Path(__file__).with_name("python_slave.py").read_bytes()
-    about = _about(component)
-    content = {**files, "slave": slave, "about": json.dumps(about).encode(), "xml": describe("")}
+    about = _about(component) | {"n_shared": parts.n_shared}
+    content = {
+        **files,
+        "slave": slave,
+        "module": _MODULE.encode(),
+        "about": json.dumps(about).encode(),
+        "xml": describe(""),
+    }
     whole = digest(content)
     module, guid = f"hapticlink_{whole[:16]}", f"{{{uuid.UUID(whole[:32])}}}"
     files |= {
         "modelDescription.xml": describe(guid),
         "resources/component.json": json.dumps(about | {"digest": whole, "guid": guid}).encode(),
-        f"resources/{module}.py": slave,
+        f"resources/{module}.py": _MODULE.format(module).encode(),
+        f"resources/{module}_slave.py": slave,
         "resources/slavemodule.txt": f"{module}\n".encode(),
     }
     return files
@@ -96,9 +114,6 @@ def write(files: Mapping[str, bytes], target: BinaryIO) -> None:
             info.create_system = 3  # Unix, wherever it is written
             info.external_attr = 0o644 << 16
             archive.writestr(info, files[name], zipfile.ZIP_DEFLATED)
-
-
-_ROLES = ("initialize", "step", "output")
 
 
 def check_functions(component: Component) -> None:

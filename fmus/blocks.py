@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -45,12 +45,14 @@ def build_block(
     packaging: Packaging = "python",
     platforms: Sequence[str] = (),
     starts: Starts = MappingProxyType({}),
+    poll: Callable[[], object] = lambda: None,
 ) -> Path:
     """The path of the block's FMU: in the cache, or built in `room` where the cache is off.
 
     settings: the block's own, by name; starts: start values that replace those of its parameters.
     experiment: stop_time and step_size (s) of the default experiment. platforms: those of a native
-    FMU, by default this machine's. Raises FmuError if the settings give no FMU,
+    FMU, by default this machine's. poll: called while another process builds it. Raises FmuError if
+    the settings give no FMU,
     CompilerError if it cannot be compiled.
     """
 
@@ -74,4 +76,4 @@ def build_block(
 
         material["compiler"] = compiler_version()
         material["platforms"] = list(platforms) or [host_platform()]
-    return cache.cached(material, make, room)
+    return cache.cached(material, make, room, poll)

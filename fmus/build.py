@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from fmpy import read_model_description
+from fmpy.model_description import ValidationError
 from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Component
@@ -27,9 +30,7 @@ def build(
     FmuError with the findings, and UnsupportedPlatform where pythonfmu has no binary.
     """
     require_platform()
-    return _publish(
-        component.name, entries(component, stop_time=stop_time, step_size=step_size), folder
-    )
+    return _publish(component, entries(component, stop_time=stop_time, step_size=step_size), folder)
 
 
 def build_native(
@@ -57,17 +58,36 @@ def build_native(
         step_size=step_size,
         platforms=tuple(platforms) or (host_platform(),),
     )
-    return _publish(component.name, made, folder)
+    return _publish(component, made, folder)
 
 
-def _publish(name: str, files: Mapping[str, bytes], folder: Path | str) -> Path:
+def _publish(component: Component, files: Mapping[str, bytes], folder: Path | str) -> Path:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    target = folder / f"{name}.fmu"
+    target = folder / f"{component.name}.fmu"
     with atomic_file(target) as unfinished:
         with unfinished.open("xb") as file:
             write(files, file)
-        findings = validate_fmu(str(unfinished))
+        findings = _findings(component, str(unfinished))
         if findings:
-            raise FmuError(f"`{name}` fails validation:\n  " + "\n  ".join(findings))
+            raise FmuError(f"`{component.name}` fails validation:\n  " + "\n  ".join(findings))
     return target
+
+
+_PLAIN = re.compile(
+    r"(?!der\()[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.A
+)
+"""Names that the grammar of FMI 2.0.5 section 2.2.9 allows, without quotes or derivatives."""
+
+
+def _findings(component: Component, path: str) -> list[str]:
+    """The findings of FMPy's validation. Its parser of names takes 1 ms for each (N = 40: 2 s of
+    11), and is left out if all names are plain."""
+    variables = (*component.inputs, *component.parameters, *component.outputs)
+    if not all(_PLAIN.fullmatch(name) for v in variables for name in v.names):
+        return validate_fmu(path)
+    try:
+        read_model_description(path, validate=True, validate_model_structure=True)
+    except ValidationError as error:
+        return list(error.problems)
+    return []

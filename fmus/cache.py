@@ -13,8 +13,8 @@ import time
 import uuid
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -22,6 +22,7 @@ from typing import Any
 
 import hapticlink.components
 from hapticlink.components import registry
+from hapticlink.fmus import lock
 from hapticlink.fmus.versions import version
 
 LONGEST = 3600.0
@@ -35,8 +36,11 @@ def folder() -> Path | None:
     chosen = os.environ.get("HAPTICLINK_CACHE")
     if chosen == "off":
         return None
-    if chosen:
-        return Path(chosen)
+    return Path(chosen) if chosen else user_folder()
+
+
+def user_folder() -> Path:
+    """The folder of this package in the user's cache folder."""
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
     elif sys.platform == "darwin":
@@ -57,7 +61,12 @@ def key(material: Mapping[str, Any]) -> str:
         "sources": sources(hapticlink.components, package),
         "plugins": {name: source(name) for name in plugins},
     }
-    return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()
+    return sha(json.dumps(whole, sort_keys=True))
+
+
+def sha(text: str) -> str:
+    """The SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @cache
@@ -83,21 +92,63 @@ def source(module: str) -> str:
 
 
 def cached(
-    key_material: Mapping[str, Any], build_function: Callable[[Path], Path], room: Path
+    key_material: Mapping[str, Any],
+    build_function: Callable[[Path], Path],
+    room: Path,
+    poll: Callable[[], object] = lambda: None,
 ) -> Path:
     """The cached FMU for `key_material`, built by `build_function(folder) -> path` if necessary.
 
-    Concurrent runs each build their own, and the last rename wins, with the same bytes. A damaged
-    file in the cache is built again. It is built in `room`, which the caller has to remove, and
-    stays there if the cache is off or cannot be written; the latter is logged as a warning.
+    Processes of a machine that need the same one wait for the first to build it, which is logged as
+    a warning; `poll` is called meanwhile. Those of several machines each build their own, and the
+    last rename wins, with the same bytes. A damaged file in the cache is built again. It is built
+    in `room`, which the caller has to remove, and stays there if the cache is off or cannot be
+    written; the latter is logged as a warning.
     """
     root = folder()
-    if root is not None:
-        place = root / key(key_material)
-        for path in place.glob("[!.]*.fmu"):
-            stat = path.stat()
-            if _is_whole(path, stat.st_mtime_ns, stat.st_size):
-                return path
+    if root is None:
+        return _made(build_function, room, None, Path())
+    place = root / key(key_material)
+    if found := _found(place):
+        return found
+    with _alone(place, str(key_material.get("block", "the same FMU")), poll):
+        return _found(place) or _made(build_function, room, root, place)
+
+
+def _found(place: Path) -> Path | None:
+    for path in place.glob("[!.]*.fmu"):
+        stat = path.stat()
+        if _is_whole(path, stat.st_mtime_ns, stat.st_size):
+            return path
+    return None
+
+
+@contextmanager
+def _alone(place: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
+    """No other process of this machine builds for `place` within the context."""
+    told = False
+
+    def wait() -> None:
+        nonlocal told
+        if not told:
+            logging.getLogger(__name__).warning("waiting for another process that builds %s", name)
+        told = True
+        poll()
+
+    path = Path(tempfile.gettempdir()) / f"hapticlink-{sha(str(place.absolute()))[:32]}.lock"
+    with ExitStack() as stack:
+        with suppress(PermissionError):  # the file of another user, who has another cache
+            stack.enter_context(lock.held(path, wait))
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                path.unlink()
+
+
+def _made(
+    build_function: Callable[[Path], Path], room: Path, root: Path | None, place: Path
+) -> Path:
     room.mkdir(parents=True, exist_ok=True)
     making = Path(tempfile.mkdtemp(dir=room))
     built = build_function(making)

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from hapticlink.fmus.blocks import component
+from hapticlink.fmus.one_pass import one_pass
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Instructions of one communication step (all substeps) and of one evaluation of the outputs;
-    sizes of the ports by name."""
+    """Instructions of one communication step, all substeps and the outputs; sizes of the ports by
+    name."""
 
     step: int
-    output: int
     inputs: Mapping[str, int]
     outputs: Mapping[str, int]
 
@@ -23,9 +23,10 @@ class Cost:
 def cost(name: str, settings: Mapping[str, Any]) -> Cost:
     """The cost of the block `name` with `settings`. Raises FmuError if they give no component."""
     made = component(name, settings)
+    parts = one_pass(made)
+    before = (parts.substeps - 1) * parts.substep.n_instructions()
     return Cost(
-        step=made.step.n_instructions() * made.substeps,
-        output=made.output.n_instructions(),
+        step=before + parts.advance.n_instructions(),
         inputs={v.name: v.size for v in made.inputs},
         outputs={v.name: v.size for v in made.outputs},
     )

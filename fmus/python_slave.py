@@ -3,14 +3,18 @@
 Its text is copied into the FMU's resources/ under a name with a hash of the FMU's content: all
 Python FMUs of a process share one interpreter, in which a second module of the same name would
 silently be the first one. It needs the standard library and pythonfmu, and uses casadi if that is
-installed. pythonfmu executes the module's body twice and takes the class that it finds in it for
-the slave, so the body has no side effects and imports no other class.
+installed.
 
 All reals are in one array [inputs | parameters | outputs], whose indices are the value references.
 
-    continuous   doStep: substeps times x <- step(x, u, p, t, h/substeps);
-                 get: y = output(x, u, p, t), evaluated on demand
-    sampled      doStep: y <- output(x, u, p, t_k), then x <- step(...); get: that y
+    continuous   doStep: substeps - 1 times x <- substep(x, u, p, t, h/substeps), then
+                 x, y, z <- advance(...), with the outputs at the end of the step;
+                 get: that y, or y = output(x, u, p, t) if values were set since
+    sampled      doStep: x, y <- advance(...), with the outputs at t_k, and further substeps;
+                 get: that y
+
+z are values for the next step that the outputs have evaluated already (`fmus.one_pass`); they are
+no state: where p, x or t are not those that they were evaluated for, they are evaluated again.
 
 Until the end of initialisation mode a get of either kind returns y = output(x0, u, p, t) with
 x0 = initialize(u, p), from the values set so far.
@@ -73,20 +77,29 @@ class HapticlinkSlave(Fmi2Slave):
         self._settable, self._n_inputs = n_u + n_p, n_u
         self._fixed = frozenset(about["fixed"])
         self._sampled, self._substeps = about["timing"] == "sampled", about["substeps"]
+        self._whole = 0 if self._sampled else self._substeps - 1  # the substep with the outputs
         # due: to be computed before the next read
         self._mode, self._start_due, self._output_due = INSTANTIATED, True, True
+        self._shared_time = math.nan  # for which z was evaluated; nan: it is out of date
         t, h = _doubles([0.0]), _doubles([0.0])
         x, trial, after = (_doubles([0.0] * n_x) for _ in range(3))
-        self._before = _doubles([0.0] * n_y)  # a sampled block's outputs before its step
+        new_y = _doubles(
+            [0.0] * n_y
+        )  # a sampled block's outputs, before they are known to be finite
+        end, z, next_z = _doubles([0.0]), *(_doubles([0.0] * about["n_shared"]) for _ in range(2))
+        self._shared, self._next_shared = z, next_z
         values = _doubles(about["starts"] + [0.0] * n_y)
         u, p, y = values[:n_u], values[n_u : n_u + n_p], values[n_u + n_p :]
         self._time, self._substep, self._values, self._outputs = t, h, values, y
         self._state, self._trial, self._after = x, trial, after
+        self._new_outputs, self._end = new_y if self._sampled else y, end
         self._buffers: list = []
         self._blocks: dict = {}
         self._evaluate_x0 = self._bind("initialize", (u, p), x)
-        self._evaluate_y = self._bind("output", (x, u, p, t), y)
-        self._evaluate_step = self._bind("step", (trial, u, p, t, h), after)
+        self._evaluate_y = self._bind("output", (x, u, p, t), y, z)
+        whole = self._bind("advance", (trial, u, p, t, h, end, z), after, self._new_outputs, next_z)
+        part = self._bind("substep", (trial, u, p, t, h), after) if self._substeps > 1 else whole
+        self._evaluate = [whole if k == self._whole else part for k in range(self._substeps)]
 
     def _require_own_description(self) -> None:
         """pythonfmu passes on no GUID; importers take the one that stands in the FMU's folder."""
@@ -119,15 +132,16 @@ class HapticlinkSlave(Fmi2Slave):
 
     # --- the component's functions ------------------------------------------------------
 
-    def _bind(self, name: str, arguments: tuple, result: memoryview) -> typing.Callable:
+    def _bind(self, name: str, arguments: tuple, *results: memoryview) -> typing.Callable:
         """A function without arguments that evaluates `name` on these arrays in place."""
         function = self._functions()[name]
         if not hasattr(function, "buffer"):
-            return functools.partial(function, *arguments, result)
+            return functools.partial(function, *arguments, *results)
         buffer, evaluate = function.buffer()
         for i, argument in enumerate(arguments):
             buffer.set_arg(i, argument)
-        buffer.set_res(0, result)
+        for i, result in enumerate(results):
+            buffer.set_res(i, result)
         self._buffers.append(buffer)  # `evaluate` holds a bare pointer to it
         return evaluate
 
@@ -155,7 +169,7 @@ class HapticlinkSlave(Fmi2Slave):
         with open(path, encoding="utf-8") as file:
             namespace = {"__name__": "functions"}
             exec(compile(file.read(), path, "exec"), namespace)
-        return {name: namespace[name] for name in ("initialize", "step", "output")}
+        return namespace
 
     # --- FMI ----------------------------------------------------------------------------
 
@@ -214,6 +228,8 @@ class HapticlinkSlave(Fmi2Slave):
             self._start_due = True
         if self._mode != STEP or not self._sampled:
             self._output_due = True
+        if last >= self._n_inputs:
+            self._shared_time = math.nan
 
     def _block(self, vrs: list) -> tuple:
         """The value references as a slice, None if they are not consecutive, and the largest one;
@@ -251,6 +267,7 @@ class HapticlinkSlave(Fmi2Slave):
         if self._output_due:
             self._evaluate_y()
             self._output_due = False
+            self._shared_time = self._time[0]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """True is fmi2OK, False fmi2Discard; raises nothing. State and outputs change only on
@@ -268,31 +285,33 @@ class HapticlinkSlave(Fmi2Slave):
         time, x, trial, after = self._time, self._state, self._trial, self._after
         if self._start_due:
             self._refresh()
-        n = self._substeps
-        self._substep[0] = step_size / n
-        trial[:] = x
-        for k in range(n):
-            time[0] = start + k * step_size / n
-            self._evaluate_step()
-            trial[:] = after
-        if not all(map(math.isfinite, trial)):
+        if self._shared and self._shared_time != start:
             time[0] = start
+            self._evaluate_y()
+        # Until the step is accepted, a plant's outputs are to be evaluated again.
+        self._output_due, self._shared_time = not self._sampled, math.nan
+        n = self._substeps
+        self._substep[0], self._end[0] = step_size / n, start + step_size
+        trial[:] = x
+        for k, evaluate in enumerate(self._evaluate):
+            time[0] = start + k * step_size / n
+            evaluate()
+            trial[:] = after
+        time[0] = start
+        if not all(map(math.isfinite, trial)):
             message = self._not_finite(trial, start + step_size)
             self.log(f"{message}; the state stays at t = {start!r}", enums.Fmi2Status.error)
             return False
         if self._sampled:
-            time[0] = start
-            self._before[:] = self._outputs
-            self._evaluate_y()
-            if not all(map(math.isfinite, self._outputs)):
-                message = self._not_finite(self._outputs, start, outputs=True)
-                self._outputs[:] = self._before
+            if not all(map(math.isfinite, self._new_outputs)):
+                message = self._not_finite(self._new_outputs, start, outputs=True)
                 said = f"{message}; state and outputs stay as before the step"
                 self.log(said, enums.Fmi2Status.error)
                 return False
-        x[:] = trial
-        time[0] = start + step_size
-        self._output_due = not self._sampled
+            self._outputs[:] = self._new_outputs
+        x[:], self._shared[:] = trial, self._next_shared
+        time[0] = self._shared_time = start + step_size
+        self._output_due = False
         return True
 
     def _not_finite(self, found: memoryview, time: float, outputs: bool = False) -> str:
@@ -329,6 +348,7 @@ class HapticlinkSlave(Fmi2Slave):
         if flags[0] >= len(MODES):
             raise ValueError("this FMU state is damaged")
         self._mode, self._start_due, self._output_due = MODES[flags[0]], *map(bool, flags[1:])
+        self._shared_time = math.nan
         for part in parts:
             end = offset + 8 * len(part)
             part[:] = array.array("d", state[offset:end])

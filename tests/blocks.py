@@ -14,6 +14,7 @@ class Running:
         self.x = np.array(component.initialize(self.u, self.p)).ravel()
         self.t = 0.0
         self._step = _on_own_memory(component.step)
+        self._substep = _on_own_memory(component.substep or component.step)
         self._outputs = {}
 
     @staticmethod
@@ -72,9 +73,10 @@ class Running:
         return ca.Function("y", arguments, [whole(*arguments)[rows.tolist()]])
 
     def step(self, h):
-        for _ in range(self.component.substeps):
-            part = h / self.component.substeps
-            self.x = self._step(self.x, self.u, self.p, self.t, part)
+        n = self.component.substeps
+        for k in range(n):
+            part, step = h / n, self._step if k == n - 1 else self._substep
+            self.x = step(self.x, self.u, self.p, self.t, part)
             self.t += part
 
 

@@ -100,6 +100,7 @@ def virtual_environment(
         step=step,
         output=output,
         substeps=1 if copy.sync == "exact" else copy.substeps,
+        memory=["n_constrained"],
         documentation=__doc__ or "",
     )
     require_assembled(component, model)

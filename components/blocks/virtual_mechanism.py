@@ -154,6 +154,7 @@ def virtual_mechanism(
         step=stepped,
         output=output,
         substeps=mechanism.substeps,
+        memory=["n_constrained"],
         state_notes=notes(model),
         documentation=__doc__ or "",
         shared=not frame_s and not touching,

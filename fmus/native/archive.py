@@ -19,7 +19,7 @@ from hapticlink.fmus.native.compiler import (
     compile_library,
     compiler_version,
 )
-from hapticlink.fmus.native.source import component_header
+from hapticlink.fmus.native.source import component_source
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
 
@@ -49,10 +49,12 @@ def entries(
         "documentation/index.html": documentation(component),
         "model.png": icon(component.timing),
     }
+    header, pieces = component_source(component)
     made_by = [compiler_version(), *FLAGS, TARGETS]
     content = {
         **files,
-        "component.h": component_header(component).encode(),
+        "component.h": header.encode(),
+        **{f"piece{k}.c": piece.encode() for k, piece in enumerate(pieces)},
         "fmi2.c": WRAPPER.read_bytes(),
         "compiler": json.dumps(made_by).encode(),
         "xml": describe(""),
@@ -63,9 +65,11 @@ def entries(
         room = Path(name)
         head = f'#define GUID "{guid}"\n'.encode()
         (room / "component.h").write_bytes(head + content["component.h"])
-        (room / "fmi2.c").write_bytes(content["fmi2.c"])
+        sources = [room / name for name in content if name.endswith(".c")]
+        for source in sources:
+            source.write_bytes(content[source.name])
         for platform in platforms:
-            library = compile_library(room / "fmi2.c", room / "library", platform)
+            library = compile_library(sources, room / "library", platform)
             entry = f"binaries/{platform}/{component.name}{SUFFIX[platform]}"
             files[entry] = library.read_bytes()
     return files

@@ -11,13 +11,14 @@ import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import fmpy
 
 from hapticlink.fmus.errors import CompilerError, FmuError
+from hapticlink.fmus.native.compiler_cache import compiler_cache
 from hapticlink.fmus.versions import version
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
@@ -59,12 +60,13 @@ def compiler_version() -> str:
 
 
 def compile_library(
-    source: Path | str,
+    source: Path | str | Sequence[Path],
     library: Path | str,
     platform: str | None = None,
     options: Iterable[str] = (),
 ) -> Path:
-    """Compile the C file `source` to the shared library `library` and return its path.
+    """Compile the C file `source` to the shared library `library` and return its path; several
+    files are compiled side by side.
 
     platform: one of PLATFORMS, by default this machine's. The FMI headers are on the include path,
     and only functions declared FMI2_Export are exported. options: further arguments of the compiler
@@ -72,30 +74,35 @@ def compile_library(
     with the compiler's output if the source does not compile.
     """
     compiler_version()
-    source, library = Path(source).resolve(), Path(library).resolve()
+    several = [source] if isinstance(source, (Path, str)) else source
+    sources, library = [Path(s).resolve() for s in several], Path(library).resolve()
     targets = TARGETS.get(platform or host_platform())
     if targets is None:
         raise FmuError(f"no platform {platform!r}; there are {', '.join(PLATFORMS)}")
     with tempfile.TemporaryDirectory(dir=library.parent) as room:
-        slices = [_compiled(source, Path(room), target, options) for target in targets]
+        slices = [_compiled(sources, Path(room), target, options) for target in targets]
         library.write_bytes(slices[0] if len(slices) == 1 else universal(slices))
     return library
 
 
-def _compiled(source: Path, room: Path, target: str, options: Iterable[str]) -> bytes:
+def _compiled(sources: list[Path], room: Path, target: str, options: Iterable[str]) -> bytes:
     made = room / target
     made.mkdir()
     flags = [*FLAGS, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags, *options]
     # A Mach-O file contains the path that it was written to, so this is the same everywhere.
-    command += [f"-I{_HEADERS}", "-o", "library", str(source)]
+    command += [f"-I{_HEADERS}", "-o", "library", *map(str, sources)]
     # zig keeps its own C library in its cache, but not our code.
-    environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(room / "cache")}
-    done = subprocess.run(
-        command, cwd=made, env=environment, capture_output=True, text=True, check=False
-    )
+    local = {"ZIG_LOCAL_CACHE_DIR": str(room / "cache")}
+    with compiler_cache() as own:
+        environment = {**os.environ, **own, **local}
+        done = subprocess.run(
+            command, cwd=made, env=environment, capture_output=True, text=True, check=False
+        )
     if done.returncode:
-        raise CompilerError(f"{source.name} does not compile for {target}:\n{done.stderr.strip()}")
+        raise CompilerError(
+            f"{sources[0].name} does not compile for {target}:\n{done.stderr.strip()}"
+        )
     return (made / "library").read_bytes()
 
 

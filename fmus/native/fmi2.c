@@ -1,13 +1,19 @@
 /* The FMI 2.0.5 co-simulation interface of one component, beside the C that CasADi writes of its
    functions. component.h, generated, holds both the sizes and the functions:
 
-       x0 = initialize(u, p),   x' = step(x, u, p, t, h),   y = output(x, u, p, t)
+       x0 = initialize(u, p),   y, z = output(x, u, p, t),   x' = substep(x, u, p, t, h),
+       x', y, z' = advance(x, u, p, t, h, end, z)
 
    All reals stand in one array [inputs | parameters | outputs]; a place is a value reference.
 
-       continuous   doStep: SUBSTEPS times x <- step(x, u, p, t, h/SUBSTEPS);
-                    get: y = output(x, u, p, t), evaluated when asked for
-       sampled      doStep: y <- output(x, u, p, t_k), then x <- step(...); get: that y
+       continuous   doStep: SUBSTEPS - 1 times x <- substep(x, u, p, t, h/SUBSTEPS), then
+                    x, y, z <- advance(...), with the outputs at the end of the step;
+                    get: that y, or y = output(x, u, p, t) if values were set since
+       sampled      doStep: x, y <- advance(...), with the outputs at t_k, and further substeps;
+                    get: that y
+
+   z are values for the next step that the outputs have evaluated already (one_pass.py); they are no
+   state: where p, x or t are not those that they were evaluated for, they are evaluated again.
 
    Up to the end of initialisation mode both kinds answer a get with y = output(x0, u, p, t) of the
    values set so far. The Python FMU (python_slave.py) does the same operations in the same order.
@@ -25,9 +31,14 @@
 
 #include "component.h"
 
+#if SUBSTEPS == 1
+#define substep advance /* never called */
+#endif
+
 typedef const fmi2ValueReference *References;
 
 enum { SETTABLE = N_U + N_P, REALS = N_U + N_P + N_Y };
+enum { WITH_OUTPUTS = SAMPLED ? 0 : SUBSTEPS - 1 }; /* the substep that evaluates them */
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8 }; /* modes */
 
 typedef struct { /* what fmi2GetFMUstate saves and serialises; without padding */
@@ -41,6 +52,8 @@ typedef struct {
     State now;
     fmi2CallbackFunctions callbacks;
     double trial[N_X], after[N_X], sample[N_Y];
+    double shared[N_Z + 1], next[N_Z + 1]; /* z, and the one after a step */
+    double shared_time;                    /* for which z was evaluated; NAN: it is out of date */
     char name[];
 } Model;
 
@@ -123,11 +136,12 @@ typedef struct { /* room in which a function calls the look-ups of tables */
     double w[N_W + 1];
 } Room;
 
-static void evaluate_output(Model *m, double time, double *y) {
+static void evaluate_output(Model *m, double time) {
     const double *arguments[N_ARG] = {m->now.x, m->now.reals, m->now.reals + N_U, &time};
-    double *results[N_RES] = {y};
+    double *results[N_RES] = {m->now.reals + SETTABLE, m->shared};
     Room room;
     output(arguments, results, room.iw, room.w, 0);
+    m->shared_time = time;
 }
 
 /* Bring x0 and y up to date with what was set. */
@@ -140,7 +154,7 @@ static void refresh(Model *m) {
         m->now.start_due = 0;
     }
     if (m->now.output_due) {
-        evaluate_output(m, m->now.time, m->now.reals + SETTABLE);
+        evaluate_output(m, m->now.time);
         m->now.output_due = 0;
     }
 }
@@ -151,6 +165,7 @@ static void restart(Model *m) {
     memcpy(m->now.reals, starts, SETTABLE * sizeof(double));
     m->now.mode = INSTANTIATED;
     m->now.start_due = m->now.output_due = 1;
+    m->shared_time = NAN;
 }
 
 /* --- life of an instance -------------------------------------------------------------------- */
@@ -250,7 +265,10 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
             return fail(m, fmi2Error, "parameter %s is fixed; set it before the end of "
                         "initialisation mode", names[vr[i]]);
     }
-    for (size_t i = 0; i < n; i++) m->now.reals[vr[i]] = value[i];
+    for (size_t i = 0; i < n; i++) {
+        m->now.reals[vr[i]] = value[i];
+        if (vr[i] >= N_U) m->shared_time = NAN;
+    }
     if (!initialized) m->now.start_due = 1;
     if (!initialized || !SAMPLED) m->now.output_due = 1;
     return fmi2OK;
@@ -275,15 +293,21 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     if (!isfinite(start + size))
         return fail(m, fmi2Error, "a step from t = %s by %s s has no end", number(start).text,
                     number(size).text);
-    double time, h = size / SUBSTEPS;
-    const double *arguments[N_ARG] = {m->trial, m->now.reals, m->now.reals + N_U, &time, &h};
-    double *results[N_RES] = {m->after};
+    double time, h = size / SUBSTEPS, end = start + size;
+    double *const y = SAMPLED ? m->sample : m->now.reals + SETTABLE;
+    const double *arguments[N_ARG] = {m->trial, m->now.reals, m->now.reals + N_U, &time, &h, &end,
+                                      m->shared};
+    double *results[N_RES] = {m->after, y, m->next};
     Room room;
     if (m->now.start_due) refresh(m);
+    if (N_Z && m->shared_time != start) evaluate_output(m, start);
+    /* Until the step is accepted, a plant's outputs are to be evaluated again. */
+    m->now.output_due = !SAMPLED;
+    m->shared_time = NAN;
     memcpy(m->trial, m->now.x, sizeof m->trial);
     for (int k = 0; k < SUBSTEPS; k++) {
         time = start + k * size / SUBSTEPS;
-        step(arguments, results, room.iw, room.w, 0);
+        (k == WITH_OUTPUTS ? advance : substep)(arguments, results, room.iw, room.w, 0);
         memcpy(m->trial, m->after, sizeof m->trial);
     }
     int i = first_not_finite(m->trial, N_X);
@@ -293,7 +317,6 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
                           "the state stays as before the step");
     }
     if (SAMPLED) {
-        evaluate_output(m, start, m->sample);
         if ((i = first_not_finite(m->sample, N_Y)) >= 0) {
             m->now.time = start;
             return not_finite(m, fmi2Discard, names[SETTABLE + i], m->sample[i], start, DIVISION,
@@ -302,8 +325,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
         memcpy(m->now.reals + SETTABLE, m->sample, sizeof m->sample);
     }
     memcpy(m->now.x, m->trial, sizeof m->trial);
-    m->now.time = start + size;
-    m->now.output_due = !SAMPLED;
+    memcpy(m->shared, m->next, sizeof m->shared);
+    m->now.time = m->shared_time = end;
+    m->now.output_due = 0;
     return fmi2OK;
 }
 
@@ -371,6 +395,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     Model *m = c;
     if (!is_ours(m, state)) return fmi2Error;
     memcpy(&m->now, state, sizeof(State));
+    m->shared_time = NAN;
     return fmi2OK;
 }
 

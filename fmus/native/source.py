@@ -10,14 +10,18 @@ from collections.abc import Iterable
 import casadi as ca
 
 from hapticlink.components.component import Component
+from hapticlink.fmus.native.pieces import split
+from hapticlink.fmus.one_pass import one_pass
 
 
-def component_header(component: Component) -> str:
-    """Sizes, names, start values and functions; the same text for the same component.
+def component_source(component: Component) -> tuple[str, tuple[str, ...]]:
+    """component.h (sizes, names, start values and functions) and the texts of further C files, with
+    pieces of long functions; the same texts for the same component.
 
-    The functions are `static`, so that their names (initialize, step, output) cause no conflict.
+    The functions are `static`, so that their names (initialize, output, advance) cause no conflict.
     """
-    text = functions((component.initialize, component.step, component.output))
+    parts = one_pass(component)
+    text, pieces = functions(parts.functions)
     settable = (*component.inputs, *component.parameters)
     fixed = [False] * len(component.start_inputs)
     fixed += [v.variability == "fixed" for v in component.parameters for _ in v.names]
@@ -28,12 +32,13 @@ def component_header(component: Component) -> str:
         "N_P": len(component.start_parameters),
         "N_Y": sum(v.size for v in component.outputs),
         "N_X": sum(v.size for v in component.states),
+        "N_Z": parts.n_shared,
         "SUBSTEPS": component.substeps,
         "SAMPLED": int(component.timing == "sampled"),
         # Working memory that the functions need to call the look-ups of tables.
         **{f"N_{of.upper()}": _room(text, of) for of in ("arg", "res", "iw", "w")},
     }
-    return "\n".join(
+    header = "\n".join(
         [
             *(f"#define {name} {value}" for name, value in sizes.items()),
             _table(
@@ -46,6 +51,7 @@ def component_header(component: Component) -> str:
             text,
         ]
     )
+    return header, pieces
 
 
 def _table(declared: str, entries: Iterable[str]) -> str:
@@ -68,9 +74,9 @@ def _room(text: str, of: str) -> int:
     return max(int(n) for n in re.findall(rf"\*sz_{of} = (\d+);", text))
 
 
-def functions(made: Iterable[ca.Function]) -> str:
+def functions(made: Iterable[ca.Function]) -> tuple[str, tuple[str, ...]]:
     """Static C functions in which each instruction of CasADi's virtual machine is a statement on
-    local variables.
+    local variables, and the C files with the pieces of those that are long.
 
     CasADi's tests for missing arguments and results are left out, since `fmi2.c` passes all of
     them: with these branches the time to compile grows with the square of the length.
@@ -80,4 +86,4 @@ def functions(made: Iterable[ca.Function]) -> str:
         generator.add(function if function.is_a("SXFunction") else function.expand())
     text = "#define CASADI_SYMBOL_EXPORT static\n" + generator.dump()
     text = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", text)
-    return re.sub(r"if \(res\[\d+\]!=0\) ", "", text)
+    return split(re.sub(r"if \(res\[\d+\]!=0\) ", "", text))

@@ -125,17 +125,14 @@ def _needs(scene: Any, time: Timeline) -> None:
         for need in found:
             if need.needed == needed:
                 say(f"  {need.part}: {need.why}")
-    say("\noperations of a step and of its outputs, signals in and out")
+    say("\noperations of a step and its outputs, signals in and out")
     rows = {}
     for title, skip in (("as it is", True), ("nothing left out", False)):
         rows[title] = costs.costs(scene, time, skip=skip)
         say(f"  {title}")
         for row in rows[title]:
             ports = sum(row.cost.inputs.values()), sum(row.cost.outputs.values())
-            say(
-                f"    {row.name}: {row.cost.step} + {row.cost.output} operations, "
-                f"{ports[0]} + {ports[1]} signals"
-            )
+            say(f"    {row.name}: {row.cost.step} operations, {ports[0]} + {ports[1]} signals")
         operations, signals = (sum(getattr(r, k) for r in rows[title]) for k in _PER_TICK)
         say(f"    a haptic tick: {operations:.0f} operations, {signals:.0f} signals")
 

@@ -23,7 +23,7 @@ class BlockCost:
     @property
     def operations(self) -> float:
         """Arithmetic operations per haptic tick, on average."""
-        return self.steps * (self.cost.step + self.cost.output)
+        return self.steps * self.cost.step
 
     @property
     def signals(self) -> float:

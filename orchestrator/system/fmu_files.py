@@ -52,6 +52,7 @@ def fmu_files(
                 packaging=scene.packaging,
                 platforms=platforms,
                 starts=given,
+                poll=interrupt.check,
             )
         except CompilerError as error:
             interrupt.check()  # Ctrl-C in a terminal ends the compiler too

@@ -23,7 +23,7 @@ from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.fmus.archive import entries
 from hapticlink.fmus.native.archive import WRAPPER
 from hapticlink.fmus.native.compiler import compile_library
-from hapticlink.fmus.native.source import component_header
+from hapticlink.fmus.native.source import component_source
 from tests.attack import cases
 from tests.attack.caller import TOLD, Target
 from tests.fmus import sample_components
@@ -109,7 +109,7 @@ def _compiled(
 def _sources(component: Component, folder: Path) -> Path:
     room = folder / component.name
     room.mkdir(parents=True)
-    text = f'#define GUID "{GUID}"\n' + component_header(component)
+    text = f'#define GUID "{GUID}"\n' + component_source(component)[0]
     (room / "component.h").write_text(text)
     return room
 

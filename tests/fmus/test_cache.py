@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import threading
+import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -124,7 +126,9 @@ def test_a_cache_that_cannot_be_written_is_told_and_done_without(place, room, ca
     assert f"the cache {place} cannot be written" in caplog.text
 
 
-def test_races_end_with_one_whole_file(place, room):
+def test_processes_of_two_machines_end_with_one_whole_file(place, room, monkeypatch):
+    """Their locks do not see each other."""
+    monkeypatch.setattr(cache, "_alone", lambda *_: nullcontext())
     paths, together = [], threading.Barrier(4)
 
     def race() -> None:
@@ -141,6 +145,39 @@ def test_races_end_with_one_whole_file(place, room):
         thread.join()
     assert len(set(paths)) == 1
     assert files(place) == ["gain.fmu"]
+
+
+def test_who_needs_the_same_fmu_waits_for_it_and_says_so(place, room, caplog):
+    builder, polled = Builder(), []
+
+    def slow(folder: Path) -> Path:
+        other.start()
+        while not polled:  # it waits
+            time.sleep(0.001)
+        return builder(folder)
+
+    def wait() -> None:
+        paths.append(cached({"block": "gain"}, builder, room, lambda: polled.append(True)))
+
+    paths: list[Path] = []
+    other = threading.Thread(target=wait)
+    paths.append(cached({"block": "gain"}, slow, room))
+    other.join()
+    assert builder.calls == 1
+    assert paths[0] == paths[1]
+    assert caplog.messages == ["waiting for another process that builds gain"]
+
+
+def test_whoever_waits_can_be_interrupted(place, room):
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    def build(folder: Path) -> Path:
+        return cached(MATERIAL, Builder(), room, interrupted)  # waits for this very build
+
+    with pytest.raises(KeyboardInterrupt):
+        cached(MATERIAL, build, room)
+    assert cached(MATERIAL, Builder(), room).exists()
 
 
 def test_off_builds_every_time_and_keeps_nothing(monkeypatch, room):

@@ -40,8 +40,9 @@ from hapticlink.fmus.blocks import component
 from hapticlink.fmus.build import build, build_native
 from hapticlink.fmus.check import check_fmu, session
 from hapticlink.fmus.errors import FmuError
-from hapticlink.fmus.native import compile_library, compiler
-from hapticlink.fmus.native.source import component_header
+from hapticlink.fmus.native import compile_library, compiler, pieces
+from hapticlink.fmus.native.compiler_cache import compiler_cache
+from hapticlink.fmus.native.source import component_source
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene import blocks
 from tests.fmus import sample_components
@@ -62,7 +63,11 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"})
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
     made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
-    return {n: (build(c, folder / "p"), build_native(c, folder / "n")) for n, c in made.items()}
+    # Several are named virtual_mechanism.
+    return {
+        n: (build(c, folder / n / "python"), build_native(c, folder / n / "native"))
+        for n, c in made.items()
+    }
 
 
 SINE = CoordinateSine(mean=0.1, amplitude=0.2, frequency=3.0, phase=0.3)
@@ -199,9 +204,37 @@ def test_plain_python_gives_the_same_bits(both, name, monkeypatch):
     np.testing.assert_array_equal(by_c, driven(both[name][0]))
 
 
+@pytest.mark.parametrize("name", ["arm", "driven"])
+def test_pieces_of_long_functions_give_the_same_bits(both, name, tmp_path, monkeypatch):
+    """The arm calls look-ups; the statements of the slider are pieces in several files."""
+    for size, statements in (("LONGEST", 30), ("PIECE", 20), ("FILE", 5)):
+        monkeypatch.setattr(pieces, size, statements)
+    made = arm(300) if name == "arm" else driven_slider()
+    header, files = component_source(made)
+    assert header.count("noinline") > len(files) >= 1
+    split = build_native(made, tmp_path)
+    np.testing.assert_array_equal(driven(split), driven(both[name][0]))
+
+
+def test_processes_that_compile_at_the_same_time_have_a_cache_each(tmp_path, monkeypatch):
+    monkeypatch.delenv("ZIG_GLOBAL_CACHE_DIR", raising=False)
+    monkeypatch.setattr("hapticlink.fmus.cache.user_folder", lambda: tmp_path)
+    with compiler_cache() as first:
+        folder = Path(first["ZIG_GLOBAL_CACHE_DIR"])
+        (folder / "o").mkdir(parents=True)
+        (folder / "o" / "libc.a").write_text("built")
+        with compiler_cache() as second:
+            other = Path(second["ZIG_GLOBAL_CACHE_DIR"])
+            assert (other / "o" / "libc.a").read_text() == "built"
+            assert not (other / "o" / "libc.a").samefile(folder / "o" / "libc.a")
+    with compiler_cache() as third:
+        assert third == first
+    assert other != folder
+
+
 def test_rows_of_a_table_are_data(both):
     """The C text has as many statements for a path of 3000 rows as for one of 300."""
-    short, long = (component_header(arm(rows)) for rows in (300, 3000))
+    short, long = (component_source(arm(rows))[0] for rows in (300, 3000))
     assert len(long) > 5 * len(short)
     assert long.count(";") == short.count(";")
 
@@ -461,7 +494,7 @@ def test_start_values_and_names_stand_in_the_c_text(value, percent):
     name = "load%" if percent else "load"
     b = Block(inputs=[Variable(name, (), "1", value)], outputs=[Variable("y")])
     made = b.component("c", "", "sampled", initial={}, step={}, output={"y": b.u[name]})
-    text = component_header(made)
+    text, _ = component_source(made)
     literal = text.split("starts[] = {")[1].split(",")[0]
     known = literal.replace("NAN", "nan").replace("INFINITY", "inf")
     assert array("d", [float(known)]).tobytes() == array("d", [value]).tobytes() or value != value

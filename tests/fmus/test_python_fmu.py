@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
+import os
 import shutil
 import subprocess
 import sys
@@ -63,7 +65,7 @@ def test_an_exception_inside_a_step_is_a_discard(opened):
     at = opened("spring")
     fmu = Named(at).start()
     slave = living_slaves()[-1]
-    slave._evaluate_step = None
+    slave._evaluate = [None]
     with pytest.raises(FMICallException) as raised:
         fmu.step(0.0, 0.1)
     assert raised.value.status == DISCARD
@@ -111,7 +113,7 @@ def test_only_pythonfmu_and_the_slave_can_be_imported_from_resources(opened):
         p.name for p in resources.iterdir() if p.is_dir()
     }
     module = (resources / "slavemodule.txt").read_text().strip()
-    assert importable == {"pythonfmu", module}
+    assert importable == {"pythonfmu", module, f"{module}_slave"}
     assert module.startswith("hapticlink_")
 
 
@@ -126,6 +128,38 @@ def test_nothing_is_left_behind(fmus, monkeypatch, tmp_path):
     assert living_slaves() == []
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_an_instance_leaves_less_than_2_kb(opened):
+    """pythonfmu itself leaves a list. FMPy's own objects are left out: fmi2Instantiate directly."""
+    at = opened("spring")
+    kept = at.instance()
+    guid, uri = at.description.guid.encode(), Path(at.folder, "resources").as_uri().encode()
+    instantiate, free = kept.dll.fmi2Instantiate, kept.dll.fmi2FreeInstance
+    instantiate.restype, free.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
+
+    def lives(count: int) -> None:
+        for _ in range(count):
+            one = instantiate(b"one", 1, guid, uri, ctypes.byref(kept.callbacks), 0, 0)
+            assert one
+            free(one)
+        gc.collect()
+
+    def classes() -> int:
+        return sum(isinstance(o, type) and o.__name__ == "HapticlinkSlave"
+                   and o.__module__ == type(living_slaves()[0]).__module__
+                   for o in gc.get_objects())  # fmt: skip
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    lives(100)
+    before, objects = resident(), len(gc.get_objects())
+    lives(1000)
+    assert classes() == 1
+    assert len(gc.get_objects()) - objects <= 1000 * 1.1
+    assert resident() - before < 1000 * 2000
+
+
 def living_slaves() -> list:
     gc.collect()
     return [o for o in gc.get_objects() if type(o).__name__ == "HapticlinkSlave"]
@@ -136,11 +170,12 @@ def test_a_damaged_fmu_is_found_out(fmus, tmp_path):
     with session(fmus["spring"]) as at:
         folder = Path(at.folder) / "resources"
         module = (folder / "slavemodule.txt").read_text().strip()
-        text = (folder / f"{module}.py").read_text()
+        text = (folder / f"{module}_slave.py").read_text()
         broken = text.replace("part[:] = array.array", "array.array")
         assert broken != text
-        (folder / f"{module}.py").unlink()
-        (folder / f"{module}_broken.py").write_text(broken)
+        (folder / f"{module}_broken_slave.py").write_text(broken)
+        entry = (folder / f"{module}.py").read_text().replace(module, f"{module}_broken")
+        (folder / f"{module}_broken.py").write_text(entry)
         (folder / "slavemodule.txt").write_text(f"{module}_broken\n")
         archive = shutil.make_archive(str(tmp_path / "spring"), "zip", at.folder)
     findings = check_fmu(Path(archive).rename(tmp_path / "spring.fmu"))

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 
 from hapticlink.orchestrator.base.faults import FmuFault, Interrupted
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Table, read_table
@@ -165,3 +167,23 @@ def test_a_full_disk_is_a_fault(
 def test_calls_are_counted(slave: Slave, tmp_path: Path) -> None:
     outcome = run(alone(slave("Counted")), RunFolder(tmp_path))
     assert outcome.calls == {"Counted": {"get": 64, "step": 64}}
+
+
+def test_loading_and_unloading_are_no_part_of_the_runs_time(
+    slave: Slave, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fmu, pauses = slave("Counted"), []
+
+    def paused(method: Callable[[InProcess], object]) -> Callable[[InProcess], object]:
+        def call(instance: InProcess) -> object:
+            time.sleep(0.3)
+            pauses.append(method.__name__)
+            return method(instance)
+
+        return call
+
+    for name in ("_load", "close"):
+        monkeypatch.setattr(InProcess, name, paused(getattr(InProcess, name)))
+    outcome = run(alone(fmu), RunFolder(tmp_path))
+    assert pauses == ["_load", "close"]
+    assert outcome.wall_time < 0.3

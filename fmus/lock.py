@@ -1,0 +1,50 @@
+"""Locks between processes of a machine, which end with the process that holds them."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+POLL = 0.05
+"""Time (s) between two attempts to take a lock."""
+
+
+@contextmanager
+def attempted(path: Path) -> Iterator[bool]:
+    """Whether the lock of the file `path`, which is made if necessary, is held within the context:
+    not if it is held already, by another process or another call in this one. Raises OSError where
+    the file cannot be opened."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("ab") as file:
+        yield _taken(file)
+
+
+@contextmanager
+def held(path: Path, poll: Callable[[], object]) -> Iterator[None]:
+    """Holds the lock of the file `path`; calls `poll` from time to time while waiting for it."""
+    while True:
+        with attempted(path) as taken:
+            if taken:
+                yield
+                return
+        poll()
+        time.sleep(POLL)
+
+
+def _taken(file: IO[bytes]) -> bool:
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
