@@ -3,6 +3,7 @@
 import os
 import signal
 
+import pythonfmu  # noqa: F401
 from hypothesis import settings
 
 # The same draws every time: a test that fails here fails everywhere.
@@ -17,3 +18,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 # inherit.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# pythonfmu is imported above from where it is installed: after a test in which FMPy runs a Python
+# FMU, it would be the copy of that FMU, whose folder is gone, and runs in this process could not
+# tell that theirs is the same.

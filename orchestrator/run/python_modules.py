@@ -10,6 +10,7 @@ are its top-level modules and packages. Two are the same where their files have 
 
 from __future__ import annotations
 
+import re
 import sys
 import zlib
 from collections.abc import Iterable
@@ -23,6 +24,9 @@ from hapticlink.orchestrator.system.system import Fmu
 Modules = dict[str, dict[str, int]]
 """For each top-level module name, the CRC-32 of its files by their path in resources/."""
 
+OURS = re.compile("hapticlink_[0-9a-f]{16}(_slave)?")
+"""Names that contain a hash of the whole FMU: equal names are equal modules, also where the folder
+that one was imported from is gone."""
 _loaded: Modules = {}
 """Modules of all FMUs that this process has loaded; they stay imported when FMUs are freed."""
 
@@ -63,6 +67,8 @@ def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
 def _is_mine(name: str, files: dict[str, int]) -> bool:
     """Whether `import name` would give an FMU its own module."""
     known = _loaded.get(name)
+    if OURS.fullmatch(name):
+        return True
     if known is None:
         module = sys.modules.get(name)
         if module is None:
