@@ -13,6 +13,7 @@ import numpy as np
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.run_folder import RunFolder
@@ -20,6 +21,7 @@ from hapticlink.orchestrator.results.tables import Results, Table, load, size
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.beside import SAMPLES, beside
 from hapticlink.orchestrator.run.event_loop import Outcome, Progress, run
+from hapticlink.orchestrator.run.fetched import with_fetched
 from hapticlink.orchestrator.run.open_fmus import isolated
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -51,16 +53,25 @@ class Experiment:
         if self.outcome.published:
             return load(self.folder)
         none: dict[str, Table] = {}
-        for clock, names in _columns(self.system).items():
-            columns = ("time", *names)
+        written = _columns(self.system)
+        for clock in self.run["rates"]:
+            columns = ("time", *written.get(clock, ()))
             none[clock] = Table(columns, np.zeros((0, len(columns))), none)
         return Results(self.folder, self.run, none)
 
 
 def _columns(system: System) -> dict[str, list[str]]:
-    """The column names of each clock's table."""
+    """The column names of each clock's table, if it has one."""
     signals = SignalVector(system)
-    return {clock.name: signals.columns(clock.name) for clock in system.timeline.clocks}
+    found = {clock.name: signals.recorded(clock.name) for clock in system.timeline.clocks}
+    return {clock: [*columns] for clock, columns in found.items() if columns is not None}
+
+
+def _left_out(every: System, system: System) -> list[str]:
+    """The outputs `fmu.port` of which no entry is written."""
+    written = None if system.recorded is None else {entry_of(name)[0] for name in system.recorded}
+    outputs = [f"{u.name}.{s.port}" for u in every.fmus for s in u.description.outputs]
+    return [] if written is None else [n for n in dict.fromkeys(outputs) if n not in written]
 
 
 def simulate(
@@ -92,23 +103,25 @@ def _simulated(
 ) -> Experiment:
     begin = perf_counter()
     read = open_scene.load(scene, options)
-    with built(read) as system:
+    with built(read) as every:
+        system = with_fetched(every)
         plan = Plan(system)
         plan.check()
         build_time = perf_counter() - begin
-        story = _story(read, plan)
+        tables = _columns(system)
+        story = _story(read, plan, tables) | {"not_recorded": _left_out(every, system)}
         if real_time:
             clocks = dict.fromkeys(beside(plan)[0].values())
-            story["files"] += [f"{clock}_{SAMPLES}.csv" for clock in clocks]
+            story["files"] += [f"{clock}_{SAMPLES}.{read.record.format}" for clock in clocks]
         alone = isolated(system.fmus)
-        foreign = [fmu.name for fmu in read.fmu if fmu.path]
-        risky = any(name not in alone for name in foreign)
-        with RunFolder(folders.ensure(folder), story, bool(foreign), csv) as results:
+        risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
+        csv = csv and read.record.format == "csv"
+        with RunFolder(folders.ensure(folder), story, csv) as results:
             with crash_monitor.watched(folder) if risky else nullcontext():
                 outcome = run(plan, results, progress, real_time)
             ending = _ending(system, outcome, build_time)
             try:
-                results.end(ending, _columns(system))
+                results.end(ending, tables)
             except OSError as error:
                 if outcome.fault is None:
                     outcome.fault = Fault(f"{folder}: {error.strerror or error}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -93,7 +93,8 @@ def energies(system: System, booked: Mapping[str, Energy]) -> dict[str, Any]:
     }
 
 
-def _story(scene: Scene, plan: Plan) -> dict[str, Any]:
+def _story(scene: Scene, plan: Plan, tables: Iterable[str]) -> dict[str, Any]:
+    """What is known before the run; `tables` are the clocks that have one."""
     system, base = plan.system, plan.system.timeline.base
     return {
         "scene": scene.tables(),
@@ -102,7 +103,7 @@ def _story(scene: Scene, plan: Plan) -> dict[str, Any]:
         | {"python": platform.python_version()},
         "plugins": plugins.loaded(),
         "seeds": _seeds(scene, system),
-        "files": ["run.json", *(f"{c.name}.csv" for c in system.timeline.clocks)],
+        "files": ["run.json", *(f"{clock}.{scene.record.format}" for clock in tables)],
         "rates": [c.name for c in system.timeline.clocks],
         "clocks": clocks(system.timeline),
         "stop_when": str(system.ends_when or ""),

@@ -1,4 +1,4 @@
-/* A ring of FMUs called from C and nothing else: set, step and get of each. */
+/* FMUs called from C and nothing else: set, step and get of each, in a ring, or in any system. */
 
 #include <stddef.h>
 
@@ -14,4 +14,31 @@ __attribute__((visibility("default"))) void ring(int n, void **fmus, Set set, St
         for (int i = 0; i < n; i++) step(fmus[i], k * h, h, 1);
         for (int i = 0; i < n; i++) get(fmus[i], outputs, signals, y + signals * i);
     }
+}
+
+typedef struct {
+    void *fmu;
+    Set set;
+    Step step;
+    Get get;
+    const unsigned *inputs, *outputs;
+    size_t n_inputs, n_outputs;
+    const long *sources;
+    double *u, *y, rate;
+} Bare;
+
+/* `values` are the outputs y of all FMUs, `sources` the places of an FMU's inputs in them. An FMU
+ * steps at its rate (Hz), which is at most that of the loop. */
+__attribute__((visibility("default"))) void loop(int n, Bare *fmus, const double *values,
+                                                 double rate, long steps) {
+    for (long k = 0; k < steps; k++)
+        for (int i = 0; i < n; i++) {
+            Bare *f = fmus + i;
+            const long at = (long)(k * f->rate / rate);
+            if ((long)((k + 1) * f->rate / rate) == at) continue;
+            for (size_t j = 0; j < f->n_inputs; j++) f->u[j] = values[f->sources[j]];
+            if (f->n_inputs) f->set(f->fmu, f->inputs, f->n_inputs, f->u);
+            f->step(f->fmu, at / f->rate, 1 / f->rate, 1);
+            f->get(f->fmu, f->outputs, f->n_outputs, f->y);
+        }
 }

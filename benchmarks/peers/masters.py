@@ -21,6 +21,7 @@ from fmpy import extract, fmi2, read_model_description
 from hapticlink.fmus.native import compile_library
 
 STEP = 1 / 512
+BARE = "bare_loop.c"
 
 
 class Ring:
@@ -103,7 +104,7 @@ def bare(ring: Ring, steps: int, folder: Path) -> float:
     """A loop in C over the FMUs' functions alone: what they cost themselves."""
     library = folder / "bare.so"
     if not library.exists():
-        compile_library(Path(__file__).parent / "bare_loop.c", library)
+        compile_library(Path(__file__).parent / BARE, library)
     with _slaves(ring, folder) as slaves:
         fmus = (ctypes.c_void_p * ring.n)(*(slave.component for slave in slaves))
         names = ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")

@@ -7,6 +7,7 @@ from pathlib import Path
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.plan import explain as explained
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.run.fetched import with_fetched
 from hapticlink.orchestrator.scene import find
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -38,4 +39,4 @@ def explain(scene: str | Path | Scene, options: Options = ()) -> list[str]:
     are computed. Raises InputFault for a scene that cannot be run.
     """
     with built(open_scene.load(scene, options)) as system:
-        return list(explained.explain(Plan(system), explained.PRINTED))
+        return list(explained.explain(Plan(with_fetched(system)), explained.PRINTED))

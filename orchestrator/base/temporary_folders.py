@@ -54,11 +54,12 @@ def clear(ended: int | None = None) -> None:
             if not found or not entry.is_dir(follow_symlinks=False):
                 continue
             owner, own = int(found[1]), entry.stat(follow_symlinks=False).st_uid == os.getuid()
-            if own and (owner == ended or not _lives(owner)):
+            if own and (owner == ended or not lives(owner)):
                 shutil.rmtree(entry.path, ignore_errors=True)
 
 
-def _lives(process: int) -> bool:
+def lives(process: int) -> bool:
+    """Whether a process exists. Not for Windows, where asking may end it."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:

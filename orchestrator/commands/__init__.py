@@ -32,6 +32,7 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
         "sweep": "Run many variants of a scene in parallel: one table and figure.",
         "study": "Study which hold suits which rate: tables, figures and a page.",
         "bench": "Measure run time against error, beside other codes.",
+        "recover": "Make the CSVs of a run that was killed.",
         "reproduce": "Reproduce the report's figures, with a page of the findings.",
     },
     no_function,

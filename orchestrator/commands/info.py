@@ -53,6 +53,7 @@ def info(
     from hapticlink.orchestrator.plan import sample_ages
     from hapticlink.orchestrator.plan.plan import Plan
     from hapticlink.orchestrator.results import summary
+    from hapticlink.orchestrator.run.fetched import with_fetched
     from hapticlink.orchestrator.system.built import built
 
     if scene is None:
@@ -63,6 +64,7 @@ def info(
     with built(read) as made:
         time = made.timeline
         start = at_start(made) if read.linkage else {}
+        fetched = with_fetched(made).fmu
     say(f"{read.title}\n{read.description.strip()}".strip())
     say(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
     if read.linkage and start:
@@ -70,7 +72,8 @@ def info(
             say(f"  {line}")
     for fmu in made.fmus:
         timing = fmu.description.timing
-        say(f"  {fmu.name}: {timing}, at {fmu.clock}, {len(fmu.description.outputs)} outputs")
+        every, some = (len(of.description.outputs) for of in (fmu, fetched[fmu.name]))
+        say(f"  {fmu.name}: {timing}, at {fmu.clock}, {every} outputs, {some} fetched")
     say("\nconnections (age of the newest sample when it is used, ms)")
     ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(made)).items()}
     for connection in made.connections:

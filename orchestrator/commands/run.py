@@ -39,6 +39,7 @@ def run(
     """Run a scene; write CSV files, run.json, plan.txt, figures to OUT (default runs/<scene>)."""
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.results import summary
+    from hapticlink.orchestrator.results.tables import TABLES
 
     if explain:
         say(*api.explain(scene, options(set, swap)), sep="\n")
@@ -59,10 +60,9 @@ def run(
     if wall_time:  # none where a signal came before the first event
         speed = made.run["end"]["time"] / wall_time
         say(f"  {wall_time:.2f} s of run time, {speed:.1f} times real time")
-    tables = (f"{rate}.csv" for rate in made.run["rates"])
-    others = (name for name in made.run["files"] if not name.endswith(".csv"))
     if made.folder:
-        say(f"  {folder}/: {', '.join([*tables, *others])}")
+        names = sorted(made.run["files"], key=lambda name: not name.endswith(TABLES))
+        say(f"  {folder}/: {', '.join(names)}")
     else:
         say(f"  {folder}/ is unchanged: the run has no row")
     return Fault.exit_status if made.fault else 0

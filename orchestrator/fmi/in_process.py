@@ -39,8 +39,8 @@ WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 
 
 class InProcess(Instance):
-    """An FMU of FMI 2.0 whose library is loaded into this process. `slave`, `gets` and `retry` are
-    for the compiled loop."""
+    """An FMU of FMI 2.0 whose library is loaded into this process. `slave`, `gets`, `fewer` and
+    `retry` are for the compiled loop."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -49,6 +49,8 @@ class InProcess(Instance):
         self._saved_time: dict[int, float] = {}
         self._initialized = False
         self._status = 0
+        self._setters = 0
+        """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
         self.slave: Any = None
         self.holds_python = False
         self._key = messages.opened()
@@ -66,10 +68,17 @@ class InProcess(Instance):
             raise self._fault(f"could not be loaded: {said}", 0.0) from error
         finally:
             os.chdir(before)  # FMPy leaves it changed where a library cannot be loaded
-        self.gets = self._transfers("Get", self.description.outputs, self.outputs)
+        outputs = self.description.outputs
+        self.gets = self.fewer = self._transfers("Get", outputs, self.outputs)
+        if self.seldom:
+            often = [s for s in outputs if s.name not in self.seldom]
+            self.fewer = self._transfers(
+                "Get", often, self.outputs, places=[*map(outputs.index, often)]
+            )
         do_step = self._stepper()
 
         def advance(time: float, size: float) -> int:
+            self.place.steps += 1
             try:
                 status = do_step(time, size)
             except SystemError as error:
@@ -78,7 +87,7 @@ class InProcess(Instance):
 
         self._advance: Callable[[float, float], int] = advance
         if self.policy.discard == "retry" and Retry.possible(self.description):
-            self.retry = Retry(self.slave, self.description.fmi, advance)
+            self.retry = Retry(self.slave, self.description.fmi, self.place, advance)
             self._advance = self.retry.step
 
     def _instantiate(self) -> Any:
@@ -134,8 +143,9 @@ class InProcess(Instance):
         scalars: Sequence[Scalar],
         values: Vector,
         exact: Mapping[str, int] = MappingProxyType({}),
+        places: Sequence[int] | None = None,
     ) -> list[Transfer]:
-        return transfers(self.slave, self.description.fmi, verb, scalars, values, exact)
+        return transfers(self.slave, self.description.fmi, verb, scalars, values, exact, places)
 
     # --- initialisation -------------------------------------------------------------------
 
@@ -149,15 +159,18 @@ class InProcess(Instance):
         order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
         where, conversions = [places[i] for i in order], [scalars[i].conversion for i in order]
         setting = self._setting([scalars[i] for i in order], exact)
-        return Setter(where, conversions, *setting, self._set_all)
+        self._setters += self.description.block is not None
+        return Setter(where, conversions, *setting, self._set_all, self.place, self._setters)
 
     def _set_all(self, transfers: Sequence[Transfer]) -> None:
-        if not self.ended:
-            self._carry_out(transfers)
+        self._carry_out(transfers, "sets")
 
-    def _carry_out(self, transfers: Sequence[Transfer], passing: bool = False) -> None:
+    def _carry_out(
+        self, transfers: Sequence[Transfer], counted: str, passing: bool = False
+    ) -> None:
         try:
             for transfer in transfers:
+                setattr(self.place, counted, getattr(self.place, counted) + 1)
                 if (status := transfer.call()) > WARNING:
                     raise self.failed(transfer.name, status)
         except SystemError as error:
@@ -173,6 +186,7 @@ class InProcess(Instance):
             self.retry.renew = varying.renew
 
         def set_from(board: Vector) -> None:
+            self.place.setter = 0  # the inputs move on from what was set
             if not self.ended and (status := varying.set(board)) > WARNING:
                 raise self.failed(varying.name, status)
 
@@ -220,8 +234,13 @@ class InProcess(Instance):
 
     # --- the loop -------------------------------------------------------------------------
 
+    @property
+    def asked(self) -> list[Transfer]:
+        """The calls that `read` makes."""
+        return self.gets if self.due.value else self.fewer
+
     def read(self) -> None:
-        self._carry_out(self.gets, passing=True)
+        self._carry_out(self.asked, "gets", passing=True)
 
     @property
     def smaller_steps(self) -> int:
@@ -267,7 +286,7 @@ class InProcess(Instance):
     def slot(self, slot: int) -> Saved:
         """The storage of a slot, which may not have been saved to."""
         if slot not in self._saved:
-            self._saved[slot] = Saved(self.slave, self.description.fmi)
+            self._saved[slot] = Saved(self.slave, self.description.fmi, self.place)
         return self._saved[slot]
 
     def rollback(self, slot: int = 0) -> None:
@@ -288,6 +307,7 @@ class InProcess(Instance):
         restored = self._state("DeSerialize", "deserializeFMUState", state)
         try:
             self._state("Set", "setFMUState", restored)
+            self.place.setter = 0
         finally:
             self.slave.freeFMUState(restored)
 

@@ -3,6 +3,7 @@ own (`isolated`)."""
 
 from __future__ import annotations
 
+import ctypes
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -31,7 +32,8 @@ class Instance(ABC):
 
     outputs: the view that `get` fills. held: number of outputs held at their last value by
     `faults.nan`. good: the last finite outputs, None unless these are held. place: where the
-    instance stands.
+    instance stands. seldom: the outputs, by name, that are only read where `due`, the table's next
+    row is written.
     """
 
     def __init__(
@@ -48,6 +50,9 @@ class Instance(ABC):
         self.good: Vector | None = None
         self.place = Place()
         self._waiting: list[Callable[[], object]] = []
+        self.seldom: frozenset[str] = frozenset()
+        self.due = ctypes.c_int64(1)
+        self._counted = False
         self.bounds = Bounds(description, outputs)
         self._folder = folder or temporary_folders.new()
 
@@ -94,6 +99,11 @@ class Instance(ABC):
     @step_time.setter
     def step_time(self, seconds: float) -> None:
         self.place.step_time = seconds
+
+    @property
+    def calls(self) -> dict[str, int]:
+        """The number of calls of its functions in the loop, by kind."""
+        return self.place.calls() if self._counted else {}
 
     # --- settings while it runs -----------------------------------------------------------
 
@@ -227,8 +237,11 @@ class Instance(ABC):
                 raise self._fault(what, self.time, passing=True, repeatable=True)
 
     def _start_loop(self) -> None:
-        """Take the start values of the outputs as reference for their bounds."""
+        """Take the start values of the outputs as reference for their bounds, and count calls from
+        here."""
         self.bounds.start()
+        self.place.start()
+        self._counted = True
         if self.policy.nan == "hold":
             self.good = self.outputs.copy()
 

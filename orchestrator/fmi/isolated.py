@@ -8,7 +8,8 @@ awaited in `finish`, so that several FMUs step concurrently (`run.parallel_steps
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,8 @@ class Isolated(Instance):
     _dismissed = False
     _lost: FmuFault | None = None
     """How the process ended that was to close its FMU."""
+    _calls: Mapping[str, int] = MappingProxyType({})
+    """Known once the FMU is closed."""
 
     def _load(self) -> None:
         self._pending: list[tuple[int, bytes]] = []
@@ -85,6 +88,11 @@ class Isolated(Instance):
     def _died(self, how: Died) -> FmuFault:
         self._process = None
         return FmuFault(self.name, f"its process {how}", self.time)
+
+    @property
+    def calls(self) -> dict[str, int]:
+        """Counted by the worker, whose end loses them."""
+        return dict(self._calls)
 
     # --- the calls of a run ---------------------------------------------------------------
 
@@ -179,7 +187,7 @@ class Isolated(Instance):
         try:
             self.dismiss()
             if process is not None and process.busy:
-                self._answer()
+                self._calls = self._answer()
         except FmuFault as fault:
             self._lost = fault
         finally:

@@ -8,10 +8,25 @@ import ctypes
 class Place(ctypes.Structure):
     """time: where the instance stands. begin, size, end: of its newest step. step_time: spent in
     doStep. All in s. ended: whether it has requested the end of the simulation. waiting: whether
-    there are settings that it is to take before its next step."""
+    there are settings that it is to take before its next step. setter: the key of the Setter whose
+    values its inputs have, 0 where that is not known. The others count the calls of its functions
+    in the loop."""
 
     _fields_ = (
         *((name, ctypes.c_double) for name in ("time", "begin", "size", "end", "step_time")),
-        ("ended", ctypes.c_int64),
-        ("waiting", ctypes.c_int64),
+        *((name, ctypes.c_int64) for name in ("ended", "waiting", "setter")),
+        *((name, ctypes.c_int64) for name in ("gets", "sets", "steps", "saves", "rollbacks")),
     )
+
+    def calls(self) -> dict[str, int]:
+        """The number of calls of the loop by kind, without those that were not made."""
+        found = {name: getattr(self, name + "s") for name in _CALLS}
+        return {name: count for name, count in found.items() if count}
+
+    def start(self) -> None:
+        """Count from here."""
+        for name in _CALLS:
+            setattr(self, name + "s", 0)
+
+
+_CALLS = ("get", "rollback", "save", "set", "step")

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.place import Place
 
 WARNING, DISCARD = 1, 2
 HALVINGS = 10
@@ -18,18 +19,23 @@ _NEEDED = {
 
 
 class Saved:
-    """Storage for one FMU state. save and restore return the status of the call."""
+    """Storage for one FMU state. save and restore return the status of the call; `place` counts
+    them, and forgets which inputs the FMU has."""
 
-    def __init__(self, slave: Any, fmi: str) -> None:
+    def __init__(self, slave: Any, fmi: str, place: Place) -> None:
+        self._place = place
         state = "state" if fmi == "2" else "State"
         self._instance, self.state = ctypes.c_void_p(slave.component), ctypes.c_void_p()
         calls = (slave.dll[f"fmi{fmi}{verb}FMU{state}"] for verb in ("Get", "Set", "Free"))
         self.get, self.set, self._free = calls
 
     def save(self) -> int:
+        self._place.saves += 1
         return self.get(self._instance, ctypes.byref(self.state))
 
     def restore(self) -> int:
+        self._place.rollbacks += 1
+        self._place.setter = 0
         return self.set(self._instance, self.state)
 
     def free(self) -> None:
@@ -42,10 +48,12 @@ class Retry:
     begin: of the step (s). saved: the states by depth of halving. renew: sets varying inputs for a
     time (s) after the beginning of the step."""
 
-    def __init__(self, slave: Any, fmi: str, advance: Callable[[float, float], int]) -> None:
+    def __init__(
+        self, slave: Any, fmi: str, place: Place, advance: Callable[[float, float], int]
+    ) -> None:
         self._advance, self.smaller, self.begin = advance, 0, 0.0
         self.renew: Callable[[float], int] = lambda elapsed: 0
-        self.saved = [Saved(slave, fmi) for _ in range(HALVINGS + 1)]
+        self.saved = [Saved(slave, fmi, place) for _ in range(HALVINGS + 1)]
 
     @staticmethod
     def possible(description: Description) -> bool:

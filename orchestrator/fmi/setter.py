@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.fmi.place import Place
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.units import SAME, Linear
 
@@ -15,10 +16,13 @@ Places = NDArray[np.intp]
 
 
 class Setter:
-    """values[i] = factors[i] board[where[i]] + offsets[i], then the calls of `transfers`.
+    """values[i] = factors[i] board[where[i]] + offsets[i], then the calls of `transfers`, unless
+    the FMU has these values: inputs keep theirs (FMI 2.0.5 section 2.1.7).
 
-    factors and offsets are None where all are 1 and 0. Of arrays that are set as a whole, `into`
-    are the places of the values in `whole`, else None. carry_out makes the calls.
+    place: of the FMU. key: of this among the setters of the FMU, 0 where the FMU may change its
+    inputs itself, which are then set each time. factors and offsets are None where all are 1 and 0.
+    Of arrays that are set as a whole, `into` are the places of the values in `whole`, else None.
+    carry_out makes the calls.
     """
 
     def __init__(
@@ -29,7 +33,10 @@ class Setter:
         into: Places | None,
         transfers: Sequence[Transfer],
         carry_out: Callable[[Sequence[Transfer]], None],
+        place: Place,
+        key: int,
     ) -> None:
+        self.place, self.key, self._before = place, key, b""
         self.where, self.whole, self.into = np.array(where, dtype=np.intp), whole, into
         self.values = whole if into is None else np.zeros(len(where))
         self.factors: Vector | None = None
@@ -40,10 +47,17 @@ class Setter:
         self.transfers, self._carry_out = transfers, carry_out
 
     def __call__(self, board: Vector) -> None:
+        if self.place.ended:
+            return
         # "raise" would copy through a buffer.
         board.take(self.where, out=self.values, mode="clip")
         if self.factors is not None and self.offsets is not None:
             self.values.__imul__(self.factors).__iadd__(self.offsets)
+        before, self._before = self._before, self.values.tobytes()
+        if self.key and self.place.setter == self.key and self._before == before:
+            return
         if self.into is not None:
             self.whole[self.into] = self.values
+        self.place.setter = 0
         self._carry_out(self.transfers)
+        self.place.setter = self.key

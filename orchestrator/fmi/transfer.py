@@ -45,11 +45,12 @@ class Transfer:
         scalars: Sequence[Scalar],
         type_: str,
         values: Vector,
+        places: Sequence[int],
         exact: Mapping[str, int],
     ) -> None:
         chosen = [i for i, s in enumerate(scalars) if s.type == type_]
         self.name = f"fmi{fmi}{verb}{type_}"
-        self.values = values[chosen[0] : chosen[-1] + 1]
+        self.values = values[places[chosen[0]] : places[chosen[-1]] + 1]
         self.type, self.fmi = type_, fmi
         in_c = _IN_C.get(type_) or _BOOLEAN[fmi]
         self._boolean, self._whole = type_ == "Boolean", np.issubdtype(in_c, np.integer)
@@ -124,7 +125,10 @@ def transfers(
     scalars: Sequence[Scalar],
     values: Vector,
     exact: Mapping[str, int] = MappingProxyType({}),
+    places: Sequence[int] | None = None,
 ) -> list[Transfer]:
-    """One transfer per FMI type; `scalars` are sorted by type."""
+    """One transfer per FMI type. `scalars` are sorted by type, those of a type side by side at
+    their `places` in `values`, by default from the first on."""
+    places = range(len(scalars)) if places is None else places
     present = [t for t in TYPES if any(s.type == t for s in scalars)]
-    return [Transfer(slave, fmi, verb, scalars, t, values, exact) for t in present]
+    return [Transfer(slave, fmi, verb, scalars, t, values, places, exact) for t in present]

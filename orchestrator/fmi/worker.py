@@ -92,10 +92,14 @@ class Worker:
     def deserialize(self, state: bytes) -> None:
         self.instance.deserialize(state)
 
-    def close(self) -> None:
+    def close(self) -> dict[str, int]:
+        """Returns the number of calls of the loop, by kind."""
         instance, self._instance = self._instance, None
-        if instance is not None and (fault := instance.close()):
+        if instance is None:
+            return {}
+        if fault := instance.close():
             raise fault
+        return instance.calls
 
 
 def _told(fault: FmuFault) -> tuple[Any, ...]:

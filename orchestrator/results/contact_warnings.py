@@ -29,10 +29,12 @@ def lines(results: Results) -> Iterator[str]:
         return
     linkage = TypeAdapter(Linkage).validate_python(scene["linkage"])
     contacts = TypeAdapter(Contacts).validate_python(scene["contacts"])
-    yield from _deep(linkage, contacts, table)
+    if COORDINATES in table:  # both are recorded
+        yield from _deep(linkage, contacts, table)
     mechanism = TypeAdapter(Mechanism).validate_python(scene["mechanism"])
     if mechanism.integrator != "linearly-implicit" and len(table["time"]) > 1:
-        step_s = float(np.diff(table["time"]).max()) / mechanism.substeps
+        rate = results.run["fmus"][GAP.partition(".")[0]]["rate"]
+        step_s = results.run["clocks"][rate]["longest"] / mechanism.substeps
         yield from _stiff(linkage, contacts, step_s)
 
 

@@ -34,9 +34,9 @@ ROW, COLUMNS = 0.15, 3
 
 
 def last_time(results: Results) -> float:
-    """The time (s) of the last row of the first table."""
-    rows = next(iter(results.tables.values()))["time"]
-    return float(rows[-1]) if len(rows) else 0.0
+    """The time (s) of the last row of the first table that has any."""
+    rows = (table["time"] for table in results.tables.values())
+    return next((float(times[-1]) for times in rows if len(times)), 0.0)
 
 
 def short(value: float) -> str:

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -16,95 +16,106 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.results import rows
 from hapticlink.orchestrator.results.tables import Vector
 
-ROOM = 1 << 16
-"""Bytes of the rows that are kept in memory."""
-
 
 class Recorder:
-    """Writes a table: `time` and the values of a view. A context manager.
+    """Writes a table: `time` and the `values` at `places`, named by `columns`, of every `every`-th
+    row; no table without columns, whose rows are counted only. A context manager.
 
-    at_once: each row is text in the CSV, and has been passed to the operating system, when `row`
-    returns. Otherwise rows are kept in `block`, of which `count` are filled, and go to a file of
-    doubles beside it (`rows`), of which `finish` makes the CSV: a crash loses those in the block.
+    Rows are kept in a block, which a crash of the process leaves (`rows.Block`), and go to a file
+    of doubles beside it, of which `finish` makes the CSV. `first` is called after the first row and
+    has to call `publish`, which moves that file to its place, `target`.
 
-    `last` is the time (s) of the last complete row on the disk, None before the first. `first` is
-    called after the first and has to call `publish`, which moves the file to its place, `target`.
+    `view` is `values` at `places` where these are side by side, else None. `due`: whether the next
+    row is written. `room`: of the block, 0 until the first row is. `count`: rows so far, written or
+    not. `reached`: time of the newest (s). They are shared with the compiled loop.
     """
 
     def __init__(
         self,
         path: Path,
-        columns: Sequence[str],
-        view: Vector,
+        columns: Sequence[str] | None,
+        values: Vector,
+        places: Sequence[int],
         first: Callable[[], object],
-        at_once: bool = True,
+        every: int = 1,
     ) -> None:
-        self.path, self.view, self._first, self.at_once = path, view, first, at_once
-        self.block = np.zeros((max(ROOM // (8 + view.nbytes), 1), 1 + len(view)))
-        self.count = ctypes.c_int64()
-        self.target = path if at_once else path.with_suffix(rows.SUFFIX)
-        self.last: float | None = None
+        self.path, self.target = path, path.with_suffix(rows.SUFFIX)
+        self.values, self.places, self.every = values, np.array(places, np.int64), every
+        span = slice(places[0], places[-1] + 1) if len(places) else slice(0)
+        beside = [*places] == [*range(len(values))[span]]
+        self.view = values[span] if beside else None
+        self._first = first
+        self._full: float | None = None
+        self._file: BinaryIO | None = None
+        self.due, self.room, self.count = (ctypes.c_int64(n) for n in (1, 0, 0))
+        self.reached = ctypes.c_double()
+        if columns is None:
+            return
+        self.block = rows.Block(path, 1 + len(places))
         self._unfinished = self._beside(self.target)
         self._file = self._unfinished.open("xb", buffering=0)  # never through a link
         try:
-            self._write(",".join(["time", *map(_quoted, columns)]).encode() + b"\n")
+            self._write(rows.header(("time", *columns)))
         except OSError:
             self.__exit__()
             raise
 
+    @property
+    def last(self) -> float | None:
+        """The time (s) of the newest row, None before the first: of the last one on the disk where
+        that is full."""
+        if self._full is not None:
+            return self._full
+        return self.reached.value if self.count.value else None
+
+    @property
+    def files(self) -> list[str]:
+        """The names of its files during the run."""
+        return [self.target.name, self.block.path.name] if self._file else []
+
     def row(self, time: float) -> None:
         """Write a row at `time` (s). Raises OSError, as on a full disk."""
-        row = self.block[self.count.value]
-        row[0], row[1:] = time, self.view
+        if self.due.value and self._file:
+            filled, kept = self.block.filled, self.block.rows
+            if filled.value == len(kept):
+                self.flush()
+            row = kept[filled.value]
+            row[0], row[1:] = time, self.values[self.places] if self.view is None else self.view
+            filled.value += 1
+        self.reached.value = time
         self.count.value += 1
-        if self.at_once or self.count.value == len(self.block):
-            self.flush()
+        self.due.value = self.count.value % self.every == 0
+        if self.count.value == 1:
+            self._first()
+            self.room.value = len(self.block.rows) if self._file else 1
 
     def flush(self) -> None:
         """Write the rows of the block. Raises OSError, as on a full disk, after those that fit."""
-        kept, self.count.value = self.block[: self.count.value], 0
-        if not len(kept):
+        if not self._file or not (filled := self.block.filled.value):
             return
+        kept = self.block.rows[:filled]
         try:
-            self._write(self._encoded(kept))
+            self._write(kept.tobytes())
         except OSError:
-            if len(kept) == 1:
-                raise
-            for i in range(len(kept)):
-                self._write(self._encoded(kept[i : i + 1]))
-                self._written(kept[i])
-        else:
-            self._written(kept[-1])
-
-    def _encoded(self, kept: Vector) -> bytes:
-        return rows.text(kept) if self.at_once else kept.tobytes()
-
-    def _written(self, row: Vector) -> None:
-        before, self.last = self.last, float(row[0])
-        if before is None:
-            self._first()
+            for row in kept:
+                self._write(row.tobytes())
+                self._full = float(row[0])
+        finally:
+            self.block.filled.value = 0
 
     def publish(self) -> None:
         """Replace the file of an earlier run by this one."""
-        self._file.close()  # Windows moves no open file
-        os.replace(self._unfinished, self.target)
-        self._file = self.target.open("ab", buffering=0)
+        if self._file:
+            self._file.close()  # Windows moves no open file
+            os.replace(self._unfinished, self.target)
+            self._file = self.target.open("ab", buffering=0)
 
     def finish(self) -> None:
         """Make the CSV of the rows, and remove these. Raises OSError, as on a full disk, and keeps
         the rows."""
-        if self.at_once or self.last is None:
-            return
-        self._file.close()
-        made = self._beside(self.path)
-        try:
-            with made.open("xb") as file:
-                rows.write_csv(self.target, file)
-            os.replace(made, self.path)
-        except OSError:
-            made.unlink(missing_ok=True)
-            raise
-        self.target.unlink()
+        if self._file and self.last is not None:
+            self._file.close()
+            make_csv(self.path)
 
     @staticmethod
     def _beside(path: Path) -> Path:
@@ -115,6 +126,7 @@ class Recorder:
 
     def _write(self, content: bytes) -> None:
         """Write all of `content`; or nothing, raising OSError, where the disk is full."""
+        assert self._file
         whole = os.fstat(self._file.fileno()).st_size
         try:
             left = memoryview(content)
@@ -129,15 +141,28 @@ class Recorder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
-        self._unfinished.unlink(missing_ok=True)
+        if self._file:
+            self._file.close()
+            self._unfinished.unlink(missing_ok=True)
+            self.block.close()
 
 
-def _quoted(name: str) -> str:
-    """A column name in CSV (RFC 4180): names of matrix entries contain a comma, those of FMUs
-    any printable character."""
-    doubled = name.replace('"', '""')
-    return f'"{doubled}"' if "," in name or '"' in name else name
+def make_csv(path: Path) -> int:
+    """Make the CSV `path` of its rows, and remove these; the number of rows. Raises OSError, as on
+    a full disk, and keeps the rows."""
+    source = path.with_suffix(rows.SUFFIX)
+    made = path.with_name(f".{path.name}.{os.getpid()}")
+    made.unlink(missing_ok=True)
+    try:
+        with made.open("xb") as file:
+            count = rows.write_csv(source, file)
+        os.replace(made, path)
+    except OSError:
+        made.unlink(missing_ok=True)
+        raise
+    for left in (source, *rows.blocks(path)):
+        left.unlink(missing_ok=True)
+    return count
 
 
 def write_json(path: Path, content: Mapping[str, Any], room: int = 0) -> None:

@@ -10,8 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Interrupted
 from hapticlink.orchestrator.results import rows
@@ -29,19 +28,11 @@ class RunFolder:
 
     A context manager that records how the run ended in run.json even when an exception or a second
     signal, which ends the process at once, breaks it off. `published`: the folder has the results
-    of this run. at_once: whether each row has to be written before the FMUs are called again, since
-    one of them may crash or hang. csv: whether `finish` makes the CSV of the rows.
+    of this run. csv: whether its tables become CSVs.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        story: dict[str, Any] | None = None,
-        at_once: bool = False,
-        csv: bool = True,
-    ) -> None:
-        self.folder, self.published, self._at_once, self._csv = folder, False, at_once, csv
-        self._story = story
+    def __init__(self, folder: Path, story: dict[str, Any] | None = None, csv: bool = True) -> None:
+        self.folder, self.published, self._story, self._csv = folder, False, story, csv
         self._recorders: list[Recorder] = []
 
     def __enter__(self) -> RunFolder:
@@ -55,11 +46,16 @@ class RunFolder:
                 self._broken_off("fault", error)
 
     def recorder(
-        self, clock: str, columns: Sequence[str], view: Vector, at_once: bool = False
+        self,
+        clock: str,
+        columns: Sequence[str] | None,
+        values: Vector,
+        places: Sequence[int],
+        every: int = 1,
     ) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
         path = self.folder / f"{clock}.csv"
-        made = Recorder(path, columns, view, self._publish, at_once or self._at_once)
+        made = Recorder(path, columns, values, places, self._publish, every)
         self._recorders.append(made)
         return made
 
@@ -91,7 +87,8 @@ class RunFolder:
             write_json(self.folder / RUN, self._story | {"end": end}, ROOM)
         for recorder in self._recorders:
             recorder.publish()
-        for name in earlier - {RUN, *(recorder.target.name for recorder in self._recorders)}:
+        kept = {RUN, *(name for recorder in self._recorders for name in recorder.files)}
+        for name in earlier - kept:
             (self.folder / name).unlink(missing_ok=True)
         self.published = True
 
@@ -101,8 +98,9 @@ class RunFolder:
         OSError if the disk is full."""
         if not self.published and not _has_rows(self.folder):
             for clock, names in columns.items():
-                with self.recorder(clock, names, np.zeros(0), at_once=True) as empty:
-                    empty.publish()
+                name = f"{clock}.csv" if self._csv else f"{clock}{rows.SUFFIX}"
+                with atomic_file(self.folder / name) as empty:
+                    empty.write_bytes(rows.header(("time", *names)))
             self.published = True
         if self.published and self._story is not None:
             write_json(self.folder / RUN, self._story | ending)
@@ -120,6 +118,8 @@ class RunFolder:
             left.unlink()
         self._broken_off("interrupted", Interrupted(self.last))
         for recorder in self._recorders:
+            with suppress(OSError):
+                recorder.flush()
             recorder.__exit__()
 
     def _broken_off(self, reason: str, error: BaseException) -> None:
@@ -141,11 +141,12 @@ def _has_rows(folder: Path) -> bool:
 
 def _listed(folder: Path) -> set[str]:
     """The files that the run.json of an earlier run lists, without paths outside of `folder`, and
-    the rows that a run leaves that was killed."""
+    the rows and blocks that a run leaves that was killed."""
     try:
         names = json.loads((folder / RUN).read_text(encoding="utf-8")).get("files", ())
         found = {n for n in names if isinstance(n, str) and n != ".." and Path(n).name == n}
     except (OSError, ValueError, AttributeError, TypeError):
         return set()
-    left = {Path(n).with_suffix(rows.SUFFIX).name for n in found if n.endswith(".csv")}
-    return found | {n for n in left if (folder / n).exists()}
+    tables = (folder / n for n in found if n.endswith((".csv", rows.SUFFIX)))
+    left = [f for t in tables for f in (t.with_suffix(rows.SUFFIX), *rows.blocks(t)) if f.exists()]
+    return found | {f.name for f in left}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import groupby, islice
 from typing import Any
 
@@ -11,17 +11,24 @@ import numpy as np
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.results import friction_speed
 from hapticlink.orchestrator.results.figure_axes import short
-from hapticlink.orchestrator.results.force_figure import wrenches
+from hapticlink.orchestrator.results.force_figure import WRENCHES, wrenches
 from hapticlink.orchestrator.results.real_time_figure import finding
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import (
+    BRANCH,
+    COUNTS,
     DEVICE,
     folded,
     has_tracking,
     of_block,
     pose_error,
 )
+from hapticlink.orchestrator.results.tracking import MECHANISM as TRACKED
 from hapticlink.orchestrator.results.user_port import user_port
+
+MECHANISM = "virtual_mechanism"
+MARGIN = "haptic_device.workspace_margin"
+CLOSURE = "virtual_mechanism.closure_error"
 
 
 def ending(results: Results) -> str:
@@ -81,6 +88,7 @@ def lines(results: Results) -> Iterator[str]:
             "Lambda_inv, P_c and contacts: take graphics.sync = 'exact'"
         )
     yield from replaced(run.get("replaced", {}))
+    yield from unrecorded(run.get("not_recorded", ()))
     for fmu, count in run["held_outputs"].items():
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
     for fmu, count in run["smaller_steps"].items():
@@ -133,6 +141,28 @@ def _real_time(found: Mapping[str, Any]) -> Iterator[str]:
 
 NOTHING = 1e-9
 """Energy (J) that is not worth a line."""
+
+USED = {
+    "tracking": (TRACKED, DEVICE),
+    "drawing of the mechanism": ("virtual_mechanism.q",),
+    "forces": (*WRENCHES, "controller.F_motor"),
+    "constrained directions": COUNTS,
+    "closure": (CLOSURE,),
+    "folded frames": (BRANCH,),
+    "depth of contacts": ("virtual_mechanism.contact_gap",),
+    "friction": (friction_speed.RATES,),
+}
+"""The signals of what a run tells and draws."""
+
+
+def unrecorded(left_out: Collection[str]) -> Iterator[str]:
+    """A line if what a run tells and draws misses signals that are not recorded."""
+    missing = {what: [s for s in signals if s in left_out] for what, signals in USED.items()}
+    said = [f"{what} ({', '.join(signals)})" for what, signals in missing.items() if signals]
+    if said:
+        yield f"not recorded, and so not told or drawn in full: {'; '.join(said)} (record.signals)"
+
+
 LARGEST, SUM = 0.1, 0.1
 """Bounds of the relative error of a step, which may be an impact, and of the sum over all steps of
 the mechanism (`step_check`); the controller takes back what would add up in the device."""
@@ -203,8 +233,3 @@ def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
 
 REPORTED = {"rad": 0.1, "m": 0.01}
 """Moves of a joint by more than this are reported."""
-
-
-MECHANISM = "virtual_mechanism"
-MARGIN = "haptic_device.workspace_margin"
-CLOSURE = "virtual_mechanism.closure_error"

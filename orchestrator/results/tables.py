@@ -20,6 +20,8 @@ from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.results import rows
 
 Vector = NDArray[np.float64]
+TABLES = (".csv", rows.SUFFIX)
+"""Endings of the names of tables."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -105,7 +107,7 @@ class Results:
 
 def size(folder: Path, run: Mapping[str, Any]) -> int:
     """Bytes of a run's tables."""
-    return sum(_place(folder / f"{name}.csv").stat().st_size for name in run["rates"])
+    return sum(_place(folder / n).stat().st_size for n in run["files"] if n.endswith(TABLES))
 
 
 def _place(path: Path) -> Path:
@@ -121,7 +123,10 @@ def load(folder: Path | str) -> Results:
     try:
         run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         for name in run["rates"]:
-            tables[name] = read_table(folder / f"{name}.csv", tables)
+            if any(name + suffix in run["files"] for suffix in TABLES):
+                tables[name] = read_table(folder / f"{name}.csv", tables)
+            else:  # nothing of it is recorded
+                tables[name] = Table(("time",), np.zeros((0, 1)), tables)
     except (OSError, ValueError, TypeError, KeyError) as error:
         why = f"{type(error).__name__}: {error}"
         raise InputFault(f"{folder}: not the folder of a run: {why}") from error

@@ -43,7 +43,8 @@ def watched(folder: Path) -> Iterator[None]:
 def record_crash(folder: Path, process: int) -> None:
     """Records in run.json that the run with the given process ID has crashed, and removes its
     temporary folders. Without a row of that run, only prints a message."""
-    from hapticlink.orchestrator.results.files import write_json
+    from hapticlink.orchestrator.results.figure_axes import last_time
+    from hapticlink.orchestrator.results.recover import recover
     from hapticlink.orchestrator.results.tables import load
 
     temporary_folders.clear(process)
@@ -54,17 +55,13 @@ def record_crash(folder: Path, process: int) -> None:
         "the run names the one that crashes"
     )
     if _process(folder) != process:  # the crashed run has written no row
+        for block in folder.glob(f".*.{process}.block"):
+            block.unlink()
         print(f"hapticlink: the process ended before its first row; {remedy}", file=sys.stderr)
         return
     results = load(folder)
-    content = dict(results.run)
-    time = float(results.tables[content["rates"][0]]["time"][-1])
-    message = f"the process of the run ended after t = {time!r} s; {remedy}"
-    content |= {
-        "end": {"reason": "fault", "time": time},
-        "fault": {"kind": "Crash", "message": message},
-    }
-    write_json(folder / "run.json", content)
+    message = f"the process of the run ended after t = {last_time(results)!r} s; {remedy}"
+    recover(folder, "Crash", message, ended=True)
     print(f"hapticlink: {message}; results are in {folder}", file=sys.stderr)
 
 

@@ -30,8 +30,8 @@ from hapticlink.orchestrator.run.step_control import Steps
 from hapticlink.orchestrator.system.haptic_loop import WORKSPACE
 
 Progress = Callable[[float], None]
-KEPT = 0.02
-"""Time (s) for which rows are kept in memory."""
+PAUSE = 0.02
+"""Time (s) between two reports of progress."""
 
 
 @dataclass
@@ -93,19 +93,17 @@ def run(
             if real_time:
                 loop.prepare(kinds(plan))
                 stack.enter_context(real_time.pace.undisturbed())
-            begin = flushed = perf_counter()
+            begin = shown = perf_counter()
 
             def turn(tick: int) -> None:
-                nonlocal flushed
+                nonlocal shown
                 time = plan.system.timeline.seconds(tick)
                 interrupt.check(time)
                 if real_time:
                     real_time.turn(loop)
-                if perf_counter() - flushed > KEPT:
-                    results.flush()
-                    flushed = perf_counter()
-                    if progress:
-                        progress(time)
+                if progress and perf_counter() - shown > PAUSE:
+                    shown = perf_counter()
+                    progress(time)
 
             try:
                 loop.run(turn)
@@ -145,7 +143,7 @@ def run(
             found = {n: check.errors() for n, check in simulation.step_checks.items()}
             outcome.step_errors = {n: errors for n, errors in found.items() if errors}
             outcome.delays = delays(plan, loop.complete)
-            outcome.calls = loop.calls()
+            outcome.calls = {n: i.calls for n, i in simulation.instances.items()}
             outcome.steps = loop.steps()
             outcome.iterations = loop.iterations()
             outcome.in_python = loop.in_python

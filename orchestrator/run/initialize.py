@@ -140,6 +140,8 @@ def _raise_unsettled(
 
 
 DEVICE = "haptic_device"
+TOLD = {DEVICE: ("workspace_margin", "x_true")}
+"""Outputs by which an unreachable start pose is told, by block."""
 
 
 def require_finite(instances: Mapping[str, Instance]) -> None:

@@ -21,4 +21,6 @@ def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
 def instance(fmu: Fmu, outputs: Vector, policy: Faults, alone: bool) -> Instance:
     """The instance of `fmu`, not loaded yet, that fills `outputs`."""
     kind = Isolated if alone else IN_PROCESS[fmu.description.fmi]
-    return kind(fmu.name, fmu.description, outputs, fmu.starts, policy)
+    made = kind(fmu.name, fmu.description, outputs, fmu.starts, policy)
+    made.seldom = fmu.seldom
+    return made

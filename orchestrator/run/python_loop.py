@@ -3,20 +3,10 @@ reference of the compiled loop."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from hapticlink.orchestrator.holds import Hold
-from hapticlink.orchestrator.plan.operations import (
-    Event,
-    Get,
-    Operation,
-    Part,
-    Rollback,
-    Save,
-    Set,
-    Step,
-)
+from hapticlink.orchestrator.plan.operations import Event, Part
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.bind import Binder, Bound
 from hapticlink.orchestrator.run.fixed_point import Iterations, total
@@ -42,7 +32,6 @@ class PythonLoop:
         self._paced = None
         if simulation.pace:
             self._paced = PacedEvents(plan.system.timeline, simulation.pace, simulation.sides)
-        self._counts: Counter[Event | Part] = Counter()
         self.complete = 0
 
     def run(self, turn: Callable[[int], object]) -> None:
@@ -57,7 +46,6 @@ class PythonLoop:
 
     def _calls(self, kind: Event | Part) -> list[Call]:
         """The calls of a kind of event, bound at its first occurrence."""
-        self._counts[kind] += 1
         if (found := self._bound.get(kind)) is None:
             found = self._bound[kind] = self._binder.bind_all(self._plan.block(kind))
         return found
@@ -95,24 +83,6 @@ class PythonLoop:
         """Replace a hold. Raises InputFault where this loop cannot."""
         self._simulation.holds[connection] = hold
         self._bound.clear()
-
-    def _times(self) -> Mapping[Event | Part, int]:
-        """How often each kind of event was begun."""
-        return self._counts
-
-    def calls(self) -> dict[str, dict[str, int]]:
-        """Number of FMI calls by FMU and kind; blocks interrupted by a fault count in full."""
-        totals: dict[str, Counter[str]] = {name: Counter() for name in self._simulation.instances}
-        ran: list[tuple[Operation, int]] = []
-        for event, times in self._times().items():
-            ran += [(op, times) for op in self._plan.block(event)]
-        for repeat, loop in self._binder.loops.items():
-            ran += [(op, loop.counts.iterations) for op in repeat.body]
-            ran += [(op, loop.counts.rollbacks) for op in repeat.again]
-        for op, times in ran:
-            if isinstance(op, Get | Set | Step | Save | Rollback):
-                totals[op.fmu][type(op).__name__.lower()] += times
-        return {name: dict(sorted(counter.items())) for name, counter in totals.items()}
 
     def steps(self) -> dict[str, Steps]:
         return {clock: a.steps for clock, a in self._binder.advancers.items()}

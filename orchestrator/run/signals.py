@@ -16,9 +16,11 @@ Vector = NDArray[np.float64]
 
 
 class SignalVector:
-    """The vector `values` and the index of each signal in it."""
+    """The vector `values` and the index of each signal in it. asked: outputs whose indices were
+    asked for, by FMU and name."""
 
     def __init__(self, system: System) -> None:
+        self._system, self.asked = system, set[tuple[str, str]]()
         self._of_fmu: dict[str, slice] = {}
         self._of_clock: dict[str, slice] = {}
         self._of_hold: dict[str, slice] = {}
@@ -71,6 +73,7 @@ class SignalVector:
         return self._credits + spring
 
     def scalar(self, fmu: str, variable: str) -> int:
+        self.asked.add((fmu, variable))
         return self._of_scalar[fmu, variable]
 
     def port(self, unit: Fmu, name: str) -> list[int]:
@@ -95,8 +98,12 @@ class SignalVector:
             return list(range(held.start, held.stop))
         return self.sources(connection)
 
-    def columns(self, clock: str) -> list[str]:
-        """The names `fmu.variable` of all outputs of a clock, in order."""
-        span = self.clock(clock)
-        inside = (k for k, i in self._of_scalar.items() if span.start <= i < span.stop)
-        return [f"{fmu}.{variable}" for fmu, variable in inside]
+    def recorded(self, clock: str) -> dict[str, int] | None:
+        """The columns `fmu.variable` of a clock's table with their indices, None where it has no
+        table."""
+        span, written = self.clock(clock), self._system.recorded
+        names = {f"{f}.{v}": i for (f, v), i in self._of_scalar.items()}
+        found = {n: i for n, i in names.items() if span.start <= i < span.stop}
+        if written is None:
+            return found
+        return {n: found[n] for n in written if n in found} or None

@@ -102,11 +102,18 @@ class Simulation:
                 sources = [p for c in incoming for p in self.signals.sources(c)]
                 self.now_setters[fmu.name] = connect(scalars, sources)
         for clock in self.system.timeline.clocks:
-            view = values[self.signals.clock(clock.name)]
-            made = self._results.recorder(clock.name, self.signals.columns(clock.name), view)
+            recorded = self.signals.recorded(clock.name)
+            columns = None if recorded is None else [*recorded]
+            places = [] if recorded is None else [*recorded.values()]
+            every = self.system.every
+            made = self._results.recorder(clock.name, columns, values, places, every)
             self.recorders[clock.name] = self._stack.enter_context(made)
+            for fmu in self.system.fmus:
+                if fmu.clock == clock.name:
+                    self.instances[fmu.name].due = made.due
         for side in self.sides:
-            made = self._results.recorder(f"{side}_{SAMPLES}", COLUMNS, np.zeros(len(COLUMNS)))
+            sample, all_of_it = np.zeros(len(COLUMNS)), range(len(COLUMNS))
+            made = self._results.recorder(f"{side}_{SAMPLES}", COLUMNS, sample, all_of_it)
             self.arrivals[side] = self._stack.enter_context(made)
             made.row(0.0)  # the sample of t = 0 is there at once
 
@@ -114,7 +121,7 @@ class Simulation:
         """Take over the sample that the FMUs beside the loop have left for a tick, `late`."""
         late, arrived = self.seconds(self.late), self.arrivals[clock]
         computing = self.sides[clock].collect(late)
-        arrived.view[:] = self.seconds(tick + self.late), late, computing
+        arrived.values[:] = self.seconds(tick + self.late), late, computing
         arrived.row(self.seconds(tick))
 
     def _derived(

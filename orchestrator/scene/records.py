@@ -87,6 +87,21 @@ class Wire:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Record:
+    """What a run writes. Outputs that nobody reads either are not fetched from their FMUs:
+    [what is recorded](fmus.md#what-is-fetched-and-recorded)."""
+
+    signals: Literal["all", "connected", "none"] | tuple[str, ...] = "all"
+    """all: every output; connected: those that a connection reads; none: no table; or a list of
+    FMUs, of their outputs `fmu.port`, and of entries of these, `fmu.port[1]`."""
+    every: Annotated[int, Quantity("1", ge=1, le=1_000_000)] = 1
+    """Every so many communication points of a rate, from the one at t = 0 on, it gets a row."""
+    format: Literal["csv", "rows"] = "csv"
+    """csv; or rows, the header of the CSV and a line feed, then rows of doubles, which take less
+    than half the time to write and almost none to read."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Iteration:
     """The fixed-point iteration of `coupling = "iterated"`: it repeats a communication step until
     connected plants of one rate agree."""

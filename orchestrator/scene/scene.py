@@ -35,6 +35,7 @@ from hapticlink.orchestrator.scene.records import (
     Iteration,
     Latency,
     PowerPort,
+    Record,
     SetSpring,
     StepControl,
     Wire,
@@ -165,6 +166,8 @@ class Scene:
     """Further FMUs: [foreign FMUs](foreign-fmus.md)."""
     connection: tuple[Wire, ...] = ()
     """Connections to and from them."""
+    record: Record = field(default_factory=Record)
+    """What is written, and how often."""
     faults: Faults = field(default_factory=Faults)
     """How a run reacts to an FMU that fails: [faults](faults.md)."""
     isolate: bool = False

@@ -119,7 +119,9 @@ class StateVector:
         simulation = self._simulation
         system, signals = simulation.system, simulation.signals
         found = [Coordinate(u.name, name, "fmu") for u in system.fmus for _, name in _entries(u)]
-        columns = [n for clock in system.timeline.clocks for n in signals.columns(clock.name)]
+        columns = [
+            n for clock in system.timeline.clocks for n in signals.recorded(clock.name) or ()
+        ]
         outputs = [_signal(name) for name in columns]
         further = range(len(outputs), len(template.signals))
         found += outputs + [Coordinate("held values", f"[{i}]", "signal") for i in further]

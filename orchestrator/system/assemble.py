@@ -18,6 +18,7 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system import checks, fmu_tables, haptic_loop, replacements
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import connect, whole
+from hapticlink.orchestrator.system.recorded import recorded
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
@@ -51,6 +52,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(fmus, condition):
         problems.append((("stop_when",), f"{condition}: there is no such output"))
+    written = recorded(scene.record, fmus, assigned, problems)
     if problems:
         raise SceneFault(scene.title, [scene.place(*problem) for problem in problems])
     return System(
@@ -69,6 +71,8 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         rules.springs,
         haptic_loop.energy_in_play(scene),
         replacements.replacements(blocks, haptic_loop.rows(scene), fmus, assigned),
+        written,
+        scene.record.every,
     )
 
 

@@ -24,13 +24,14 @@ from hapticlink.orchestrator.scene.records import (
 @dataclass(frozen=True)
 class Fmu:
     """One FMU of the system, the clock that it steps at, its start values, and whether it runs in
-    a process of its own."""
+    a process of its own. seldom: outputs that are only read for the rows of a table."""
 
     name: str
     description: Description
     clock: str
     starts: Starts = ()
     isolate: bool = False
+    seldom: frozenset[str] = frozenset()
 
     @property
     def sampled(self) -> bool:
@@ -87,6 +88,8 @@ class System:
     outputs may be read again after inputs are set, without a doStep between. refused: holds that
     did not fit. springs: spring-dampers whose set positions are connected. energy_in_play: scale
     of the mechanism's gravitational energy (J), None where its energy balance is not checked.
+    recorded: the outputs that are written, `fmu.output`, None for all. every: communication points
+    of a clock for which it gets a row.
     """
 
     fmus: tuple[Fmu, ...]
@@ -104,6 +107,8 @@ class System:
     springs: tuple[SetSpring, ...] = ()
     energy_in_play: float | None = None
     replacements: Mapping[str, Replacement] = field(default_factory=dict)
+    recorded: tuple[str, ...] | None = None
+    every: int = 1
 
     @cached_property
     def fmu(self) -> Mapping[str, Fmu]:

@@ -58,10 +58,6 @@ class Events:
         found: int = self._c.events
         return found
 
-    def counts(self) -> dict[Event, int]:
-        """How many events of each kind were begun."""
-        return {event: b.count for event, b in zip(self._kinds, self._blocks, strict=True)}
-
     def run(self, turn: Callable[[int], object]) -> None:
         """Run all events; `turn` is called from time to time, and at the end, with the tick."""
         c, machine = self._c, self._machine

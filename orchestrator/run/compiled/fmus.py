@@ -15,6 +15,7 @@ from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.run import step_check
 from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.step_check import SLOT, StepCheck
 
 _TYPES = {
@@ -29,39 +30,43 @@ def address(function: Any) -> int | None:
     return ctypes.cast(function, ctypes.c_void_p).value
 
 
-def of_transfers(
-    transfers: Sequence[Transfer], instance: InProcess
-) -> ctypes.Array[structures.Transfer]:
+def of_transfers(transfers: Sequence[Transfer], instance: InProcess, memory: Memory) -> int:
     """The calls of a get or a set."""
-    made = (structures.Transfer * len(transfers))()
-    for c, t in zip(made, transfers, strict=True):
+    size = ctypes.sizeof(structures.Transfer)
+    made = memory.room(size * len(transfers))
+    for i, t in enumerate(transfers):
+        c = structures.Transfer.from_address(made + i * size)
         c.call, c.fmu = address(t.function), t.component
-        c.references, c.n_references = ctypes.addressof(t.references), len(t.references)
+        c.references, c.n_references = memory.copy(t.references), len(t.references)
         c.buffer, c.values, c.n = t.buffer.ctypes.data, t.values.ctypes.data, len(t.values)
-        c.python = instance.holds_python
-        c.type, c.fmi = _TYPES.get(t.type, _BOOLEAN[t.fmi]), int(t.fmi)
+        c.kind.python = instance.holds_python
+        c.kind.type, c.kind.fmi = _TYPES.get(t.type, _BOOLEAN[t.fmi]), int(t.fmi)
     return made
 
 
-def of_instance(instance: InProcess, check: StepCheck | None, c: structures.Fmu) -> object:
+def of_instance(
+    instance: InProcess, check: StepCheck | None, c: structures.Fmu, memory: Memory
+) -> object:
     """Fills `c`; what is returned has to be kept."""
     fmi, slave = instance.description.fmi, instance.slave
-    gets = of_transfers(instance.gets, instance)
     c.place, c.fmu = ctypes.addressof(instance.place), slave.component
     c.do_step = address(slave.dll[f"fmi{fmi}DoStep"])
-    c.fmi, c.forward, c.python = int(fmi), instance.forward, instance.holds_python
+    c.kind.fmi, c.kind.python, c.forward = int(fmi), instance.holds_python, instance.forward
     if instance.retry:
         saved = instance.retry.saved[0]
         c.get_state, c.state = address(saved.get), ctypes.addressof(saved.state)
     if isinstance(instance, InProcess3):
         c.event, c.terminate, c.early = map(ctypes.addressof, instance.told)
         c.reached = ctypes.addressof(instance.reached)
-    c.gets, c.n_gets = ctypes.addressof(gets), len(gets)
+    c.gets, c.n_gets = of_transfers(instance.gets, instance, memory), len(instance.gets)
     c.outputs, c.n_outputs = instance.outputs.ctypes.data, len(instance.outputs)
-    c.inverse = instance.bounds.inverse.ctypes.data
+    c.inverse = memory.copy(instance.bounds.inverse)
+    c.fewer, c.n_fewer, c.due = c.gets, c.n_gets, ctypes.addressof(instance.due)
+    if instance.fewer is not instance.gets:
+        c.fewer, c.n_fewer = of_transfers(instance.fewer, instance, memory), len(instance.fewer)
     c.good = None if instance.good is None else instance.good.ctypes.data
     if check is None:
-        return gets
+        return None
     made = structures.Check()
     c.check = ctypes.addressof(made)
     saved = instance.slot(SLOT)
@@ -82,7 +87,7 @@ def of_instance(instance: InProcess, check: StepCheck | None, c: structures.Fmu)
     made.before, made.halves = scratch[0].ctypes.data, scratch[1].ctypes.data
     check.changed = partial(_fill_check, made, check)
     check.changed()
-    return gets, made, scratch
+    return made, scratch
 
 
 def _fill_check(c: structures.Check, check: StepCheck) -> None:
@@ -90,14 +95,13 @@ def _fill_check(c: structures.Check, check: StepCheck) -> None:
     c.weights = check.weights.ctypes.data
 
 
-def of_setter(setter: Setter, instance: InProcess, c: structures.Setter) -> object:
-    """Fills `c`; what is returned has to be kept."""
-    sets = of_transfers(setter.transfers, instance)
-    c.place, c.n = ctypes.addressof(instance.place), len(setter.where)
-    c.where, c.values = setter.where.ctypes.data, setter.values.ctypes.data
+def of_setter(setter: Setter, instance: InProcess, c: structures.Setter, memory: Memory) -> None:
+    """Fills `c`."""
+    c.place, c.n, c.key = ctypes.addressof(instance.place), len(setter.where), setter.key
+    c.where, c.values = memory.copy(setter.where), setter.values.ctypes.data
     if setter.factors is not None and setter.offsets is not None:
         c.factors, c.offsets = setter.factors.ctypes.data, setter.offsets.ctypes.data
     if setter.into is not None:
         c.into, c.whole = setter.into.ctypes.data, setter.whole.ctypes.data
-    c.sets, c.n_sets = ctypes.addressof(sets), len(sets)
-    return sets
+    c.sets = of_transfers(setter.transfers, instance, memory)
+    c.n_sets = len(setter.transfers)

@@ -17,7 +17,7 @@
 #endif
 
 enum { WARNING = 1 };
-enum { SHORT = 1000, ALL = 64, EACH = 16 };
+enum { SHORT = 10000, ALL = 64, EACH = 64 };
 /* Steps below SHORT ns, after ALL steps that were all timed, are timed one in EACH: reading the
  * clock takes longer than the shortest steps. */
 
@@ -35,7 +35,7 @@ typedef int (*GetState)(void *, void *);
 typedef int (*SetState)(void *, void *);
 
 static int transferred(const Transfer *t) {
-    if (t->fmi == 2)
+    if (t->kind.fmi == 2)
         return ((Transfer2)t->call)(t->fmu, t->references, t->n_references, t->buffer);
     return ((Transfer3)t->call)(t->fmu, t->references, t->n_references, t->buffer, t->n);
 }
@@ -47,7 +47,7 @@ static int from_buffer(const Transfer *t) {
     case kind:                                                                                     \
         for (int64_t i = 0; i < t->n; i++) t->values[i] = (double)((type *)t->buffer)[i];          \
         break;
-    switch (t->type) {
+    switch (t->kind.type) {
     case DOUBLE: return 1;
         FROM(FLOAT, float)
         FROM(INT64, int64_t)
@@ -61,7 +61,7 @@ static int from_buffer(const Transfer *t) {
         FROM(BOOL2, int32_t)
         FROM(BOOL3, uint8_t)
     }
-    if (t->type == INT64 || t->type == UINT64)
+    if (t->kind.type == INT64 || t->kind.type == UINT64)
         for (int64_t i = 0; i < t->n; i++)
             if (fabs(t->values[i]) >= exact) return 0;
     return 1;
@@ -77,7 +77,7 @@ static int to_buffer(const Transfer *t) {
             ((type *)t->buffer)[i] = (type)whole;                                                  \
         }                                                                                          \
         break;
-    switch (t->type) {
+    switch (t->kind.type) {
     case FLOAT:
         for (int64_t i = 0; i < t->n; i++) ((float *)t->buffer)[i] = (float)t->values[i];
         break;
@@ -100,47 +100,73 @@ static int to_buffer(const Transfer *t) {
 }
 
 /* Call number i of a get or a set. */
-static int call(const Transfer *t, int64_t i, At *at) {
+static inline int call(const Transfer *t, int64_t i, int64_t *count, At *at) {
+    ++*count;
     at->what = i;
     at->status = transferred(t);
-    if (t->python && exception_left()) return RAISED;
+    if (t->kind.python && exception_left()) return RAISED;
     return at->status > WARNING ? FAILED : 0;
 }
 
 static int get(const Fmu *f, int64_t judged, At *at) {
-    for (int64_t i = 0; i < f->n_gets; i++) {
-        const int code = call(f->gets + i, i, at);
+    const Transfer *gets = *f->due ? f->gets : f->fewer;
+    const int64_t n = *f->due ? f->n_gets : f->n_fewer;
+    for (int64_t i = 0; i < n; i++) {
+        const int code = call(gets + i, i, &f->place->gets, at);
         if (code) return code;
-        if (!from_buffer(f->gets + i)) return CALL;
+        if (gets[i].kind.type != DOUBLE && !from_buffer(gets + i)) return CALL;
     }
     if (!judged) return 0;
+    int kept = 1;
     for (int64_t i = 0; i < f->n_outputs; i++)
-        if (!(fabs(f->outputs[i]) * f->inverse[i] <= 1.0)) return JUDGE;
+        kept &= fabs(f->outputs[i]) * f->inverse[i] <= 1.0;
+    if (!kept) return JUDGE;
     if (f->good) memcpy(f->good, f->outputs, f->n_outputs * sizeof(double));
     return 0;
 }
 
+/* Whether a value differs from the one before in any bit, and is now that. */
+static inline int differs(double *before, double value) {
+    int64_t bits[2];
+    memcpy(bits, before, sizeof *before);
+    memcpy(bits + 1, &value, sizeof value);
+    *before = value;
+    return bits[0] != bits[1];
+}
+
 static int set(const Setter *s, const double *board, At *at) {
-    if (s->place->ended) return 0;
+    Place *p = s->place;
+    if (p->ended) return 0;
+    int differ = !s->key || p->setter != s->key;
     if (s->factors)
         for (int64_t i = 0; i < s->n; i++)
-            s->values[i] = board[s->where[i]] * s->factors[i] + s->offsets[i];
+            differ |= differs(s->values + i, board[s->where[i]] * s->factors[i] + s->offsets[i]);
     else
-        for (int64_t i = 0; i < s->n; i++) s->values[i] = board[s->where[i]];
+        for (int64_t i = 0; i < s->n; i++) differ |= differs(s->values + i, board[s->where[i]]);
+    if (!differ) return 0;
     if (s->into)
         for (int64_t i = 0; i < s->n; i++) s->whole[s->into[i]] = s->values[i];
+    p->setter = 0;
     for (int64_t i = 0; i < s->n_sets; i++) {
-        if (!to_buffer(s->sets + i)) return CALL;
-        const int code = call(s->sets + i, i, at);
+        if (s->sets[i].kind.type != DOUBLE && !to_buffer(s->sets + i)) return CALL;
+        const int code = call(s->sets + i, i, &p->sets, at);
         if (code) return code;
     }
+    p->setter = s->key;
     return 0;
 }
 
 static int do_step(const Fmu *f, double time, double size) {
-    if (f->fmi == 2) return ((DoStep2)f->do_step)(f->fmu, time, size, (int)f->forward);
+    f->place->steps++;
+    if (f->kind.fmi == 2) return ((DoStep2)f->do_step)(f->fmu, time, size, (int)f->forward);
     return ((DoStep3)f->do_step)(f->fmu, time, size, f->forward != 0, f->event, f->terminate,
                                  f->early, f->reached);
+}
+
+/* The status of saving an FMU's state. */
+static int save(const Fmu *f, void *get_state, void *state) {
+    f->place->saves++;
+    return ((GetState)get_state)(f->fmu, state);
 }
 
 static int step(Fmu *f, double time, double end, double size, At *at) {
@@ -149,16 +175,15 @@ static int step(Fmu *f, double time, double end, double size, At *at) {
     p->size = size;
     p->end = end;
     if (p->ended || p->waiting) return CALL;
-    if (f->get_state && (at->status = ((GetState)f->get_state)(f->fmu, f->state)) > WARNING)
-        return UNSAVED;
+    if (f->get_state && (at->status = save(f, f->get_state, f->state)) > WARNING) return UNSAVED;
     const int timed = !f->sparse || f->n_steps % EACH == 0;
     const int64_t begin = timed ? now() : 0;
     at->what = -1;
     at->status = do_step(f, time, size);
     if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
-    if (f->python && exception_left()) return RAISED;
+    if (f->kind.python && exception_left()) return RAISED;
     if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
-    if (at->status > WARNING || (f->fmi == 3 && *f->terminate)) return STEPPED;
+    if (at->status > WARNING || (f->kind.fmi == 3 && *f->terminate)) return STEPPED;
     p->time = end;
     return 0;
 }
@@ -207,7 +232,7 @@ static int checked_step(Fmu *f, double time, double end, double size, At *at) {
     const int regular = (*c->steps + 1) % c->every == c->first, jumped = moved(c, f->outputs);
     const int due = regular || jumped;
     if (due && (f->get_state || f->place->ended || *c->count == c->room)) return CALL;
-    if (due && ((GetState)c->get_state)(f->fmu, c->state) > WARNING) return CALL;
+    if (due && save(f, c->get_state, c->state) > WARNING) return CALL;
     note_rates(c, f->outputs, jumped);
     ++*c->steps;
     if (!due) return step(f, time, end, size, at);
@@ -217,6 +242,8 @@ static int checked_step(Fmu *f, double time, double end, double size, At *at) {
     const int halved = do_step(f, time, half) <= WARNING
                        && do_step(f, time + half, half) <= WARNING && !get(f, 0, at);
     if (halved) memcpy(c->halves, f->outputs, bytes);
+    f->place->rollbacks++;
+    f->place->setter = 0;
     at->status = ((SetState)c->set_state)(f->fmu, *(void **)c->state);
     int code = at->status > WARNING ? UNRESTORED : step(f, time, end, size, at);
     if (!code && !(code = get(f, 0, at)) && halved)
@@ -306,18 +333,29 @@ static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
     return hold_push(h, sample, stamp, arrival);
 }
 
+/* CALL before the first row, and where the block is full. */
 static int record(const Loop *l, Table *t, int64_t tick) {
-    if (*t->rows == t->room) return FULL;
-    double *row = t->block + *t->rows * (1 + t->n);
-    row[0] = seconds(l, tick);
-    memcpy(row + 1, t->view, t->n * sizeof *row);
-    ++*t->rows;
+    if (!*t->room) return CALL;
+    if (*t->due && t->block) {
+        if (*t->rows >= *t->room) return CALL;
+        double *row = t->block + *t->rows * (1 + t->n);
+        row[0] = seconds(l, tick);
+        if (t->where)
+            for (int64_t i = 0; i < t->n; i++) row[1 + i] = l->values[t->where[i]];
+        else
+            memcpy(row + 1, t->view, t->n * sizeof *row);
+        ++*t->rows;
+    }
+    *t->reached = seconds(l, tick);
+    *t->due = ++*t->count % t->every == 0;
     return 0;
 }
 
 /* Carries out the operations from at->op to at->last. Returns DONE, or a code for operation
  * at->op. */
 static int carry_out(Loop *l, int64_t tick, At *at) {
+    int64_t known[3] = {INT64_MIN, 0, 0}; /* start, end and parts of the step before */
+    double begins = 0.0, ends = 0.0;
     for (; at->op < at->last; at->op++) {
         const Op *op = l->ops + at->op;
         int code = 0;
@@ -327,11 +365,14 @@ static int carry_out(Loop *l, int64_t tick, At *at) {
         case SET: code = set(l->setters + op->a, l->values, at); break;
         case STEP: {
             const int64_t start = tick * op->c + op->b, end = start + op->d;
-            const double whole = l->denominator * (double)op->c;
+            if (start != known[0] || end != known[1] || op->c != known[2]) {
+                const double whole = l->denominator * (double)op->c;
+                begins = (double)start * l->numerator / whole;
+                ends = (double)end * l->numerator / whole;
+                known[0] = start, known[1] = end, known[2] = op->c;
+            }
             Fmu *f = l->fmus + op->a;
-            code = (op->c == 1 && f->check ? checked_step : step)(
-                f, (double)start * l->numerator / whole, (double)end * l->numerator / whole, op->x,
-                at);
+            code = (op->c == 1 && f->check ? checked_step : step)(f, begins, ends, op->x, at);
             break;
         }
         case PUSH: code = push(l, l->holds[op->a], tick + op->b, tick + l->late); break;
@@ -444,8 +485,7 @@ static int found(Loop *l, Events *e) {
     for (e->kind = 0; e->kind < e->n_kinds; e->kind++)
         if (!memcmp(e->keys + e->kind * (1 + e->n_clocks), e->key, width)) break;
     if (e->kind == e->n_kinds) return KIND;
-    Block *b = e->kinds + e->kind;
-    b->count++;
+    const Block *b = e->kinds + e->kind;
     e->at.op = b->first;
     e->at.last = b->last;
     if (e->pace && e->key[1]) begin(l, e);
@@ -561,10 +601,10 @@ EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, 
 /* The sizes of the structures, in the order of `structures.py`. */
 EXPORT void hapticlink_sizes(int64_t *sizes) {
     const int64_t found[] = {
-        sizeof(Place), sizeof(Transfer), sizeof(Check),   sizeof(Fmu),  sizeof(Setter),
-        sizeof(Link),  sizeof(Tank),     sizeof(Reader),  sizeof(Queue), sizeof(Account),
-        sizeof(Hold),  sizeof(Meter),    sizeof(Table),   sizeof(Op),   sizeof(Side),
-        sizeof(Clock), sizeof(Pace),     sizeof(Block),   sizeof(Loop), sizeof(At),
+        sizeof(Place),  sizeof(Kind), sizeof(Transfer), sizeof(Check),  sizeof(Fmu),   sizeof(Setter),
+        sizeof(Link),   sizeof(Tank), sizeof(Reader),   sizeof(Queue),  sizeof(Account),
+        sizeof(Hold),   sizeof(Meter), sizeof(Table),   sizeof(Op),     sizeof(Side),
+        sizeof(Clock),  sizeof(Pace), sizeof(Block),    sizeof(Loop),   sizeof(At),
         sizeof(Events)};
     memcpy(sizes, found, sizeof found);
 }

@@ -1,7 +1,9 @@
 /* What the compiled loop works on. `structures.py` has the same structures, field by field.
  *
  * All arrays belong to Python, which resolves everything that does not change during a run into
- * them. Every field has 8 bytes, so that there is no padding to agree on.
+ * them. Every field has 8 bytes, so that there is no padding to agree on. What one operation reads
+ * lies together (memory.py), the fields of each step first: the cost of a loop over many FMUs is
+ * that of the cache lines that it touches.
  */
 
 #ifndef LOOP_H
@@ -12,22 +14,29 @@
 
 /* --- FMUs ------------------------------------------------------------------------------------- */
 
-/* Where an instance stands (s), shared with its Python object. waiting: settings that it is to take
- * before its next step. */
+/* Where an instance stands (s), and how often its functions were called; shared with its Python
+ * object. waiting: settings that it is to take before its next step. setter: the Setter whose values
+ * its inputs have, 0 where that is not known. */
 typedef struct {
     double time, begin, size, end, step_time;
-    int64_t ended, waiting;
+    int64_t ended, waiting, setter, gets, sets, steps, saves, rollbacks;
 } Place;
 
+/* What kind of number a call moves, of which version of FMI, and whether the FMU holds a Python
+ * interpreter. */
+typedef struct {
+    int16_t type, fmi, python, unused;
+} Kind;
+
 /* A call of fmiXGet<Type> or fmiXSet<Type>: n numbers in `buffer` as the FMU has them, in `values`
- * as doubles. These are the same memory where the FMU has doubles. python: whether it is an FMU that
- * holds an interpreter. */
+ * as doubles. These are the same memory where the FMU has doubles. A cache line long. */
 typedef struct {
     void *call, *fmu;
     const uint32_t *references;
     void *buffer;
     double *values;
-    int64_t n_references, n, type, fmi, python;
+    int64_t n_references, n;
+    Kind kind;
 } Transfer;
 
 enum { DOUBLE, FLOAT, INT64, INT32, INT16, INT8, UINT64, UINT32, UINT16, UINT8, BOOL2, BOOL3 };
@@ -47,28 +56,38 @@ typedef struct {
 typedef struct {
     Place *place;
     void *fmu, *do_step;
-    void *get_state, *state;              /* saved before each step that may be repeated */
-    int64_t fmi, forward, python;         /* noSetFMUStatePriorToCurrentPoint; as in Transfer */
-    uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
-    double *reached;
+    Kind kind;
+    int64_t forward;                      /* noSetFMUStatePriorToCurrentPoint */
+    void *get_state;                      /* before each step that may be repeated, or NULL */
     const Transfer *gets;
     int64_t n_gets;
-    double *outputs, *inverse, *good;     /* 1/bound; the last finite outputs, or NULL */
+    double *outputs;
+    const double *inverse;                /* 1/bound */
+    double *good;                         /* the last finite outputs, or NULL */
     int64_t n_outputs, n_steps, sparse;   /* sparse: steps so short that few of them are timed */
     Check *check;                         /* NULL if there is none */
+    const int64_t *due;                   /* whether the next row is written; else `fewer` suffice */
+    const Transfer *fewer;
+    int64_t n_fewer;
+    void *state;                          /* saved by get_state */
+    uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
+    double *reached;
 } Fmu;
 
 /* Sets the inputs of an FMU: values[i] = factors[i] board[where[i]] + offsets[i]. `into`: where
- * they belong in `whole`, the entries of arrays that are set as a whole; NULL without arrays. */
+ * they belong in `whole`, the entries of arrays that are set as a whole; NULL without arrays. `key`
+ * tells the setters of an FMU apart, 0 where the FMU may change its inputs: they are then set
+ * though they have not changed. */
 typedef struct {
     Place *place;
+    int64_t n, key;
     const int64_t *where;
-    const double *factors, *offsets;      /* NULL where all are 1 and 0 */
     double *values;
+    const Transfer *sets;
+    int64_t n_sets;
+    const double *factors, *offsets;      /* NULL where all are 1 and 0 */
     const int64_t *into;
     double *whole;
-    const Transfer *sets;
-    int64_t n, n_sets;
 } Setter;
 
 /* --- holds ------------------------------------------------------------------------------------ */
@@ -157,10 +176,19 @@ typedef struct {
     int64_t room, full;                   /* of stamps and samples; of the others */
 } Meter;
 
+/* Of `n` signals, at `where`, or side by side from `view` on where that is NULL, each `every`-th of
+ * the `count` rows so far is written to `block`, (room, 1 + n) of time and values, of which `rows`
+ * are filled; NULL where there is no table. due: whether the next one is. room: 0 before the
+ * first. reached: time of the newest, written or not. */
 typedef struct {
-    double *block;                        /* (room, 1 + n): time and values */
+    double *block;
     const double *view;
-    int64_t *rows, n, room;               /* rows: those that are filled */
+    const int64_t *where;
+    int64_t *rows;
+    const int64_t *room;
+    int64_t *due, *count;
+    double *reached;
+    int64_t n, every;
 } Table;
 
 /* --- the plan --------------------------------------------------------------------------------- */
@@ -209,9 +237,9 @@ typedef struct {
     int64_t *lateness, *steps;            /* histograms */
 } Pace;
 
-/* The operations of a kind of event, and how many of these there were. */
+/* The operations of a kind of event. */
 typedef struct {
-    int64_t first, last, count;
+    int64_t first, last;
 } Block;
 
 typedef struct {
@@ -254,7 +282,6 @@ enum {
     STEPPED,     /* doStep returned `status`, or asks to end */
     UNSAVED,     /* the state before a step could not be saved */
     UNRESTORED,  /* the state before a step that was checked could not be restored */
-    FULL,        /* a table's block */
     DRAW,        /* latencies */
     STOP,        /* the condition to stop holds */
     KIND,        /* an event of a kind that is new */

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 
 from hapticlink.orchestrator.holds import Hold
-from hapticlink.orchestrator.plan.operations import Event, Part
+from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.machine import Machine
@@ -50,6 +50,3 @@ class CompiledLoop(PythonLoop):
 
     def _block(self, event: Event) -> tuple[int, int]:
         return self._machine.block(self._binder.instructions(self._plan.block(event)))
-
-    def _times(self) -> Mapping[Event | Part, int]:
-        return self._counts | self._events.counts()

@@ -34,6 +34,7 @@ from hapticlink.orchestrator.run.compiled.holds import (
     parts,
     tanks,
 )
+from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.meter import Meter
 from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
@@ -70,6 +71,7 @@ class Machine:
         self.loop = structures.Loop()
         self.loop.numerator, self.loop.denominator = base.numerator, base.denominator
         self.loop.values = simulation.signals.values.ctypes.data
+        self._memory = Memory()
         self._kept: list[object] = []
         self._bound: Bound = []
         self._ops = np.zeros(0, np.dtype(Op))
@@ -183,7 +185,7 @@ class Machine:
                 return structures.MOVE, self._meter(connection), ahead
             case Feed(connection, share):
                 return structures.FEED, self._meter(connection), 0, 0, 0, share
-            case Record(clock) if not simulation.recorders[clock].at_once:
+            case Record(clock):
                 return structures.RECORD, self._table(clock)
             case StopWhen():
                 condition = system.ends_when
@@ -196,8 +198,6 @@ class Machine:
     def _why(self, instruction: Instruction) -> str:
         """Why an operation is carried out in Python."""
         match instruction:
-            case Record():
-                return "each row is written at once, since an FMU of others may crash or hang"
             case Evaluate(_, _, order) if order:
                 return "the FMU takes derivatives of its inputs"
             case Set(_, _, True):
@@ -229,7 +229,9 @@ class Machine:
             return None
         check = self._simulation.step_checks.get(name)
         return self._index(
-            "fmu", name, lambda at: fmus.of_instance(instance, check, self._fmus[at])
+            "fmu",
+            name,
+            lambda at: fmus.of_instance(instance, check, self._fmus[at], self._memory),
         )
 
     def _setter(self, name: str, now: bool) -> int | None:
@@ -241,7 +243,7 @@ class Machine:
         if any(transfer.exact for transfer in setter.transfers):
             return None
         make = partial(fmus.of_setter, setter, instance)
-        return self._index("setter", (name, now), lambda at: make(self._setters[at]))
+        return self._index("setter", (name, now), lambda at: make(self._setters[at], self._memory))
 
     def _hold(self, connection: str) -> int | None:
         hold = self._simulation.holds[connection]
@@ -273,9 +275,20 @@ class Machine:
 
         def make(at: int) -> object:
             c = self._tables[at]
-            c.block, c.room = recorder.block.ctypes.data, len(recorder.block)
-            c.view, c.n = recorder.view.ctypes.data, len(recorder.view)
-            c.rows = ctypes.addressof(recorder.count)
+            if recorder.files:
+                c.block, c.rows = (
+                    recorder.block.rows.ctypes.data,
+                    ctypes.addressof(recorder.block.filled),
+                )
+            for name in ("room", "due", "count", "reached"):
+                setattr(c, name, ctypes.addressof(getattr(recorder, name)))
+            c.n, c.every, c.where = (
+                len(recorder.places),
+                recorder.every,
+                recorder.places.ctypes.data,
+            )
+            if recorder.view is not None:
+                c.view, c.where = recorder.view.ctypes.data, None
             return recorder
 
         return self._index("table", clock, make)
@@ -303,10 +316,6 @@ class Machine:
             call(tick)
         elif code == structures.STOP:
             raise Stop
-        elif code == structures.FULL:
-            assert isinstance(instruction, Record)
-            simulation.recorders[instruction.clock].flush()
-            return
         elif code in (structures.DRAW, structures.GROW):
             assert isinstance(instruction, Push | Evaluate | Blend)
             hold = simulation.holds[instruction.connection]
@@ -335,7 +344,7 @@ class Machine:
         """The name of the failed call of a get, a set or a step."""
         if number < 0:
             return instance.do_step
-        transfers = instance.gets
+        transfers = instance.asked
         if isinstance(instruction, Set):
             simulation = self._simulation
             setters = simulation.now_setters if instruction.now else simulation.setters

@@ -16,10 +16,15 @@ def _all(kind: type, names: str) -> Iterator[tuple[str, type]]:
     return ((name, kind) for name in names.split())
 
 
+class Kind(ctypes.Structure):
+    _fields_ = (*_all(ctypes.c_int16, "type fmi python unused"),)
+
+
 class Transfer(ctypes.Structure):
     _fields_ = (
         *_all(_POINTER, "call fmu references buffer values"),
-        *_all(_INT, "n_references n type fmi python"),
+        *_all(_INT, "n_references n"),
+        ("kind", Kind),
     )
 
 
@@ -34,20 +39,26 @@ class Check(ctypes.Structure):
 
 class Fmu(ctypes.Structure):
     _fields_ = (
-        *_all(_POINTER, "place fmu do_step get_state state"),
-        *_all(_INT, "fmi forward python"),
-        *_all(_POINTER, "event terminate early reached gets"),
+        *_all(_POINTER, "place fmu do_step"),
+        ("kind", Kind),
+        ("forward", _INT),
+        *_all(_POINTER, "get_state gets"),
         ("n_gets", _INT),
         *_all(_POINTER, "outputs inverse good"),
         *_all(_INT, "n_outputs n_steps sparse"),
-        ("check", _POINTER),
+        *_all(_POINTER, "check due fewer"),
+        ("n_fewer", _INT),
+        *_all(_POINTER, "state event terminate early reached"),
     )
 
 
 class Setter(ctypes.Structure):
     _fields_ = (
-        *_all(_POINTER, "place where factors offsets values into whole sets"),
-        *_all(_INT, "n n_sets"),
+        ("place", _POINTER),
+        *_all(_INT, "n key"),
+        *_all(_POINTER, "where values sets"),
+        ("n_sets", _INT),
+        *_all(_POINTER, "factors offsets into whole"),
     )
 
 
@@ -115,7 +126,10 @@ class Meter(ctypes.Structure):
 
 
 class Table(ctypes.Structure):
-    _fields_ = (*_all(_POINTER, "block view rows"), *_all(_INT, "n room"))
+    _fields_ = (
+        *_all(_POINTER, "block view where rows room due count reached"),
+        *_all(_INT, "n every"),
+    )
 
 
 class Op(ctypes.Structure):
@@ -139,7 +153,7 @@ class Pace(ctypes.Structure):
 
 
 class Block(ctypes.Structure):
-    _fields_ = (*_all(_INT, "first last count"),)
+    _fields_ = (*_all(_INT, "first last"),)
 
 
 class Loop(ctypes.Structure):
@@ -166,7 +180,7 @@ class Events(ctypes.Structure):
 
 
 ALL = (
-    Place, Transfer, Check, Fmu, Setter, Link, Tank, Reader, Queue, Account, Hold,
+    Place, Kind, Transfer, Check, Fmu, Setter, Link, Tank, Reader, Queue, Account, Hold,
     Meter, Table, Op, Side, Clock, Pace, Block, Loop, At, Events,
 )  # fmt: skip
 
@@ -176,7 +190,7 @@ ALL = (
 """Codes of operations."""
 
 (
-    DONE, CALL, JUDGE, FAILED, RAISED, STEPPED, UNSAVED, UNRESTORED, FULL, DRAW, STOP, KIND, STARTS,
+    DONE, CALL, JUDGE, FAILED, RAISED, STEPPED, UNSAVED, UNRESTORED, DRAW, STOP, KIND, STARTS,
     PAUSE, GROW,
-) = range(15)  # fmt: skip
+) = range(14)  # fmt: skip
 """Why the loop returns."""

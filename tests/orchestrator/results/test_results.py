@@ -17,7 +17,7 @@ from hapticlink.orchestrator.results.tables import load, read_table
 
 def recorder_of(path: Path, columns: list[str], view: Any) -> Recorder:
     """One whose file is in its place from the first row on."""
-    made = Recorder(path, columns, view, lambda: made.publish())
+    made = Recorder(path, columns, view, range(len(view)), lambda: made.publish())
     return made
 
 

@@ -392,7 +392,7 @@ def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path: Path) -> None:
     assert found.run["end"]["time"] == found.haptics["time"][-1]
     rows = found.haptics["time"]
     np.testing.assert_array_equal(rows, np.arange(len(rows)) / 64)
-    assert (out / "haptics.csv").stat().st_size > most - 100
+    assert (out / "haptics.rows").stat().st_size > most - 100
     assert not list(out.glob(".*"))
 
 

@@ -154,12 +154,12 @@ def test_a_full_disk_is_a_fault(
 
     def full(source: Path, target: Path) -> None:
         replace(source, target)
-        if target.name == "haptics.csv":
+        if target.name == "haptics.rows":
             target.unlink()
             target.symlink_to("/dev/full")
 
     monkeypatch.setattr(os, "replace", full)
-    outcome = run(plan, RunFolder(tmp_path, at_once=True))
+    outcome = run(plan, RunFolder(tmp_path))
     assert "No space left on device" in str(outcome.fault)
     assert left_behind() == before
 

@@ -1,0 +1,55 @@
+"""Completes the folder of a run whose process was killed: the CSVs of its rows, and its end in
+run.json."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import rows
+from hapticlink.orchestrator.results.files import make_csv, write_json
+from hapticlink.orchestrator.results.run_folder import RUN
+from hapticlink.orchestrator.results.tables import load
+
+KILLED = "the process of the run was killed"
+
+
+class Recovered(NamedTuple):
+    """Rows of a table, the time of the last one (s), and rows that were written in part only."""
+
+    rows: int
+    time: float
+    lost: int
+
+
+def recover(
+    folder: Path, kind: str = "Killed", message: str = KILLED, ended: bool = False
+) -> dict[str, Recovered]:
+    """What was recovered, by rate; run.json has it too, and a fault of this kind with this message
+    where it did not say how the run ended. Raises InputFault where there is no run, or where it
+    still goes on; `ended` where it is known not to."""
+    run = load(folder).run
+    end = run["end"]
+    process = None if ended or os.name != "posix" else end.get("process")
+    if process and temporary_folders.lives(process):
+        raise InputFault(f"{folder}: its run goes on, in process {process}")
+    found = {}
+    for name in run["rates"]:
+        table = folder / f"{name}.csv"
+        if (source := table.with_suffix(rows.SUFFIX)).exists():
+            lost = rows.torn(source)
+            _, kept = rows.read(source)
+            found[name] = Recovered(make_csv(table), float(kept[-1, 0]), lost)
+    told: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in found.items()}}
+    if "process" in end:
+        last = next((r.time for r in found.values()), 0.0)
+        told["end"] = {"reason": "fault", "time": last}
+        told["fault"] = {"kind": kind, "time": last, "message": message}
+    if found or "process" in end:
+        content = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        write_json(folder / RUN, content | told)
+    return found

@@ -1,0 +1,73 @@
+"""The outputs that a run fetches: those that something reads at each communication point, and those
+that only the rows of a table need, where there is a row.
+
+What reads outputs asks the signal vector for their places, so that these are known without a list
+of who reads what. Entries of a port are fetched together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from hapticlink.orchestrator.run.energy.balance import Balance
+from hapticlink.orchestrator.run.energy.meters import Meters
+from hapticlink.orchestrator.run.initialize import TOLD
+from hapticlink.orchestrator.run.make_holds import make_holds
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.step_check import StepCheck
+from hapticlink.orchestrator.system.system import Fmu, System
+
+
+def with_fetched(system: System) -> System:
+    """The system with the outputs of each FMU that a run of it fetches."""
+    if system.recorded is None and system.every == 1:
+        return system
+    every = tuple(f"{u.name}.{s.name}" for u in system.fmus for s in u.description.outputs)
+    written = every if system.recorded is None else system.recorded
+    often, rows = {*_read(system)}, {*written}
+    fmus = tuple(_with(u, _ports(u, often), _ports(u, rows), system.every > 1) for u in system.fmus)
+    return replace(system, fmus=fmus, recorded=written)
+
+
+def _ports(fmu: Fmu, names: set[str]) -> set[str]:
+    """The ports of which an entry is among `names`."""
+    return {s.port for s in fmu.description.outputs if f"{fmu.name}.{s.name}" in names}
+
+
+def _with(fmu: Fmu, often: set[str], rows: set[str], apart: bool) -> Fmu:
+    """The FMU with these outputs; `apart`, those for rows alone come after the others."""
+    outputs = [s for s in fmu.description.outputs if s.port in often | rows]
+    seldom = frozenset(s.name for s in outputs if apart and s.port not in often)
+    outputs.sort(key=lambda s: s.name in seldom)
+    others = [s for s in fmu.description.scalars if s.causality != "output"]
+    return replace(
+        fmu, description=replace(fmu.description, scalars=(*others, *outputs)), seldom=seldom
+    )
+
+
+def _read(system: System) -> Iterator[str]:
+    """The outputs, `fmu.output`, that are read at each communication point."""
+    signals = SignalVector(system)
+    Meters(system, signals)
+    Balance(system, signals)
+    make_holds(system, signals)
+    for c in system.connections:
+        signals.sources(c)
+    if system.ends_when:
+        signals.scalar(system.ends_when.fmu, system.ends_when.variable)
+    yield from (f"{fmu}.{variable}" for fmu, variable in signals.asked)
+    for fmu in system.fmus:
+        yield from (f"{fmu.name}.{name}" for name in _of_itself(fmu, system))
+
+
+def _of_itself(fmu: Fmu, system: System) -> Iterator[str]:
+    """The outputs of an FMU by which its steps and its faults are judged."""
+    description = fmu.description
+    controlled = system.step_control is not None and not fmu.sampled
+    for scalar in description.outputs:
+        if controlled or scalar.bound or scalar.port in TOLD.get(description.block or "", ()):
+            yield scalar.name
+    if StepCheck.possible(description):
+        for pair in description.derivatives.items():
+            yield from pair

@@ -1,0 +1,88 @@
+"""A run that is killed loses no row, and long runs keep nothing in memory."""
+
+from __future__ import annotations
+
+import json
+import resource
+import signal
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import rows, tables
+from hapticlink.orchestrator.results.files import Recorder
+from hapticlink.orchestrator.results.recover import Recovered, recover
+from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
+from tests.orchestrator.run.test_interrupt import COMMAND, ONE
+
+LAST = 3.5
+KILLS = f"if time >= {LAST}: __import__('os').kill(__import__('os').getpid(), 9)"
+
+
+@pytest.mark.parametrize("extra", ["", "isolate = true\n"])
+def test_a_run_that_is_killed_keeps_every_row(tmp_path: Path, extra: str) -> None:
+    """By an FMU, before the first block of rows was full; or with all FMUs of others in processes
+    of their own, from outside, where no watchdog is."""
+    body = KILLS if not extra else f"if time >= {LAST}: __import__('time').sleep(1000)"
+    python_fmu(tmp_path, "Dies", f"self.y = time + size\n        {body}")
+    path, out = scene(tmp_path, ONE.format("Dies.fmu") + extra, duration=5), tmp_path / "out"
+    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    if extra:
+        with subprocess.Popen(command, stderr=subprocess.DEVNULL) as running:
+            while not (table := out / "haptics.rows").exists() or (
+                len(rows.read(table)[1]) < LAST * 64 + 1
+            ):
+                assert running.poll() is None
+            with pytest.raises(InputFault, match=f"its run goes on, in process {running.pid}"):
+                recover(out)
+            running.send_signal(signal.SIGKILL)
+        assert subprocess.run([*COMMAND, "recover", out], check=True, capture_output=True)
+    else:  # the watchdog does it, which holds the same stream
+        subprocess.run(command, stderr=subprocess.PIPE, check=False)
+    run = json.loads((out / "run.json").read_text())
+    assert run["recovered"] == {"haptics": {"rows": LAST * 64 + 1, "time": LAST, "lost": 0}}
+    assert run["end"] == {"reason": "fault", "time": LAST}
+    assert run["fault"]["kind"] == ("Killed" if extra else "Crash")
+    assert {p.name for p in out.iterdir()} == {"run.json", "haptics.csv"}
+    table = tables.load(out).haptics
+    np.testing.assert_array_equal(table["time"], np.arange(LAST * 64 + 1) / 64)
+
+
+def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path: Path) -> None:
+    """The process is killed while it writes a block: rows that the table has already are left out,
+    one that it has in part is whole in the block, or is counted as lost."""
+    values = np.zeros(2)
+    recorder = Recorder(tmp_path / "haptics.csv", ["a", "b"], values, [0, 1], lambda: None)
+    recorder.publish()
+    for k in range(5):
+        values[:] = k, -k
+        recorder.row(k / 8)
+    block = recorder.block.rows[:5].copy()
+    with recorder.target.open("ab") as file:
+        file.write(block.tobytes()[: 2 * 24 + 7])
+    expected = [[k / 8, k, -k] for k in range(5)]
+    assert rows.read(recorder.target)[1].tolist() == expected
+    recorder.block.filled.value = 0
+    assert rows.read(recorder.target)[1].tolist() == expected[:2]
+    (tmp_path / "run.json").write_text(
+        json.dumps({"end": {"reason": "running"}, "rates": ["haptics"], "files": ["haptics.csv"]})
+    )
+    assert recover(tmp_path) == {"haptics": Recovered(2, 1 / 8, 1)}
+    assert recover(tmp_path) == {}
+
+
+def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
+    """Two more minutes at 4096 Hz are 12 MB of rows; the largest memory of the process grows by a
+    fraction of that."""
+    c_fmu(tmp_path)
+    path, peaks = scene(tmp_path, ONE.format("faults.fmu"), rate=4096), []
+    for seconds in (60, 180):
+        ended = simulate(str(path), tmp_path / "out", [f"duration={seconds}"])
+        peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB
+        assert ended.outcome.fault is None
+        assert ended.outcome.end_time == seconds
+    assert peaks[1] - peaks[0] < 3e3

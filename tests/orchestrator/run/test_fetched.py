@@ -1,0 +1,182 @@
+"""A run fetches, sets and records no more than is used, with the same results."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.results import summary
+from hapticlink.orchestrator.run.compiled.library import CHOICE
+from tests.orchestrator.foreign_fmus import python_fmu, scene
+
+SCENE, SHORT = "closed-loop", ("duration=0.5",)
+TOLD = ("end", "fault", "energies", "energies_within_a_rate", "step_errors", "delays", "unstable")
+
+
+def ran(folder: Path, *options: str) -> Experiment:
+    found = simulate(SCENE, folder, (*SHORT, *options))
+    assert found.outcome.fault is None
+    return found
+
+
+def columns(folder: Path) -> dict[str, list[list[str]]]:
+    """The tables as text, column by column without their names."""
+    found = {}
+    for path in folder.glob("*.csv"):
+        with path.open(newline="") as file:
+            found[path.stem] = [list(column) for column in zip(*csv.reader(file), strict=True)]
+    return found
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Experiment, dict[str, Any]]:
+    folder = tmp_path_factory.mktemp("whole")
+    return ran(folder), columns(folder)
+
+
+LIST = '["hand", "virtual_mechanism.x", "virtual_environment.P_c[1,2]"]'
+
+
+@pytest.mark.parametrize("loop", ["compiled", "python"])
+@pytest.mark.parametrize("every", [1, 7])
+@pytest.mark.parametrize("signals", ["all", "connected", "none", LIST])
+def test_recorded_columns_are_those_of_the_whole_table(
+    whole: tuple[Experiment, dict[str, Any]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    signals: str,
+    every: int,
+    loop: str,
+) -> None:
+    """Each column in each row to the byte, and all else that a run tells."""
+    monkeypatch.setenv(CHOICE, loop)
+    found = ran(tmp_path, f"record.signals={signals}", f"record.every={every}")
+    for rate, table in columns(tmp_path).items():
+        kept = {c[0]: [c[0], *c[1::every]] for c in whole[1][rate]}
+        assert table == [kept[c[0]] for c in table]
+        assert signals != "all" or len(table) == len(kept)
+    assert (not columns(tmp_path)) == (signals == "none")
+    assert {k: found.run[k] for k in TOLD} == {k: whole[0].run[k] for k in TOLD}
+    assert bool([*summary.unrecorded(found.run["not_recorded"])]) == (signals != "all")
+
+
+def test_only_what_is_used_is_fetched(tmp_path: Path) -> None:
+    """What connections read; of the plants also what steps and faults are judged by."""
+    found = ran(tmp_path, "record.signals=none").system
+    kept = {u.name: {s.port for s in u.description.outputs} for u in found.fmus}
+    read = {(c.source, c.source_port) for c in found.connections}
+    assert all(port in kept[fmu] for fmu, port in read)
+    assert kept["controller"] == {port for fmu, port in read if fmu == "controller"}
+    assert kept["hand"] == {"F"}
+    assert "energy" in kept["virtual_mechanism"]  # of the balance
+    assert "workspace_margin" in kept["haptic_device"]  # of stop_when
+    assert "iota" not in kept["virtual_environment"]
+
+
+@pytest.mark.parametrize("loop", ["compiled", "python"])
+def test_calls_of_an_event(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: str) -> None:
+    """One get, set and step of each FMU at each communication point; a checked step adds two half
+    steps and two gets, with the state saved and restored."""
+    monkeypatch.setenv(CHOICE, loop)
+    outcome = ran(tmp_path).outcome
+    calls, ticks = outcome.calls, 256
+    assert calls["hand"] == {"get": ticks + 1, "step": ticks + 1}
+    assert calls["controller"] == {"get": ticks + 1, "set": ticks + 1, "step": ticks + 1}
+    for plant in ("haptic_device", "virtual_mechanism"):
+        checked = outcome.step_errors[plant].checked
+        assert calls[plant] == {
+            "get": ticks + 2 * checked,
+            "rollback": checked,
+            "save": checked,
+            "set": ticks,
+            "step": ticks + 2 * checked,
+        }
+
+
+FOREIGN = """
+[[fmu]]
+name = "source"
+path = "Steady.fmu"
+[[fmu]]
+name = "eats"
+path = "Eats.fmu"
+[[connection]]
+from = "source.y"
+to = "eats.u"
+"""
+
+
+@pytest.mark.parametrize("loop", ["compiled", "python"])
+def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: str
+) -> None:
+    """FMI has inputs keep their values, but FMUs of others need not, so that these are set though
+    they have not changed."""
+    monkeypatch.setenv(CHOICE, loop)
+    python_fmu(tmp_path, "Steady", "self.y = 1.0")
+    python_fmu(tmp_path, "Eats", "self.y += self.u; self.u = 0.0")
+    path = scene(tmp_path, FOREIGN)
+    found = simulate(str(path), tmp_path / "out")
+    eaten = found.results.haptics["eats.y"]
+    assert (eaten[2:] - eaten[1:-1] == 1.0).all()
+    assert found.outcome.calls["eats"]["set"] == found.outcome.calls["eats"]["step"]
+
+
+HELD = """
+[[fmu]]
+name = "source"
+path = "Source.fmu"
+rate = 8
+[[fmu]]
+name = "wall"
+block = "virtual_wall"
+settings = { stiffness = 1.0, position = 0.0 }
+[[connection]]
+from = "source.y"
+to = "wall.x"
+convert = false
+hold = "zoh"
+"""
+
+
+@pytest.mark.parametrize("loop", ["compiled", "python"])
+def test_unchanged_inputs_are_not_set_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: str
+) -> None:
+    """A block of this project gets a held value once: at 0 s, and as each of 4 steps has ended."""
+    monkeypatch.setenv(CHOICE, loop)
+    python_fmu(tmp_path, "Source")
+    found = simulate(str(scene(tmp_path, HELD)), tmp_path / "out")
+    assert found.outcome.fault is None
+    assert found.outcome.calls["wall"] == {"get": 33, "set": 5, "step": 33}
+
+
+def test_a_name_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(SceneFault, match=r"did you mean 'virtual_mechanism\.x'\?"):
+        simulate(SCENE, tmp_path, ['record.signals=["virtual_mechanism.xx"]'])
+    with pytest.raises(SceneFault, match='"all", "connected" or "none" or a list'):
+        simulate(SCENE, tmp_path, ["record.signals=some"])
+
+
+def test_rows_instead_of_csv(whole: tuple[Experiment, dict[str, Any]], tmp_path: Path) -> None:
+    found = ran(tmp_path, "record.format=rows")
+    assert {p.name for p in tmp_path.iterdir()} == {"run.json", "haptics.rows", "graphics.rows"}
+    for rate, table in whole[0].results.tables.items():
+        assert found.results.tables[rate].columns == table.columns
+        assert found.results.tables[rate].rows.tobytes() == table.rows.tobytes()
+    ran(tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {"run.json", "haptics.csv", "graphics.csv"}
+
+
+def test_results_of_a_run_that_records_nothing(tmp_path: Path) -> None:
+    found = ran(tmp_path, "record.signals=none")
+    assert {p.name for p in tmp_path.iterdir()} == {"run.json"}
+    assert found.outcome.end_time == 0.5
+    assert [*found.results.tables] == ["haptics", "graphics"]
+    assert json.loads((tmp_path / "run.json").read_text())["files"] == ["run.json"]
