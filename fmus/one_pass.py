@@ -17,6 +17,7 @@ every operation is one of the component's, so that the results are the same, bit
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -55,14 +56,19 @@ def one_pass(component: Component) -> OnePass:
         return _composed(component)
 
 
+_ALONE = threading.RLock()
+
+
 @contextmanager
 def _unsimplified() -> Iterator[None]:
-    before = ca.GlobalOptions.getSimplificationOnTheFly()
-    ca.GlobalOptions.setSimplificationOnTheFly(False)
-    try:
-        yield
-    finally:
-        ca.GlobalOptions.setSimplificationOnTheFly(before)
+    """One thread at a time, as CasADi has one such option for all."""
+    with _ALONE:
+        before = ca.GlobalOptions.getSimplificationOnTheFly()
+        ca.GlobalOptions.setSimplificationOnTheFly(False)
+        try:
+            yield
+        finally:
+            ca.GlobalOptions.setSimplificationOnTheFly(before)
 
 
 def _composed(component: Component) -> OnePass:

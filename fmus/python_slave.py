@@ -334,7 +334,9 @@ class HapticlinkSlave(Fmi2Slave):
     # --- FMU state: bytes, so that saving and serialising are the same, bit for bit -------
 
     def _get_fmu_state(self) -> bytes:
-        flags = bytes((MODES.index(self._mode), self._start_due, self._output_due))
+        # A plant's outputs follow from the rest, also where an importer has changed the bytes.
+        output_due = self._output_due or not self._sampled
+        flags = bytes((MODES.index(self._mode), self._start_due, output_due))
         parts = (self._time, self._values, self._state)
         return self._about["digest"].encode() + flags + b"".join(p.tobytes() for p in parts)
 

