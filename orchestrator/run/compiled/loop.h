@@ -290,6 +290,31 @@ enum {
     GROW,        /* a hold has no room for a sample */
 };
 
+static inline double tick_time(const Loop *l, int64_t tick) { /* s */
+    return (double)tick * l->numerator / l->denominator;
+}
+
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+enum { WARNING = 1 }; /* of FMI: a status up to it is a success */
+
+int loop_carry_out(Loop *l, int64_t tick, At *at);
+int fmu_get(const Fmu *f, int64_t judged, At *at);
+int fmu_set(const Setter *s, const double *board, At *at);
+int fmu_do_step(const Fmu *f, double time, double size);
+int fmu_save(const Fmu *f, void *get_state, void *state);
+int fmu_step(Fmu *f, double time, double end, double size, At *at);
+int fmu_checked_step(Fmu *f, double time, double end, double size, At *at);
+int meter_sample(Meter *m, const double *board, int64_t stamp);
+int meter_move(Meter *m, const double *board, int64_t tick);
+void meter_feed(Meter *m, const double *board, double share);
+int pace_wait(const Loop *l, Events *e, int64_t tick);
+void pace_begin(const Loop *l, Events *e);
+void pace_end(const Loop *l, Events *e, int64_t time);
 int64_t now(void);
 void wait_until(int64_t time);
 void watch_signals(int on);

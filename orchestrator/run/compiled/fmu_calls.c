@@ -1,0 +1,170 @@
+/* Calls of an FMU: variables read and set, a step, and saving its state. */
+
+#include "loop.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { SHORT = 10000, ALL = 64, EACH = 64 };
+/* Steps below SHORT ns, after ALL steps that were all timed, are timed one in EACH: reading the
+ * clock takes longer than the shortest steps. */
+
+typedef int (*Transfer2)(void *, const uint32_t *, size_t, void *);
+typedef int (*Transfer3)(void *, const uint32_t *, size_t, void *, size_t);
+typedef int (*DoStep2)(void *, double, double, int);
+typedef int (*DoStep3)(void *, double, double, _Bool, uint8_t *, uint8_t *, uint8_t *, double *);
+typedef int (*GetState)(void *, void *);
+
+static int transferred(const Transfer *t) {
+    if (t->kind.fmi == 2)
+        return ((Transfer2)t->call)(t->fmu, t->references, t->n_references, t->buffer);
+    return ((Transfer3)t->call)(t->fmu, t->references, t->n_references, t->buffer, t->n);
+}
+
+/* Doubles from what the FMU has given; 0 where a number of 64 bits may not be exact as one. */
+static int from_buffer(const Transfer *t) {
+    const double exact = 9007199254740992.0;
+#define FROM(kind, type)                                                                           \
+    case kind:                                                                                     \
+        for (int64_t i = 0; i < t->n; i++) t->values[i] = (double)((type *)t->buffer)[i];          \
+        break;
+    switch (t->kind.type) {
+    case DOUBLE: return 1;
+        FROM(FLOAT, float)
+        FROM(INT64, int64_t)
+        FROM(INT32, int32_t)
+        FROM(INT16, int16_t)
+        FROM(INT8, int8_t)
+        FROM(UINT64, uint64_t)
+        FROM(UINT32, uint32_t)
+        FROM(UINT16, uint16_t)
+        FROM(UINT8, uint8_t)
+        FROM(BOOL2, int32_t)
+        FROM(BOOL3, uint8_t)
+    }
+    if (t->kind.type == INT64 || t->kind.type == UINT64)
+        for (int64_t i = 0; i < t->n; i++)
+            if (fabs(t->values[i]) >= exact) return 0;
+    return 1;
+}
+
+/* The nearest numbers of the FMU's type; 0 where one is beyond its range. */
+static int to_buffer(const Transfer *t) {
+#define TO(kind, type, least, beyond)                                                              \
+    case kind:                                                                                     \
+        for (int64_t i = 0; i < t->n; i++) {                                                       \
+            const double whole = rint(t->values[i]);                                               \
+            if (!(whole >= least && whole < beyond)) return 0;                                     \
+            ((type *)t->buffer)[i] = (type)whole;                                                  \
+        }                                                                                          \
+        break;
+    switch (t->kind.type) {
+    case FLOAT:
+        for (int64_t i = 0; i < t->n; i++) ((float *)t->buffer)[i] = (float)t->values[i];
+        break;
+        TO(INT64, int64_t, -9223372036854775808.0, 9223372036854775808.0)
+        TO(INT32, int32_t, -2147483648.0, 2147483648.0)
+        TO(INT16, int16_t, -32768.0, 32768.0)
+        TO(INT8, int8_t, -128.0, 128.0)
+        TO(UINT64, uint64_t, 0.0, 18446744073709551616.0)
+        TO(UINT32, uint32_t, 0.0, 4294967296.0)
+        TO(UINT16, uint16_t, 0.0, 65536.0)
+        TO(UINT8, uint8_t, 0.0, 256.0)
+    case BOOL2:
+        for (int64_t i = 0; i < t->n; i++) ((int32_t *)t->buffer)[i] = t->values[i] >= 0.5;
+        break;
+    case BOOL3:
+        for (int64_t i = 0; i < t->n; i++) ((uint8_t *)t->buffer)[i] = t->values[i] >= 0.5;
+        break;
+    }
+    return 1;
+}
+
+/* Call number i of a get or a set. */
+static inline int call(const Transfer *t, int64_t i, int64_t *count, At *at) {
+    ++*count;
+    at->what = i;
+    at->status = transferred(t);
+    if (t->kind.python && exception_left()) return RAISED;
+    return at->status > WARNING ? FAILED : 0;
+}
+
+int fmu_get(const Fmu *f, int64_t judged, At *at) {
+    const Transfer *gets = *f->due ? f->gets : f->fewer;
+    const int64_t n = *f->due ? f->n_gets : f->n_fewer;
+    for (int64_t i = 0; i < n; i++) {
+        const int code = call(gets + i, i, &f->place->gets, at);
+        if (code) return code;
+        if (gets[i].kind.type != DOUBLE && !from_buffer(gets + i)) return CALL;
+    }
+    if (!judged) return 0;
+    int kept = 1;
+    for (int64_t i = 0; i < f->n_outputs; i++)
+        kept &= fabs(f->outputs[i]) * f->inverse[i] <= 1.0;
+    if (!kept) return JUDGE;
+    if (f->good) memcpy(f->good, f->outputs, f->n_outputs * sizeof(double));
+    return 0;
+}
+
+/* Whether a value differs from the one before in any bit, and is now that. */
+static inline int differs(double *before, double value) {
+    int64_t bits[2];
+    memcpy(bits, before, sizeof *before);
+    memcpy(bits + 1, &value, sizeof value);
+    *before = value;
+    return bits[0] != bits[1];
+}
+
+int fmu_set(const Setter *s, const double *board, At *at) {
+    Place *p = s->place;
+    if (p->ended) return 0;
+    int differ = !s->key || p->setter != s->key;
+    if (s->factors)
+        for (int64_t i = 0; i < s->n; i++)
+            differ |= differs(s->values + i, board[s->where[i]] * s->factors[i] + s->offsets[i]);
+    else
+        for (int64_t i = 0; i < s->n; i++) differ |= differs(s->values + i, board[s->where[i]]);
+    if (!differ) return 0;
+    if (s->into)
+        for (int64_t i = 0; i < s->n; i++) s->whole[s->into[i]] = s->values[i];
+    p->setter = 0;
+    for (int64_t i = 0; i < s->n_sets; i++) {
+        if (s->sets[i].kind.type != DOUBLE && !to_buffer(s->sets + i)) return CALL;
+        const int code = call(s->sets + i, i, &p->sets, at);
+        if (code) return code;
+    }
+    p->setter = s->key;
+    return 0;
+}
+
+int fmu_do_step(const Fmu *f, double time, double size) {
+    f->place->steps++;
+    if (f->kind.fmi == 2) return ((DoStep2)f->do_step)(f->fmu, time, size, (int)f->forward);
+    return ((DoStep3)f->do_step)(f->fmu, time, size, f->forward != 0, f->event, f->terminate,
+                                 f->early, f->reached);
+}
+
+/* The status of saving an FMU's state. */
+int fmu_save(const Fmu *f, void *get_state, void *state) {
+    f->place->saves++;
+    return ((GetState)get_state)(f->fmu, state);
+}
+
+int fmu_step(Fmu *f, double time, double end, double size, At *at) {
+    Place *p = f->place;
+    p->time = p->begin = time;
+    p->size = size;
+    p->end = end;
+    if (p->ended || p->waiting) return CALL;
+    if (f->get_state && (at->status = fmu_save(f, f->get_state, f->state)) > WARNING) return UNSAVED;
+    const int timed = !f->sparse || f->n_steps % EACH == 0;
+    const int64_t begin = timed ? now() : 0;
+    at->what = -1;
+    at->status = fmu_do_step(f, time, size);
+    if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
+    if (f->kind.python && exception_left()) return RAISED;
+    if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
+    if (at->status > WARNING || (f->kind.fmi == 3 && *f->terminate)) return STEPPED;
+    p->time = end;
+    return 0;
+}
