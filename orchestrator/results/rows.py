@@ -41,9 +41,13 @@ class Block:
         size = COUNT + room * 8 * width
         self.path.unlink(missing_ok=True)
         with self.path.open("xb+", buffering=0) as file:  # never through a link
-            if file.write(bytes(size)) < size:  # on the disk, so that there is room for it
+            try:
+                left = memoryview(bytes(size))  # on the disk, so that there is room for it
+                while left:
+                    left = left[file.write(left) :]
+            except OSError:
                 self.path.unlink()
-                raise OSError(28, os.strerror(28))
+                raise
             try:
                 memory = mmap.mmap(file.fileno(), size)
             except OSError:

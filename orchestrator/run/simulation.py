@@ -58,9 +58,10 @@ class Simulation:
             made = instance(fmu, view, system.faults, fmu.name in self.isolated)
             self.instances[fmu.name] = stack.enter_context(made)
         stack.callback(self._dismiss)
+        repeated = system.step_control is not None or system.coupling == "iterated"
         self.step_checks = {
             fmu.name: StepCheck(self.instances[fmu.name])
-            for fmu in system.fmus
+            for fmu in (() if repeated else system.fmus)
             if fmu.name not in self.isolated and StepCheck.possible(fmu.description)
         }
         self.holds: dict[str, Hold]
