@@ -43,6 +43,7 @@ ROOMS = {
         ".",
         "stability",
         "sweep",
+        "maps",
         "report",
         "study",
         "api",

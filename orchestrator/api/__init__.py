@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hapticlink.orchestrator.api.files import build as build
     from hapticlink.orchestrator.api.files import export as export
+    from hapticlink.orchestrator.api.maps import stability_map as stability_map
     from hapticlink.orchestrator.api.real_time import RealTime as RealTime
     from hapticlink.orchestrator.api.result import Run as Run
     from hapticlink.orchestrator.api.runs import RunInterrupted as RunInterrupted
@@ -21,10 +22,17 @@ if TYPE_CHECKING:
     from hapticlink.orchestrator.base.faults import Fault as Fault
     from hapticlink.orchestrator.base.faults import InputFault as InputFault
     from hapticlink.orchestrator.base.faults import SceneFault as SceneFault
+    from hapticlink.orchestrator.maps import Map as Map
     from hapticlink.orchestrator.results.tables import Table as Table
     from hapticlink.orchestrator.scene.scene import Scene as Scene
     from hapticlink.orchestrator.stability.analysis import Stability as Stability
     from hapticlink.orchestrator.stability.analysis import stability as stability
+    from hapticlink.orchestrator.stability.finite_time import (
+        finite_time_growth as finite_time_growth,
+    )
+    from hapticlink.orchestrator.stability.passivity import Passivity as Passivity
+    from hapticlink.orchestrator.stability.passivity import passivity as passivity
+    from hapticlink.orchestrator.stability.varying import VaryingStability as VaryingStability
 else:
 
     def __getattr__(name: str) -> Any:
@@ -49,6 +57,16 @@ else:
                 from hapticlink.orchestrator.scene import scene as room
             case "stability" | "Stability":
                 from hapticlink.orchestrator.stability import analysis as room
+            case "VaryingStability":
+                from hapticlink.orchestrator.stability import varying as room
+            case "finite_time_growth":
+                from hapticlink.orchestrator.stability import finite_time as room
+            case "passivity" | "Passivity":
+                from hapticlink.orchestrator.stability import passivity as room
+            case "stability_map":
+                from hapticlink.orchestrator.api import maps as room
+            case "Map":
+                from hapticlink.orchestrator import maps as room
             case _:
                 raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return getattr(room, name)

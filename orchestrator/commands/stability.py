@@ -2,32 +2,98 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from hapticlink.orchestrator.base.say import say
 from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, default_folder, options
+from hapticlink.orchestrator.commands.progress import counted
+from hapticlink.orchestrator.commands.sweep import Jobs, Vary
 
 At = Annotated[float, Parameter(help="Time (s) from which on no target, drive or wrench changes.")]
+Growth = Annotated[
+    float | None,
+    Parameter(help="Time (s) over which perturbations grow along the trajectory from AT on."),
+]
+UserPort = Annotated[
+    bool, Parameter(negative="", help="Passivity of the user's port for any hand, as well.")
+]
+Check = Annotated[
+    int, Parameter(help="Points of the map to be checked by runs, near the boundary and away.")
+]
+Seed = Annotated[int, Parameter(help="Seed of the choice of these points.")]
 
 
 def stability(
-    scene: Scene, /, *, out: Out = None, set: Set = None, swap: Swap = None, at: At = 0.0
+    scene: Scene,
+    /,
+    *,
+    out: Out = None,
+    set: Set = None,
+    swap: Swap = None,
+    at: At = 0.0,
+    port: UserPort = False,
+    growth: Growth = None,
+    vary: Vary = None,
+    check: Check = 0,
+    seed: Seed = 0,
+    jobs: Jobs = None,
 ) -> int:
     """Judge the stability of a scene around its equilibrium, from the linearised map of its
     co-simulation over a period of all its rates: spectral radius, modes and who takes part.
 
-    Prints the result and writes stability.json to OUT (default runs/<scene>).
+    Prints the result and writes stability.json to OUT (default runs/<scene>). With --vary, a map
+    over one or two numeric keys and others, refined at the boundary: map.csv and map.png in OUT
+    (default maps/<scene>); the same command continues an interrupted map.
     """
+    if vary:
+        return _map(scene, out or default_folder("maps", scene), options(set, swap), vary, check,
+                    seed, jobs)  # fmt: skip
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 
-    found = api.stability(scene, options(set, swap), at=at)
+    given = options(set, swap)
+    if growth is not None:
+        rate = api.finite_time_growth(scene, given, at=at, seconds=growth)
+        say(f"{default_folder('runs', scene).name}: over {growth:g} s from {at:g} s on, the worst")
+        say(f"  perturbation grows at {rate:.5g} 1/s: no verdict on stability")
+        return 0
+    found = api.stability(scene, given, at=at)
+    user = api.passivity(scene, given) if port else None
     folder = folders.ensure(out or default_folder("runs", scene))
-    write_json(folder / "stability.json", found.record())
+    record = found.record() | ({"port": user.record()} if user else {})
+    write_json(folder / "stability.json", record)
     say(f"{default_folder('runs', scene).name}: {found.verdict}")
-    say(*(f"  {line}" for line in found.lines()), sep="\n")
+    said = [*found.lines(), *(user.lines() if user else ())]
+    say(*(f"  {line}" for line in said), sep="\n")
     say(f"  {folder}/stability.json")
+    return 0
+
+
+def _map(
+    scene: str,
+    folder: Path,
+    options: tuple[str, ...],
+    vary: list[str],
+    check: int,
+    seed: int,
+    jobs: int | None,
+) -> int:
+    from hapticlink.orchestrator import api
+
+    with counted(scene) as tell:
+        made = api.stability_map(
+            scene, vary, options, out=folder, check=check, seed=seed, jobs=jobs, progress=tell
+        )
+    verdicts = [row["verdict"] for row in made.of("grid")]
+    said = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+    say(f"{default_folder('maps', scene).name}: {len(verdicts)} points, {said}")
+    say(f"  {len(made.of('boundary'))} points of the boundary")
+    if check:
+        agree = [row.get("agree") for row in made.of("check")]
+        say(f"  {agree.count(True)} of {len(agree)} runs agree with the map")
+    say(f"  {folder}/: map.csv, map.png")
     return 0

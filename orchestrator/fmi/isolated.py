@@ -163,6 +163,7 @@ class Isolated(Instance):
 
     def deserialize(self, state: bytes) -> None:
         self._pending = []  # inputs are part of the state
+        self._fresh = None  # and so are outputs
         self._ask("deserialize", state)
 
     def dismiss(self) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability import frozen
@@ -18,8 +19,13 @@ from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
-from hapticlink.orchestrator.stability.modes import Mode, leading, modes
+from hapticlink.orchestrator.stability.modes import Mode, leading, modes, verdict
 from hapticlink.orchestrator.stability.oscillation import traced
+from hapticlink.orchestrator.stability.varying import (
+    VaryingStability,
+    varies,
+    varying_stability,
+)
 from hapticlink.orchestrator.system.built import built
 
 SHOWN = 6
@@ -55,9 +61,7 @@ class Stability:
     @property
     def verdict(self) -> str:
         """stable, unstable, or marginal where the radius is 1 within its uncertainty."""
-        if abs(self.radius - 1.0) <= self.uncertainty:
-            return "marginal"
-        return "unstable" if self.radius > 1.0 else "stable"
+        return verdict(self.radius, self.uncertainty)
 
     def record(self) -> dict[str, Any]:
         """The content of stability.json."""
@@ -107,17 +111,23 @@ class Stability:
             yield f"mean, in: {', '.join(self.kinks)}"
 
 
-def stability(scene: str | Path | Scene, options: Options = (), *, at: float = 0.0) -> Stability:
+def stability(
+    scene: str | Path | Scene, options: Options = (), *, at: float = 0.0
+) -> Stability | VaryingStability:
     """The stability of a scene, changed by `options` (see `scene`), around its equilibrium.
 
     The scene is run up to the time `at` (s) before, from which on no target, drive or wrench may
-    change with time.
+    change with time. For a rate that is drawn at random the result is that of all its periods.
 
     Raises InputFault for a scene without an equilibrium, and for one whose co-simulation has no map
-    of a period: rates, latencies or steps that vary, an FMU that does not declare its state.
+    of a period: latencies or steps that vary, an FMU that does not declare its state.
     """
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
         read = open_scene.load(scene, options)
+        if varies(read):
+            if at:
+                raise InputFault(f"at = {at:g}: a rate that varies is judged from the start on")
+            return varying_stability(read)
         with built(read) as whole:
             system, removed = frozen.without(whole)
             with opened(long_enough(read, system, at), at, Closures(read)) as map_:

@@ -8,8 +8,9 @@ so that the map has the modes of their stabilisation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +51,13 @@ class Closures:
             if basis is None:
                 continue
             for indices in places.values():
-                # Outputs of the same name are computed from the states, which come last.
+                # Inputs and outputs of the same name come before the states.
                 bound.update(indices)
-                for column in basis.T:
-                    direction = np.zeros(len(point))
-                    direction[indices[-self._n :]] = column
-                    yield direction
+                for first in range(0, len(indices), self._n):
+                    for column in basis.T:
+                        direction = np.zeros(len(point))
+                        direction[indices[first : first + self._n]] = column
+                        yield direction
         for i in free:
             if i not in bound:
                 direction = np.zeros(len(point))
@@ -67,11 +69,16 @@ class Closures:
         linkage = self.scene.linkage
         return sum(3 if j.type == "free" else 1 for j in linkage.joint) if linkage else 0
 
+    @cached_property
+    def _jacobian(self) -> Callable[[Vector], Matrix]:
+        assert self.scene.linkage is not None
+        return closure_jacobian(self.scene.linkage)
+
     def _basis(self, q: Vector | None) -> Matrix | None:
         """A basis of null(W) at q, None where no closure is redundant."""
         linkage = self.scene.linkage
         if q is None or linkage is None or not linkage.closed:
             return None
-        W = closure_jacobian(linkage)(q)
+        W = self._jacobian(q)
         basis: Matrix = null_space(W, rcond=RANK)
         return basis if len(W) > W.shape[1] - basis.shape[1] else None

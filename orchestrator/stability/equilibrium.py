@@ -15,12 +15,15 @@ import numpy as np
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
 from hapticlink.orchestrator.stability.linearise import Linear, linearised
+from hapticlink.orchestrator.stability.tangent import SAME
 
 TOLERANCE = 1e-9
 """Of each coordinate z, relative to max(1, |z|)."""
 ITERATIONS = 20
 PATIENCE = 3
 """Steps of Newton in a row without halving the smallest residual that end a search."""
+COARSE = 0.03
+"""Largest relative difference of numbers for which Newton's method shares slopes."""
 NEUTRAL = 1e-7
 """Singular values of the balanced I - A, relative to the largest, that count as 0."""
 
@@ -75,8 +78,9 @@ def _unrest(at: Linear) -> Vector:
 
 
 def _newton(map_: LiftedMap, state: Vector) -> Linear:
-    """Newton's method from `state`: the last point where the FMUs can be evaluated."""
-    at, least, idle = linearised(map_, state), np.inf, 0
+    """Newton's method from `state`: the last point where the FMUs can be evaluated. Slopes are
+    shared by numbers as different as the residual allows, as long as it shrinks with them."""
+    at, least, idle = linearised(map_, state, COARSE), np.inf, 0
     for _ in range(ITERATIONS):
         left = _unrest(at).max()
         idle = idle + 1 if left > least / 2 else 0
@@ -86,11 +90,12 @@ def _newton(map_: LiftedMap, state: Vector) -> Linear:
         d = at.scales
         balanced = np.eye(len(d)) - at.A * d / d[:, None]
         step = d * np.linalg.lstsq(balanced, at.change / d, rcond=NEUTRAL)[0]
+        same = SAME if idle else max(SAME, min(COARSE, 0.1 * left))
         try:
-            at = linearised(map_, at.moved(step))
+            at = linearised(map_, at.moved(step), same)
         except FmuFault:  # far from where it is linear
             break
-    return at
+    return linearised(map_, at.point) if rests(at) else at
 
 
 def _why_none(map_: LiftedMap, nearest: Linear | None, ended: FmuFault | None) -> str:

@@ -16,15 +16,17 @@ from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.plan.operations import Event, Operation, Part, Record, StopWhen
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.bind import Binder
+from hapticlink.orchestrator.run.bind import Binder, Bound
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.frozen import discrete
 from hapticlink.orchestrator.stability.state_vector import Coordinate, StateVector, Vector
+from hapticlink.orchestrator.stability.tangent import SAME, Columns, Instruction, Matrix, Tangent
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
 
@@ -58,16 +60,23 @@ class LiftedMap:
     """
 
     def __init__(
-        self, plan: Plan, simulation: Simulation, at: float, closures: Closures | None
+        self,
+        plan: Plan,
+        simulation: Simulation,
+        at: float,
+        tangent: Tangent,
+        window: tuple[int, int] | None = None,
     ) -> None:
         self._simulation, time = simulation, plan.system.timeline
-        self._bound: dict[Event | Part, list[Call]] = {}
-        self._plan = plan
+        self._bound: dict[Event | Part, Bound] = {}
+        self._plan, self.system = plan, plan.system
         self._binder = Binder(simulation, self._calls)
+        self._tangent = tangent
         self._state = StateVector(simulation)
-        length = hyperperiod(time)
+        length = window[1] if window else hyperperiod(time)
         self.period, self.seconds = time.seconds(length), time.seconds
-        first = length * math.ceil(behind_start(plan.system, at) / length)
+        first = window[0] if window else length * math.ceil(behind_start(plan.system, at) / length)
+        self._begin = self._state.save()
         moments = list(takewhile(lambda moment: moment.tick < first + 2 * length, plan))
         for tick, event in moments:
             if tick < first:
@@ -79,7 +88,13 @@ class LiftedMap:
         self.coordinates: Sequence[Coordinate] = self._state.coordinates(self._template)
         self.start = self._state.numbers(self._template)
         free = [i for i, c in enumerate(self.coordinates) if not discrete(c)]
-        self._free, self._closures = np.array(free, dtype=np.intp), closures
+        self._free, self._closures = np.array(free, dtype=np.intp), tangent.closures
+
+    def over(self, system: System, window: tuple[int, int]) -> LiftedMap:
+        """The map of the same FMUs on the timeline of another `system`, from the first tick of a
+        `window` on and over its length."""
+        self._state.restore(self._begin)
+        return LiftedMap(Plan(system), self._simulation, 0.0, self._tangent, window)
 
     def __call__(
         self, state: Vector, watch: Watch = lambda count, state: False, always: bool = False
@@ -93,6 +108,37 @@ class LiftedMap:
                 return None
         interrupt.check()
         return self._numbers()
+
+    def slopes(
+        self,
+        point: Vector,
+        V: Matrix,
+        same: float = SAME,
+        after: Callable[[Instruction, Columns], None] = lambda instruction, M: None,
+    ) -> tuple[Vector, Matrix, Matrix]:
+        """F(point), its derivatives along the columns of V, and their errors; slopes of operations
+        are shared by numbers that differ by up to `same`, relative. `after` each operation is
+        called with the perturbations, which it may change."""
+        state = self._state
+        state.restore(state.put(self._template, point))
+        ends = np.cumsum([len(part) for part in state.parts(self._template)])[:-1]
+        M = dict(zip(state.owners, np.split(V, ends), strict=True))
+        D = {owner: np.zeros_like(rows) for owner, rows in M.items()}
+        for tick, event in self._moments:
+            for instruction, call in self._instructions(event):
+                self._tangent.carry(tick, instruction, call, M, D, same)
+                after(instruction, M)
+            interrupt.check()
+        whole, errors = (np.vstack([X[owner] for owner in state.owners]) for X in (M, D))
+        return self._numbers(), whole, errors
+
+    def set_parameters(self, values: Sequence[tuple[str, Scalar, float]]) -> None:
+        """Sets tunable parameters, by FMU, from here on."""
+        self._state.restore(self._template)
+        for fmu, scalar, value in values:
+            self._simulation.instances[fmu].connect([scalar], [0])(np.array([float(value)]))
+        self._template = self._state.save()
+        self._tangent.forget()
 
     def directions(self, point: Vector) -> Iterator[Vector]:
         """Orthonormal directions in which the state can be moved from `point`, that of the
@@ -126,18 +172,22 @@ class LiftedMap:
         return found
 
     def _run(self, tick: int, event: Event) -> None:
-        for call in self._calls(event):
+        for _, call in self._instructions(event):
             call(tick)
 
     def _calls(self, kind: Event | Part) -> list[Call]:
-        """The calls of a kind of event, without those that write rows or end a run."""
+        return [call for _, call in self._instructions(kind)]
+
+    def _instructions(self, kind: Event | Part) -> Bound:
+        """The operations of a kind of event, without those that write rows or end a run, and their
+        calls."""
         if kind not in self._bound:
             operations: list[Operation] = [
                 operation
                 for operation in self._plan.block(kind)
                 if not isinstance(operation, Record | StopWhen)
             ]
-            self._bound[kind] = self._binder.bind_all(operations)
+            self._bound[kind] = self._binder.instructions(operations)
         return self._bound[kind]
 
 
@@ -184,4 +234,4 @@ def opened(
         simulation = Simulation(system, results, stack)
         simulation.step_checks.clear()
         simulation.start()
-        yield LiftedMap(Plan(system), simulation, at, closures)
+        yield LiftedMap(Plan(system), simulation, at, Tangent(simulation, closures))

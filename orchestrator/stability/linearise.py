@@ -1,12 +1,10 @@
-"""The linearisation of the lifted map by central differences.
+"""The linearisation of the lifted map: A = V' dF/dz V, by perturbations that are carried through
+the operations of a period (tangent.py).
 
-    A_ij = V_i' (F(z + d_j V_j) - F(z - d_j V_j)) / 2 d_j,   d_j = 1e-6 max(1, |z|)
-
-V_j are the unit vectors of the coordinates, or directions within the closures (closures.py); |z| is
-the largest of the numbers that V_j moves. A number that is overwritten before anything reads it has
-a zero column; it is left out as soon as the state after some events is that of z, bit for bit. A
-number that nothing changes, a gain that a hold keeps, is a parameter of the map: its row is that of
-the identity, and it is left out too.
+V_j are the unit vectors of the coordinates, or directions within the closures (closures.py). A
+number that is overwritten before anything reads it has a zero column and is left out. A number that
+nothing changes, a gain that a hold keeps, is a parameter of the map: its row is that of the
+identity, and it is left out too.
 """
 
 from __future__ import annotations
@@ -18,17 +16,17 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
+from hapticlink.orchestrator.stability.tangent import SAME
 
 Matrix = NDArray[np.float64]
-STEP = 1e-6
-SAME = 1e-7
+ONE = 1e-7
 """Largest deviation from 1 of the diagonal entry of a parameter."""
 
 
 @dataclass(frozen=True)
 class Linear:
     """The map around `point`: F(point) = image, with the Jacobian A (n, n) along the orthonormal
-    directions V, the columns of a matrix; its error E (n, n) by differences of one side, and per
+    directions V, the columns of a matrix; its error E (n, n) by slopes to one side, and per
     column the largest of them relative to the column (`kink`): of order 1 where the map is not
     differentiable."""
 
@@ -67,37 +65,16 @@ class Linear:
         return found
 
 
-def linearised(map_: LiftedMap, point: Vector) -> Linear:
-    """The Jacobian of the map at `point`, along the directions that act on it."""
-    nominal: dict[int, Vector] = {}
-
-    def remember(count: int, state: Vector) -> bool:
-        nominal[count] = state
-        return False
-
-    def lost(count: int, state: Vector) -> bool:
-        return np.array_equal(state, nominal[count])
-
-    image = map_(point, remember)
-    assert image is not None
-    taken, columns, errors = [], [], []
-    for along in map_.directions(point):
-        d = STEP * max(1.0, float(np.abs(point[along != 0.0]).max()))
-        moved = []
-        for sign in (1.0, -1.0):
-            shifted = point + sign * d * along
-            width = along @ (shifted - point)
-            found = map_(shifted, lost)
-            moved.append(image * 0.0 if found is None else (found - image) / width)
-        forward, backward = moved
-        if forward.any() or backward.any():
-            taken.append(along)
-            columns.append((forward + backward) / 2)
-            errors.append((forward - backward) / 2)
-    if not taken:
+def linearised(map_: LiftedMap, point: Vector, same: float = SAME) -> Linear:
+    """The Jacobian of the map at `point`, along the directions that act on it; `same` as in
+    tangent.py."""
+    V = np.stack(list(map_.directions(point)), axis=1)
+    image, M, D = map_.slopes(point, V, same)
+    taken = M.any(axis=0) | D.any(axis=0)
+    if not taken.any():
         raise AssertionError("a map without a state")
-    V = np.stack(taken, axis=1)
-    A, E = V.T @ np.stack(columns, axis=1), V.T @ np.stack(errors, axis=1)
+    V, M, D = V[:, taken], M[:, taken], D[:, taken]
+    A, E = V.T @ M, V.T @ D
     kept = ~_constant(A, V.T @ (image - point) == 0.0)
     return Linear(point, image, V[:, kept], A[kept][:, kept], E[kept][:, kept])
 
@@ -105,7 +82,7 @@ def linearised(map_: LiftedMap, point: Vector) -> Linear:
 def _constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which coordinates nothing changes, not even in turn the others."""
     n = len(A)
-    own = np.abs(np.diag(A) - 1.0) < SAME
+    own = np.abs(np.diag(A) - 1.0) < ONE
     alone = np.count_nonzero(A - np.diag(np.diag(A)), axis=1) == 0
     found: NDArray[np.bool_] = own & alone & same if n else np.zeros(0, bool)
     return found

@@ -48,6 +48,13 @@ class Mode:
         return abs(self.z - 1.0) <= self.uncertainty
 
 
+def verdict(radius: float, uncertainty: float) -> str:
+    """stable, unstable, or marginal where the radius is 1 within its uncertainty."""
+    if abs(radius - 1.0) <= uncertainty:
+        return "marginal"
+    return "unstable" if radius > 1.0 else "stable"
+
+
 def modes(at: Linear, period: float) -> list[Mode]:
     """The modes, that of the largest |z| first; of a complex pair the one with omega > 0."""
     scale = at.scales

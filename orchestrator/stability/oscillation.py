@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
-from hapticlink.orchestrator.stability.linearise import STEP, Linear
+from hapticlink.orchestrator.stability.linearise import Linear
 from hapticlink.orchestrator.stability.modes import Mode
+from hapticlink.orchestrator.stability.tangent import STEP
 
 
 def traced(map_: LiftedMap, at: Linear, mode: Mode) -> Mode:

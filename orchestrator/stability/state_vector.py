@@ -8,7 +8,7 @@ else is no floating-point number stay those of a template, an instant of the sim
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from copy import copy, deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -26,16 +26,19 @@ from hapticlink.orchestrator.system.system import Fmu
 
 Vector = NDArray[np.float64]
 Visit = Callable[[str, Vector], Vector]
+SIGNALS = "signals"
 
 
 @dataclass(frozen=True)
 class Coordinate:
     """An entry of the state: of an FMU, of the signals ("signal") or of a connection's hold
-    ("hold"); `variable` is its name there."""
+    ("hold"); `variable` is its name there. inert: an output of an FMU, which its steps write and do
+    not read."""
 
     owner: str
     variable: str
     kind: str
+    inert: bool = False
 
     def __str__(self) -> str:
         joint = ": " if self.kind == "hold" else "."
@@ -53,47 +56,66 @@ class Template:
 
 
 class StateVector:
-    """Reads and writes the state of `simulation`. Raises InputFault for an FMU whose serialised
-    state does not say where its numbers are."""
+    """Reads and writes the state of `simulation`, or of its FMUs `fmus` and its holds and energy
+    tanks `holds` alone. Raises InputFault for an FMU whose serialised state does not say where its
+    numbers are.
 
-    def __init__(self, simulation: Simulation) -> None:
+    owners: the names of the FMUs, SIGNALS, and those of the holds, in the order of the numbers.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        fmus: Container[str] | None = None,
+        holds: Container[str] | None = None,
+    ) -> None:
         self._simulation = simulation
-        self._holds = {**simulation.holds}
-        for i, tank in enumerate(simulation.springs):
-            self._holds[f"energy tank {i + 1}"] = tank  # type: ignore[assignment]
+        self._holds: dict[str, Any] = {
+            name: hold
+            for name, hold in keepers(simulation).items()
+            if holds is None or name in holds
+        }
+        self._fmus = [f for f in simulation.system.fmus if fmus is None or f.name in fmus]
         self._taken: dict[str, NDArray[np.intp]] = {}
-        for fmu in simulation.system.fmus:
+        for fmu in self._fmus:
             require_layout(fmu)
-            self._taken[fmu.name] = np.array([i for i, _ in _entries(fmu)], dtype=np.intp)
+            self._taken[fmu.name] = np.array([i for i, *_ in _entries(fmu)], dtype=np.intp)
+        self.owners = (*self._taken, SIGNALS, *self._holds)
 
     def save(self) -> Template:
         simulation = self._simulation
         return Template(
-            {name: instance.serialized() for name, instance in simulation.instances.items()},
+            {name: simulation.instances[name].serialized() for name in self._taken},
             simulation.signals.values.copy(),
             [_mapped(vars(hold), name, _copied) for name, hold in self._holds.items()],
         )
 
     def restore(self, template: Template) -> None:
         simulation = self._simulation
-        for name, instance in simulation.instances.items():
-            instance.deserialize(template.fmus[name])
+        for name in self._taken:
+            simulation.instances[name].deserialize(template.fmus[name])
         simulation.signals.values[:] = template.signals
         for (name, hold), kept in zip(self._holds.items(), template.holds, strict=True):
             vars(hold).update(_mapped(kept, name, _copied))
 
     def numbers(self, template: Template) -> Vector:
         """The numbers of a saved state, in the order of `coordinates`."""
+        return np.concatenate(self.parts(template))
+
+    def parts(self, template: Template) -> list[Vector]:
+        """The numbers of a saved state, by owner."""
         parts = [_doubles(template.fmus[name])[taken] for name, taken in self._taken.items()]
         parts.append(template.signals)
-
-        def visit(path: str, value: Vector) -> Vector:
-            parts.append(value.ravel())
-            return value
-
         for name, kept in zip(self._holds, template.holds, strict=True):
+            found: list[Vector] = [np.zeros(0)]
+
+            def visit(path: str, value: Vector, found: list[Vector] = found) -> Vector:
+                found.append(value.ravel())
+                return value
+
             _mapped(kept, name, visit)
-        return np.concatenate(parts)
+            parts.append(np.concatenate(found))
+        return parts
 
     def put(self, template: Template, numbers: Vector) -> Template:
         """`template` with other numbers."""
@@ -118,7 +140,11 @@ class StateVector:
     def coordinates(self, template: Template) -> list[Coordinate]:
         simulation = self._simulation
         system, signals = simulation.system, simulation.signals
-        found = [Coordinate(u.name, name, "fmu") for u in system.fmus for _, name in _entries(u)]
+        found = [
+            Coordinate(u.name, name, "fmu", inert)
+            for u in self._fmus
+            for _, name, inert in _entries(u)
+        ]
         columns = [
             n for clock in system.timeline.clocks for n in signals.recorded(clock.name) or ()
         ]
@@ -137,6 +163,12 @@ class StateVector:
         return found
 
 
+def keepers(simulation: Simulation) -> dict[str, Any]:
+    """The holds and the energy tanks of a simulation, by name."""
+    tanks = {f"energy tank {i + 1}": tank for i, tank in enumerate(simulation.springs)}
+    return {**simulation.holds, **tanks}
+
+
 def _signal(column: str) -> Coordinate:
     fmu, _, variable = column.partition(".")
     return Coordinate(fmu, variable, "signal")
@@ -152,15 +184,17 @@ def require_layout(fmu: Fmu) -> None:
         )
 
 
-def _entries(fmu: Fmu) -> Iterator[tuple[int, str]]:
-    """Index, from the first variable on, and name of each number of an FMU that is no parameter."""
+def _entries(fmu: Fmu) -> Iterator[tuple[int, str, bool]]:
+    """Index, from the end, and name of each number of an FMU that is no parameter, and whether it
+    is an output."""
     assert fmu.description.states is not None
     scalars = sorted(fmu.description.scalars, key=lambda s: s.reference)
     for i, scalar in enumerate(scalars):
         if scalar.causality in ("input", "output"):
-            yield i - len(scalars) - len(fmu.description.states), scalar.name
+            place = i - len(scalars) - len(fmu.description.states)
+            yield place, scalar.name, scalar.causality == "output"
     for i, name in enumerate(fmu.description.states):
-        yield i - len(fmu.description.states), name
+        yield i - len(fmu.description.states), name, False
 
 
 def _doubles(state: bytes) -> Vector:

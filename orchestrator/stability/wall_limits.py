@@ -12,8 +12,10 @@ import math
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+Matrix = NDArray[np.float64]
 GRID = 4096
 
 
@@ -23,6 +25,22 @@ def passive(b: float, T: float, B: float = 0.0) -> float:
     Colgate, Schenkel, J. Robotic Systems 14 (1997), 37.
     """
     return max(0.0, 2.0 * (b - abs(B)) / T)
+
+
+def passive_damping(T: float, periods: int, K: Matrix, B: Matrix) -> Matrix:
+    """The device's damping b (N.s/m) above which the wall is passive for any hand, for arrays K and
+    B of one shape: the largest, over the frequency, of
+
+        T/2 Re{(1 - 1/z) H(z)}/(1 - cos wT),   H = z^-d (K + B (1 - 1/z)/T),   z = exp(i w T)
+
+    Colgate, Schenkel (1997), with the delay d = `periods`. At d = 0 it is K T/2 + |B|.
+    """
+    found: Matrix = np.full(K.shape, -np.inf)
+    for angle in np.linspace(math.pi / 256, math.pi, 256):
+        back = np.exp(-1j * angle)
+        H = back**periods * (K + B * (1 - back) / T)
+        found = np.maximum(found, T / 2 * ((1 - back) * H).real / (1 - math.cos(angle)))
+    return found
 
 
 def delayed(b: float, T: float, delay: float, B: float = 0.0) -> float:
@@ -66,6 +84,22 @@ def damper(m: float, T: float) -> float:
     """B = 2 m/T (N.s/m), the stability limit of a sampled damper alone, for b = 0 and a velocity
     that is read directly: v_{k+1} = (1 - B T/m) v_k."""
     return 2.0 * m / T
+
+
+def radius(m: float, b: float, T: float, periods: int, K: Matrix, B: Matrix) -> Matrix:
+    """The spectral radius of the loop of `stable` for arrays K and B of one shape: the largest root
+    of z^{d+1} (z - 1)(z - e) b + (K + B (1 - 1/z)/T)((T - tau (1 - e)) z + tau (1 - e) - T e) z."""
+    tau = m / b
+    e = math.exp(-T / tau)
+    device = np.array([T - tau * (1 - e), tau * (1 - e) - T * e]) / b
+    companion = np.zeros((*K.shape, periods + 3, periods + 3))
+    companion[..., range(1, periods + 3), range(periods + 2)] = 1.0
+    companion[..., 0, :2] = [1.0 + e, -e]
+    for power, gain in ((0, K + B / T), (1, -B / T)):
+        for i, g in enumerate(device):
+            companion[..., 0, periods + power + i] -= gain * g
+    found: Matrix = np.abs(np.linalg.eigvals(companion)).max(axis=-1)
+    return found
 
 
 def stable(m: float, b: float, T: float, periods: int = 0, B: float = 0.0) -> float:

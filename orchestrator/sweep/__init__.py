@@ -21,13 +21,12 @@ Tell = Callable[[int], None]
 
 
 class Unfinished(Fault):
-    """A sweep of `of` runs was interrupted after `done` of them."""
+    """A sweep of `of` runs was interrupted after `done` of them, which are in `table`."""
 
-    def __init__(self, done: int, of: int, folder: Path) -> None:
+    def __init__(self, done: int, of: int, folder: Path, table: str = "table.csv") -> None:
         self.done, self.of = done, of
         super().__init__(
-            f"interrupted: {done} of {of} runs are in {folder}/table.csv; "
-            "the same command continues"
+            f"interrupted: {done} of {of} runs are in {folder}/{table}; the same command continues"
         )
 
 

@@ -21,17 +21,20 @@ def points(vary: Vary, runs: Runs) -> list[Point]:
     of them is given, and for values that cannot be read."""
     if bool(vary) == bool(runs):
         raise InputFault("sweep: give either --vary key=values (repeatable) or --runs FILE")
-    if isinstance(vary, str):
-        raise InputFault(f"vary {vary!r}: give a mapping, or a list of key=values")
-    if isinstance(vary, Mapping):
-        axes = [_axis(key, values) for key, values in vary.items()]
-    else:
-        axes = [parse(each) for each in vary]
-    if axes:
-        return grid(axes)
+    if found := axes(vary):
+        return grid(found)
     if isinstance(runs, str | Path):
         return listed(Path(runs))
     return [{key: text(value, key) for key, value in run.items()} for run in runs]
+
+
+def axes(vary: Vary) -> list[Axis]:
+    """The axes of `vary`. Raises InputFault for values that cannot be read."""
+    if isinstance(vary, str):
+        raise InputFault(f"vary {vary!r}: give a mapping, or a list of key=values")
+    if isinstance(vary, Mapping):
+        return [_axis(key, values) for key, values in vary.items()]
+    return [parse(each) for each in vary]
 
 
 def _axis(key: str, values: Iterable[Any]) -> Axis:

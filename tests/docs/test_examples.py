@@ -35,6 +35,12 @@ NOT_RUN = {
         "many runs; docs/holds.md has a sweep that is run",
     "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh":
         "many runs",
+    "hapticlink stability virtual-wall --set fmu.wall.settings.unilateral=false "
+    "--set 'hand.wrench=[0.0, 0.0, 0.0]' --set fmu.wall.settings.damping=1.0 "
+    "--vary fmu.wall.start.damping=0.5..60.5:9 --vary fmu.wall.start.stiffness=200..12200:9 "
+    "--vary haptics.rate=512,1024 --vary 'holds.\"wall.F\"=zoh,foh' "
+    "--vary 'delays.\"wall.F\"=0,0.001953125' --check 180 --seed 1 --out results/stability/wall":
+        "700 points; tests/orchestrator/test_maps.py",
     "hapticlink study": "more than 1,000 runs; tests/orchestrator/study/test_study.py",
     "hapticlink reproduce": "its runs: tests/reference/test_closed_loop.py",
     "hapticlink bench mechanism": "needs other codes",

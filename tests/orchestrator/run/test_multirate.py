@@ -30,6 +30,8 @@ from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.lifted_map import opened
 from hapticlink.orchestrator.stability.modes import modes
+from hapticlink.orchestrator.stability.switching import joint_spectral_radius
+from hapticlink.orchestrator.stability.varying import edges_of
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator.oscillator import driven
 from tests.orchestrator.systems import connected
@@ -207,6 +209,20 @@ def test_the_lifted_map_of_alternating_frames(
         assert a_frame < 0.9865
     else:
         assert a_frame == pytest.approx(growth, rel=0.005)
+
+
+def test_frames_in_any_order_grow_as_the_alternating_ones(fmus: dict[str, Description]) -> None:
+    """Each length alone is stable; the fastest sequence of both grows at least as they do in
+    turn, and so does the bound."""
+    clocks = (Clock("haptics", range(1000)), Clock("graphics", [0, 17, 68, 85, 136]))
+    made = system(fmus, "sprung", Timeline(Fraction(1, 512), 900, clocks), 1050.0, 20.0)
+    edges, lengths = edges_of(None, made, 1, [17, 51])
+    alone = [np.abs(np.linalg.eigvals(edge.A)).max() for edge in edges]
+    assert lengths == [17, 51]
+    assert max(alone) < 0.9865
+    found = joint_spectral_radius(edges, 1e-4, 5000)
+    assert found.lower >= 0.995 * 1.86
+    assert found.upper >= found.lower
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import hapticlink as hl
 from hapticlink.orchestrator.commands import main
@@ -150,10 +151,38 @@ def test_a_moving_target_and_a_push_into_the_free_have_no_equilibrium() -> None:
         hl.stability("sampled-spring", {"hand": {"type": "constant", "wrench": [1.0, 0.0, 0.0]}})
 
 
+def test_growth_along_a_trajectory_is_that_of_the_variational_equation() -> None:
+    """Of phi'' + b/J phi' + 1.5 g sin(phi) = 0, a rod of 1 m and 1 kg that swings down, integrated
+    to a tight tolerance: ln sigma_max of the transition matrix, which 2 x 2 balances exactly by
+    the square root of the quotient of its other entries."""
+    start, at, seconds = 1.0, 0.1, 0.3
+    damping, J = 0.01, 1 / 3
+
+    def rate(t: float, y: Any) -> Any:
+        phi, speed, *rest = y
+        M = np.reshape(rest, (2, 2))
+        slope = np.array([[0.0, 1.0], [-1.5 * 9.81 * math.cos(phi), -damping / J]])
+        acceleration = -1.5 * 9.81 * math.sin(phi) - damping / J * speed
+        return [speed, acceleration, *(slope @ M).ravel()]
+
+    first = math.ceil(at * 512) / 512
+    fine = {"rtol": 1e-11, "atol": 1e-12}
+    begin = solve_ivp(rate, (0.0, first), [start, 0.0, 1, 0, 0, 1], **fine).y[:2, -1]
+    lasting = round(seconds * 512) / 512
+    end = solve_ivp(rate, (0.0, lasting), [*begin, 1, 0, 0, 1], **fine).y[:, -1]
+    M = end[2:].reshape(2, 2).copy()
+    M[0, 1] = M[1, 0] = math.sqrt(abs(M[0, 1] * M[1, 0]))
+    M[1, 0] *= np.sign(end[4])
+    M[0, 1] *= np.sign(end[3])
+    options = {"linkage.start": {"pivot": start - math.pi / 2}}
+    grown = hl.finite_time_growth("pendulum", options, at=at, seconds=seconds)
+    assert grown == pytest.approx(math.log(np.linalg.norm(M, 2)) / lasting, rel=1e-3)
+
+
 def test_what_has_no_map_is_refused() -> None:
-    rates = {"min": 20.0, "max": 60.0, "seed": 1}
+    rates = {"graphics.rate": [0.03, 0.07, 0.1, 0.2], "duration": 0.1}
     with pytest.raises(hl.InputFault, match=r"the period of \w+ varies"):
-        hl.stability("closed-loop-direct", HELD | {"graphics.rate": rates})
+        hl.stability("closed-loop-direct", HELD | rates)
     with pytest.raises(hl.InputFault, match="latency and loss are random"):
         hl.stability("virtual-wall", {"delays": {"wall.F": {"min": 0.001, "loss": 0.5}}})
 

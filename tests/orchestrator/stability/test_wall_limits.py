@@ -51,6 +51,8 @@ def test_the_limit_is_where_the_characteristic_polynomial_leaves_the_unit_circle
         return float(np.abs(np.roots(closed)).max())
 
     limit = wall_limits.stable(M, D, T, periods, B)
+    own = wall_limits.radius(M, D, T, periods, np.array([limit, 2 * limit]), np.array([B, B]))
+    assert own == pytest.approx([radius(limit), radius(2 * limit)], rel=1e-6)
     assert radius(limit * (1 - 1e-6)) < 1 < radius(limit * (1 + 1e-6))
 
 

@@ -1,0 +1,98 @@
+"""Points of a map at which runs of the FMUs check its verdict, chosen with a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import plugins, temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.maps.lines import COLUMNS, DONE, Line, judged
+from hapticlink.orchestrator.results.tracking import table_of
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.stability.session import Session
+from hapticlink.orchestrator.sweep.grid import Point
+from hapticlink.orchestrator.sweep.job import job
+from hapticlink.orchestrator.sweep.row import Row
+
+BAND, FAR = 0.02, 0.06
+"""Points next to a boundary lie off it by more than the first and up to the second, relative."""
+SPANS = 8.0
+"""Time constants of the leading mode that a run lasts, within the limits."""
+SHORTEST, LONGEST = 2.0, 30.0
+MOVING = ("virtual_mechanism.qd", "virtual_mechanism.v")
+GONE = 1e-9
+"""Velocity, relative to the largest of the run, that is taken for rest."""
+
+
+def chosen(rows: Sequence[Row], count: int, seed: int) -> list[Point]:
+    """`count` points: half of them next to the boundary, to both sides, and half anywhere on the
+    grid, as many as there are, drawn by numpy's PCG64 with `seed`."""
+    generator = np.random.Generator(np.random.PCG64(seed))
+    edge = [row for row in rows if row.get("at") == "boundary"]
+    grid = [row for row in rows if row.get("at") == "grid" and row["verdict"] != "refused"]
+    found: list[Point] = []
+    near = min(count // 2, 2 * len(edge)) if edge else 0
+    for i in generator.permutation(2 * len(edge))[:near]:
+        row = edge[i // 2]
+        off = generator.uniform(1.1 * BAND, FAR) * (1 if i % 2 else -1)
+        point = _point(row)
+        key = row["along"]
+        found.append(point | {key: f"{float(point[key]) * (1 + off):.6g}"})
+    for i in generator.permutation(len(grid))[: count - near]:
+        found.append(_point(grid[i]))
+    return found
+
+
+def _point(row: Row) -> Point:
+    return {k: v for k, v in row.items() if k not in COLUMNS}
+
+
+def jobs(scene: str | Path | Scene, options: Sequence[str], points: Sequence[Point]) -> list[Line]:
+    made = []
+    for point in points:
+        each = job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point)
+        if each.scene is not None:
+            own = sha256(f"check {each.key}".encode()).hexdigest()
+            made.append(Line(point, each.scene, own, "", each.plugins))
+    return made
+
+
+def work(each: Line) -> Row:
+    """The row of a check: the map's verdict, and that of a run of the scene."""
+    assert each.scene is not None
+    plugins.load(each.plugins)
+    with Session(each.scene) as session:
+        row = judged(session, "check", [])
+    if "growth_rate" not in row:
+        return {"end": DONE, "rows": [row]}
+    seconds = min(LONGEST, max(SHORTEST, SPANS / max(abs(row["growth_rate"]), 1e-9)))
+    growth = _growth(each.scene, seconds)
+    row |= {"run_growth_rate": growth, "run_verdict": "unstable" if growth > 0 else "stable"}
+    return {"end": DONE, "rows": [row | {"agree": row["run_verdict"] == row["verdict"]}]}
+
+
+def _growth(scene: Scene, seconds: float) -> float:
+    """The growth rate (1/s) of the mechanism's velocities between the second and the last quarter
+    of a run of `seconds`; that of a run that diverges is infinite, that of one at rest minus
+    infinite."""
+    with temporary_folders.room() as room:
+        experiment = simulate(open_scene.load(scene, [f"duration={seconds:.6g}"]), room)
+        if experiment.outcome.reason not in ("duration", "stop_when"):
+            return np.inf
+        results = experiment.results
+        signal = next(s for s in MOVING if table_of(results, s) is not None)
+        table = table_of(results, signal)
+        assert table is not None
+        speed = np.abs(table[signal]).max(axis=1)
+        if not speed.any():
+            raise InputFault("a run from rest shows no growth: give the scene a start off its rest")
+        _, early, _, late = np.array_split(speed, 4)
+        if late.max() <= GONE * speed.max():
+            return -np.inf
+        return float(np.log(late.max() / early.max()) / (seconds / 2))

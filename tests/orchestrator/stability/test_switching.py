@@ -1,0 +1,71 @@
+"""Growth under switched matrices, against closed forms and Kronecker squares."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.stability.switching import (
+    Edge,
+    joint_spectral_radius,
+    lyapunov,
+    mean_square,
+)
+from tests.orchestrator.stability.test_stability import HELD
+
+GOLDEN = [np.array([[1.0, 1.0], [0.0, 1.0]]), np.array([[1.0, 0.0], [1.0, 1.0]])]
+
+
+def switched(matrices: list[np.ndarray], probability: float) -> list[Edge]:
+    return [Edge(0, 0, A, probability) for A in matrices]
+
+
+def test_the_joint_spectral_radius_of_a_pair_is_the_golden_section() -> None:
+    found = joint_spectral_radius(switched(GOLDEN, 0.5))
+    golden = (1 + math.sqrt(5)) / 2
+    assert found.lower == pytest.approx(golden, abs=1e-6)
+    assert found.upper == pytest.approx(golden, abs=1e-6)
+    assert set(found.worst) == {0, 1}
+
+
+def test_bounds_hold_in_other_coordinates_and_where_order_is_constrained() -> None:
+    T = np.array([[3.0, 1.2], [-50.0, 7.0]])
+    found = joint_spectral_radius(
+        switched([T @ A @ np.linalg.inv(T) for A in GOLDEN], 0.5), 1e-3, 5000
+    )
+    golden = (1 + math.sqrt(5)) / 2
+    assert found.lower == pytest.approx(golden, rel=1e-9)
+    assert golden <= found.upper < 1.05 * golden
+    # Each may only follow itself: no product of both occurs, and each alone has radius 1.
+    apart = joint_spectral_radius([Edge(i, i, 0.9 * A) for i, A in enumerate(GOLDEN)], 1e-2)
+    assert apart.lower == pytest.approx(0.9)
+    assert apart.upper < 1.0
+
+
+def test_second_moments_grow_by_the_mean_kronecker_square() -> None:
+    generator = np.random.default_rng(1)
+    matrices = [generator.standard_normal((4, 4)) for _ in range(3)]
+    square = sum(np.kron(A, A) for A in matrices) / 3
+    expected = np.abs(np.linalg.eigvals(square)).max()
+    assert mean_square(switched(matrices, 1 / 3)) == pytest.approx(expected, rel=1e-8)
+
+
+def test_the_exponent_of_scalars_is_their_mean_logarithm() -> None:
+    mean, width = lyapunov(switched([np.array([[0.5]]), np.array([[1.5]])], 0.5), seed=3)
+    assert abs(mean - math.log(0.75) / 2) < 2 * width < 0.05
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_a_rate_that_varies_is_judged_by_the_frames_that_it_draws(hold: str) -> None:
+    """A frame of 16 ticks, after one of 16, is what 32 Hz repeats."""
+    varying = HELD | {"hold": hold, "graphics.rate": {"min": 30, "max": 32, "seed": 5}}
+    found = hl.stability("closed-loop-direct", varying)
+    fixed = hl.stability("closed-loop-direct", HELD | {"hold": hold, "graphics.rate": 32})
+    assert isinstance(found, hl.VaryingStability)
+    assert found.frames == (16, 17)
+    assert found.bounds.lower >= fixed.radius - 1e-6
+    assert found.bounds.upper >= found.bounds.lower
+    assert math.log(found.second_moment) / 2 >= found.exponent * 16 / 512 - 0.01

@@ -1,0 +1,82 @@
+"""Maps of stability: their boundary against closed forms, their checks, and their continuation."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.maps import walls
+from hapticlink.orchestrator.stability import wall_limits
+
+M, D, T = 0.3, 5.0, 1 / 512
+STIFFNESS, DAMPING = "fmu.wall.start.stiffness", "fmu.wall.start.damping"
+WALL = {
+    "fmu.wall.settings.unilateral": False,
+    "fmu.wall.settings.damping": 1.0,
+    "hand.wrench": [0.0, 0.0, 0.0],
+}
+VARY = [f"{DAMPING}=1,20,40", f"{STIFFNESS}=2000,6000,10000", "hold=zoh,foh"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("maps")
+
+
+@pytest.fixture(scope="module")
+def wall(folder: Path) -> hl.Map:
+    return hl.stability_map("virtual-wall", VARY, WALL, out=folder, check=4, seed=2, jobs=2)
+
+
+def test_the_boundary_is_that_of_the_closed_form(wall: hl.Map) -> None:
+    edge = [row for row in wall.of("boundary") if row["hold"] == "zoh"]
+    assert {row["along"] for row in edge} == {STIFFNESS, DAMPING}
+    for row in edge:
+        limit = wall_limits.stable(M, D, T, 0, float(row[DAMPING]))
+        assert float(row[STIFFNESS]) == pytest.approx(limit, rel=1e-3)
+    form = walls.form(wall.scene, {"hold": "zoh"}, DAMPING, STIFFNESS)
+    assert form is not None
+    grid = [row for row in wall.of("grid") if row["hold"] == "zoh"]
+    x, y = (np.array([float(row[key]) for row in grid]) for key in (DAMPING, STIFFNESS))
+    radii = [row["spectral_radius"] for row in grid]
+    assert form(x, y) == pytest.approx(radii, rel=1e-7)
+    assert walls.form(wall.scene, {"hold": "foh"}, DAMPING, STIFFNESS) is None
+
+
+def test_runs_agree_with_the_map(wall: hl.Map) -> None:
+    checks = wall.of("check")
+    assert len(checks) == 4
+    assert all(row["agree"] for row in checks)
+    assert {row["verdict"] for row in checks} == {"stable", "unstable"}
+
+
+def test_a_map_is_continued_and_not_computed_again(wall: hl.Map, folder: Path) -> None:
+    """One line is lost, and those that are kept are believed."""
+    (folder / "map.csv").unlink()
+    kept = sorted((folder / "rows").iterdir())
+    kept[0].unlink()
+    before = {path: path.stat().st_mtime_ns for path in kept[1:]}
+    again = hl.stability_map("virtual-wall", VARY, WALL, out=folder, check=4, seed=2, jobs=2)
+    assert again.rows == wall.rows
+    assert {path: path.stat().st_mtime_ns for path in kept[1:]} == before
+    assert kept[0].exists()
+    with (folder / "map.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(wall.rows)
+    assert (folder / "map.png").exists()
+
+
+def test_a_map_needs_a_key_of_numbers(tmp_path: Path) -> None:
+    with pytest.raises(hl.InputFault, match="no key has two numbers"):
+        hl.stability_map("virtual-wall", ["hold=zoh,foh"], out=tmp_path)
+
+
+def test_the_damping_that_makes_a_wall_passive_is_that_of_colgate_and_schenkel() -> None:
+    """b = K T/2 + |B|; with a delay and no damper, K (T/2 + t_d)."""
+    K, B = np.array([3000.0, 0.0, 1000.0]), np.array([2.0, -7.0, 0.0])
+    assert wall_limits.passive_damping(T, 0, K, B) == pytest.approx(K * T / 2 + np.abs(B), rel=1e-4)
+    late = wall_limits.passive_damping(T, 2, K[2:], B[2:])
+    assert late == pytest.approx(K[2:] * (T / 2 + 2 * T), rel=1e-3)
