@@ -4,6 +4,7 @@ is one, and the points that runs have checked."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +45,7 @@ def draw(made: Map) -> Figure:
             continue
         named = zip(made.panels, values, strict=True)
         said = ", ".join(f"{_short(key)} = {value}" for key, value in named)
-        axes.set_title(said, fontsize="small")
+        axes.set_title(fill(said, 36), fontsize="small")
     for axes in all_axes[len(panels) :]:
         axes.remove()
     for axes in all_axes[::across]:

@@ -61,8 +61,8 @@ STILL = 1e-9
 class Passivity:
     """The user's port. needed: damping b of the device (N.s/m) above which the rendering is
     passive for any hand. turning: that for rotations (N.m.s/rad), 0 without any. own: the damping
-    that the device has, in the same scale. frequency: where b is needed (Hz). curve: frequencies
-    (Hz) and the damping needed there."""
+    that the device has, in the same scale. frequency: where b is needed (Hz), up to whole turns
+    in a hyperperiod. curve: frequencies (Hz) and the damping needed there."""
 
     title: str
     needed: float
