@@ -109,10 +109,7 @@ class PassiveStep:
     def __init__(
         self, model: LinkageModel, applied: Applied, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX
     ) -> None:
-        self._model, self._n = model, model.q.numel()
-        once, q, qd = {"cse": True}, model.q, model.qd
-        moving = ca.jacobian(ca.vertcat(applied.soft), ca.vertcat(q, qd, x[2 * self._n :]))
-        self._soft = moving.nnz() > 0
+        self._n, once, q, qd = model.q.numel(), {"cse": True}, model.q, model.qd
         self._rates = ca.Function("rates", [x, u, p, t], [applied.rates], once)
         self._forces = ca.Function(
             "forces", [x, u, p, t], [applied.soft, applied.rigid, applied.sources], once
@@ -123,54 +120,44 @@ class PassiveStep:
         self._pushes = ca.Function("pushes", [u], [applied.pushes])
         self._drift = ca.Function("drift", [q, qd, p], [model.rate(applied.places)], once)
         self._velocities = ca.Function("velocities", [q, qd, p], [model.velocities], once)
-        self._solved = self._solver(model, p)
+        s, h = ca.SX.sym("s", self._n), ca.SX.sym("h")
+        G, rigid, _ = self._forces(self._half(s, x, u, p, t, h), u, p, t + h / 2)
+        slope = ca.jacobian(G, s)
+        self._pull = ca.Function("pull", [s, x, u, p, t, h], [G + rigid, slope], once)
+        self._soft = slope.nnz() > 0
+        self._next = self._solver(model, p, soft=False)
+        self._middle = self._solver(model, p, soft=True) if self._soft else self._next
 
-    def _solver(self, model: LinkageModel, p: ca.SX) -> ca.Function:
-        """(q, V, b, A, s) -> a with (D + A) a = J' M V + b + W' lambda, W (s + a) = 0 at q."""
+    def _half(self, s: ca.SX, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX, h: ca.SX) -> ca.SX:
+        """The state half a step on, with rates s."""
+        there, further = x[: self._n] + h / 2 * s, x[2 * self._n :]
+        rate = self._rates(ca.vertcat(there, s, further), u, p, t + h / 2)
+        return ca.vertcat(there, s, further + h / 2 * rate)
+
+    def _solver(self, model: LinkageModel, p: ca.SX, *, soft: bool) -> ca.Function:
+        """(q, V, b, A, s) -> a with (D + A) a = J' M V + b + W' lambda, W (s + a) = 0 at q; A is
+        empty unless `soft`."""
         n, V = self._n, ca.SX.sym("V", model.velocities.numel())
-        b, s = ca.SX.sym("b", n), ca.SX.sym("s", n)
-        found = []
-        for soft in (False, True):
-            A = ca.SX.sym("A", n, n) if soft else ca.SX.sym("A", 0, 0)
-            tree = TreeInertia(model)
-            inertia = Pivoted(model.D + A, tree, model.leaf_to_root) if soft else tree
-            solver = ClosedLoopSolver(inertia, model.W, rows(model.linkage))
-            a = solver.follow(model.momentum(V) + b, -model.W @ s)
-            found.append(ca.Function("solved", [model.q, V, b, A, s, p], [a], {"cse": True}))
-            if not self._soft:
-                break
-        self._solved_soft = found[-1]
-        return found[0]
+        b, s, A = ca.SX.sym("b", n), ca.SX.sym("s", n), ca.SX.sym("A", n * soft, n * soft)
+        tree = TreeInertia(model)
+        inertia = Pivoted(model.D + A, tree, model.leaf_to_root) if soft else tree
+        solver = ClosedLoopSolver(inertia, model.W, rows(model.linkage))
+        a = solver.follow(model.momentum(V) + b, -model.W @ s)
+        return ca.Function("solved", [model.q, V, b, A, s, p], [a], {"cse": True})
 
     def __call__(self, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX, h: ca.SX) -> tuple[ca.SX, ca.SX]:
         """x after h, before its closures are corrected, and h v_hat at the places."""
-        n, middle = self._n, t + h / 2
+        n, none = self._n, ca.SX(0, 0)
         q, qd, further = x[:n], x[n : 2 * n], x[2 * n :]
-        s = ca.SX.sym("s", n)
-
-        def half(s: ca.SX) -> ca.SX:
-            there = q + h / 2 * s
-            rate = self._rates(ca.vertcat(there, s, further), u, p, middle)
-            return ca.vertcat(there, s, further + h / 2 * rate)
-
         q_m, V = q + h / 2 * qd, self._velocities(q, qd, p)
         lag = V - self._velocities(q_m, qd, p)
-        soft, rigid, _ = self._forces(half(qd), u, p, middle)
-        effort, none = h / 2 * (soft + rigid), ca.SX(0, 0)
-        if self._soft:
-            pull = ca.Function(
-                "pull", [s, x, u, p, t, h], [ca.jacobian(self._forces(half(s), u, p, middle)[0], s)]
-            )
-            slope = pull(qd, x, u, p, t, h)
-            A = -h / 4 * (slope + slope.T)
-            change = self._solved_soft(q_m, lag, effort, A, qd, p)
-        else:
-            change = self._solved(q_m, lag, effort, none, qd, p)
-        s = qd + change
+        G, slope = self._pull(qd, x, u, p, t, h)
+        A = -h / 4 * (slope + slope.T) if self._soft else none
+        s = qd + self._middle(q_m, lag, h / 2 * G, A, qd, p)
         after = q + h * s
-        V = 2 * self._velocities(q_m, s, p) - V - self._velocities(after, s, p)
-        qd = s + self._solved(after, V, ca.SX(n, 1), none, s, p)
-        rate = self._rates(half(s), u, p, middle)
+        rest = 2 * self._velocities(q_m, s, p) - V - self._velocities(after, s, p)
+        qd = s + self._next(after, rest, ca.SX(n, 1), none, s, p)
+        rate = self._rates(self._half(s, x, u, p, t, h), u, p, t + h / 2)
         return ca.vertcat(after, qd, further + h * rate), h * self._drift(q_m, s, p)
 
     def within(

@@ -17,6 +17,7 @@ from hapticlink.components.specs.linkage import (
     Linkage,
     Mechanism,
     OperationalPoint,
+    ProfileDrive,
     Spring,
 )
 from hapticlink.orchestrator.open_scene import load
@@ -91,9 +92,12 @@ def test_neither_do_contacts_limits_and_further_hands(scene):
     assert block.y.get("closure_error", 0.0) < 1e-3
 
 
-def test_a_drive_may_put_energy_in():
+@pytest.mark.parametrize(
+    "drive", [ConstantDrive(effort=2.0), ProfileDrive(table=[[0.0, 2.0], [1.0, 2.0]])]
+)
+def test_a_drive_may_put_energy_in(drive):
     """A constant torque on an axle: its work, and no more."""
-    axle = Joint(name="axle", child="disc", drive=ConstantDrive(effort=2.0))
+    axle = Joint(name="axle", child="disc", drive=drive)
     linkage = Linkage(
         body=(Body(name="disc", mass=1.0, inertia=0.5),),
         joint=(axle,),
