@@ -15,9 +15,10 @@ outcome, `grew`, is what none may have: an end with more energy than the bound a
 
 from __future__ import annotations
 
+import csv
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -25,8 +26,6 @@ from typing import Any, Literal
 import numpy as np
 
 import hapticlink as hl
-from benchmarks import state
-from benchmarks.rows import Rows
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 
 CATALOGUE = Path(__file__).parent / "stress.toml"
@@ -74,7 +73,6 @@ class Made:
 
 
 COLUMNS = ("case", "kind", "expected", "outcome", "status", "rise_J", "bound_J", "map", "end")
-ENERGIES = ("rise_J", "bound_J")
 LONG = 160
 """Characters of an end that the page quotes."""
 
@@ -118,26 +116,26 @@ def risen(run: hl.Run) -> float:
 
 def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> Path:
     """Write stress.csv and stress.md to `out`; returns the page."""
-    state.begin(out, ("stress.csv",))
-    rows = Rows(out / "stress.csv", COLUMNS, keys=1)
     chosen = [case for case in cases() if case.quick or not quick]
-    wrong = {}
+    found: dict[str, Made] = {}
     for i, case in enumerate(chosen):
         told(f"stress: {case.name}", i, len(chosen))
-        made = make(case)
-        if why := made.wrong(case):
-            wrong[case.name] = why
-        end = " ".join(made.end.split())
-        rows.add(
-            case.name, case.kind, case.expect, made.outcome, made.status, float(f"{made.rise:.3g}"),
-            case.energy, made.map, end,
-        )  # fmt: skip
+        found[case.name] = make(case)
+    out.mkdir(parents=True, exist_ok=True)
+    with (out / "stress.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for case in chosen:
+            m, bound = found[case.name], f"{case.energy:g}"
+            row = (case.name, case.kind, case.expect, m.outcome, m.status, f"{m.rise:.3g}", bound)
+            writer.writerow((*row, m.map, m.end))
     path = out / "stress.md"
-    path.write_text(page(chosen, rows, wrong, command), encoding="utf-8")
+    path.write_text(page(chosen, found, command), encoding="utf-8")
     return path
 
 
-def page(chosen: Sequence[Case], rows: Rows, wrong: dict[str, str], command: str) -> str:
+def page(chosen: Sequence[Case], found: Mapping[str, Made], command: str) -> str:
+    wrong = {c.name: why for c in chosen if (why := found[c.name].wrong(c))}
     counts = Counter(case.expect for case in chosen)
     judged = sum(bool(case.map) for case in chosen)
     finding = (
@@ -162,9 +160,10 @@ def page(chosen: Sequence[Case], rows: Rows, wrong: dict[str, str], command: str
         "|---|---|---|---|--:|--:|---|",
     ]
     for case in chosen:
-        row = rows.rows[(case.name,)]
-        end = row["end"] if len(row["end"]) < LONG else f"{row['end'][:LONG]}..."
-        rise, bound = (row[c] if case.expect in ("stable", "warned") else "" for c in ENERGIES)
+        made = found[case.name]
+        end = made.end if len(made.end) < LONG else f"{made.end[:LONG]}..."
+        bounded = case.expect in ("stable", "warned")
+        rise, bound = (f"{made.rise:.3g}", f"{case.energy:g}") if bounded else ("", "")
         cells = [case.name, case.why, case.expect, end, rise, bound, case.map]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
