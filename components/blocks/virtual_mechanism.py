@@ -39,9 +39,16 @@ from hapticlink.components.dynamics import (
 )
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
+from hapticlink.components.dynamics.closed_loop_solver import Inertia
 from hapticlink.components.dynamics.constrained_directions import constrained_directions
 from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.passive_midpoint import (
+    Applied,
+    PassiveStep,
+    require_fitting,
+    stops_output,
+)
 from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.dynamics.variables import (
     direction_outputs,
@@ -52,11 +59,12 @@ from hapticlink.components.dynamics.variables import (
     motion_outputs,
     states,
 )
-from hapticlink.components.forces import drives, friction
+from hapticlink.components.forces import drives, friction, gravity
 from hapticlink.components.formulations import independent_coordinates
 from hapticlink.components.formulations.embedding import Embedding
 from hapticlink.components.formulations.independent_coordinates import Formulation
 from hapticlink.components.formulations.partitioning import Partitioning
+from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.contacts import Contacts
@@ -89,6 +97,7 @@ def virtual_mechanism(
     friction too stiff for step_s.
     """
     independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
+    require_fitting(mechanism, linkage, held=frame_s is not None)
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     felt = felt and bool(further_points.inputs(linkage) + joint_ports.inputs(linkage))
@@ -133,7 +142,12 @@ def virtual_mechanism(
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
     initial |= _deflections(block, space, applied + pushed, initial, signals)
-    after, n = _step(block, model, mechanism, applied, touching, space, signals), model.q.numel()
+    if parts.passive:
+        initial["stops"], output["stops"] = ca.SX(0), block.x["stops"]
+        after = _passive_step(block, model, mechanism, applied, touching, energy, signals)
+    else:
+        after = _step(block, model, mechanism, applied, touching, space, signals)
+    n = model.q.numel()
     q1, qd1 = after[:n], after[n : 2 * n]
     if k := model.deflection.numel():
         after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
@@ -175,6 +189,11 @@ class _Parts:
     contacts: Contacts | None
     frame_s: float | None
     felt: bool
+
+    @property
+    def passive(self) -> bool:
+        """Whether the passive midpoint method takes the steps."""
+        return isinstance(integrators.METHODS[self.mechanism.integrator], PassiveMidpoint)
 
     @property
     def touches(self) -> bool:
@@ -219,6 +238,9 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
         memory += contact_forces.states(linkage, contacts)
         if contacts.detection == "graphics":
             inputs.append(contact_forces.contact_port(linkage, contacts))
+    if parts.passive:
+        memory.append(Variable("stops"))
+        outputs.append(stops_output())
     if directions:
         memory.append(Variable("n_constrained"))
         parameters += direction_parameters(directions)
@@ -318,8 +340,59 @@ def _step(
             integrator = integrator.completed(independent.complete)
         return independent_coordinates.step(integrator, independent, x, given, p, t, block.h)
     after = integrators.step(integrator, ode, x, given, p, t, block.h, range(n))
+    return _projected(after, model, mechanism, space.terms.inertia, p)
+
+
+def _projected(
+    after: ca.SX, model: LinkageModel, mechanism: Mechanism, inertia: Inertia, p: ca.SX
+) -> ca.SX:
+    """`after` on the closures, if the scene chooses projection."""
+    n = model.q.numel()
     if mechanism.stabilization == "projection":
-        own = space.terms.inertia
-        project = projection(model, own if isinstance(own, TreeInertia) else TreeInertia(model))
+        own = inertia if isinstance(inertia, TreeInertia) else TreeInertia(model)
+        project = projection(model, own)
         after[: 2 * n] = ca.vertcat(*project(after[:n], after[n : 2 * n], p))
     return after
+
+
+def _passive_step(
+    block: Block,
+    model: LinkageModel,
+    mechanism: Mechanism,
+    pushed: ca.SX,
+    touching: OneSidedForces | None,
+    energy: ca.SX,
+    signals: list[TimeSignal],
+) -> ca.SX:
+    """As `_step`, by the passive midpoint method."""
+    further = [block.x[name] for name in DEFLECTIONS if name in block.x]
+    x, u, p, t = ca.vertcat(model.q, model.qd, *further), block.u.vector, block.p.vector, block.t
+    points = [
+        (model.pose(at.body, f"{at.name}.at"), f"{at.name}.F_hand") for at in model.linkage.point
+    ]
+    places = ca.vertcat(model.x_h, *(place for place, _ in points), model.q)
+    drawn = block.u["F_hand"] - block.u["F_drift"]
+    pushes = [drawn, *(block.u[name] for _, name in points), joint_ports.efforts(model, block.u)]
+    rates = friction.deflection_rates(model)
+    weight = gravity.efforts(model)
+    soft = forces.efforts(model, weight=False) + (touching.efforts() if touching else 0)
+    found = [
+        soft,
+        pushed if weight is None else pushed + weight,
+        ca.vertcat(rates, touching.state_rates()) if touching else rates,
+        energy,
+        places,
+        ca.vertcat(*pushes),
+        forces.sources(model),
+    ]
+    given = u
+    if signals:
+        over = ca.SX.sym("over", time_signals.size_over(signals))
+        now = time_signals.within(signals, over, t)
+        found = [ca.substitute(each, model.tabled, now) for each in found]
+        u, given = ca.vertcat(u, over), ca.vertcat(u, time_signals.over(signals, t, block.h))
+    step = PassiveStep(model, Applied(*found), x, u, p, t)
+    after, moved = step(x, given, p, t, block.h)
+    after = _projected(after, model, mechanism, TreeInertia(model), p)
+    after, stops = step.within(x, after, moved, given, p, t, block.h)
+    return ca.vertcat(after, block.x["stops"] + stops)

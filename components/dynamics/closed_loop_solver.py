@@ -83,28 +83,39 @@ class Factored:
         m, nonzero = A.shape[0], A.sparsity().has_nz
         left = [{i: A[i, j] for i in range(j, m) if nonzero(i, j)} for j in range(m)]
         self._inverse: list[ca.SX] = []
+        pivots: list[ca.SX] = []
         self._columns: list[dict[int, ca.SX]] = []
         for j, column in enumerate(left):
             pivot = column.pop(j, ca.SX(0))
-            self._inverse.append(1 / (pivot if least is None else ca.fmax(pivot, least[j])))
+            pivots.append(pivot if least is None else ca.fmax(pivot, least[j]))
+            self._inverse.append(1 / pivots[j])
             scaled = {i: a * self._inverse[j] for i, a in column.items()}
             for i, a in column.items():
                 for k, entry in scaled.items():
                     if k >= i:
                         left[i][k] = left[i].get(k, ca.SX(0)) - entry * a
             self._columns.append(scaled)
+        self.pivots = ca.vertcat(*pivots)
 
-    def solve(self, b: ca.SX) -> ca.SX:
-        """x of A x = b, m x r."""
+    def forward(self, b: ca.SX) -> ca.SX:
+        """L^-1 b, m x r."""
         x = [b[i, :] for i in range(b.shape[0])]
         for j, column in enumerate(self._columns):
             for i, entry in column.items():
                 x[i] = x[i] - entry * x[j]
+        return ca.vertcat(*x)
+
+    def backward(self, u: ca.SX) -> ca.SX:
+        """L'^-1 u, m x r."""
+        x = [u[i, :] for i in range(u.shape[0])]
         for j, column in reversed(list(enumerate(self._columns))):
-            x[j] = self._inverse[j] * x[j]
             for i, entry in column.items():
                 x[j] = x[j] - entry * x[i]
         return ca.vertcat(*x)
+
+    def solve(self, b: ca.SX) -> ca.SX:
+        """x of A x = b, m x r."""
+        return self.backward(ca.diag(ca.vertcat(*self._inverse)) @ self.forward(b))
 
 
 class Regularised(Factored):

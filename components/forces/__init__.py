@@ -41,11 +41,13 @@ def parameters(linkage: Linkage) -> list[Variable]:
     return own + [v for force in named(linkage) for v in force.parameters()]
 
 
-def efforts(model: LinkageModel) -> ca.SX:
+def efforts(model: LinkageModel, *, weight: bool = True) -> ca.SX:
     """Sum of all generalised forces (n x 1): gravity (-g of (2.3)), springs, friction, drives, and
-    those of [[linkage.force]]. Raises ValueError for a force of another size, or one that refers to
-    a frame, joint or parameter that the linkage does not have."""
-    found = [Q for kind in KINDS if (Q := kind.efforts(model)) is not None]
+    those of [[linkage.force]]; without gravity unless `weight`. Raises ValueError for a force of
+    another size, or one that refers to a frame, joint or parameter that the linkage does not
+    have."""
+    kinds = [kind for kind in KINDS if weight or kind is not gravity]
+    found = [Q for kind in kinds if (Q := kind.efforts(model)) is not None]
     n = model.q.numel()
     for force in named(model.linkage):
         try:
@@ -58,6 +60,16 @@ def efforts(model: LinkageModel) -> ca.SX:
             raise ValueError(f"force `{force.name}`: efforts of {Q.shape}, not {(n, 1)}")
         found.append(Q)
     return sum(found, start=ca.SX(n, 1))
+
+
+def sources(model: LinkageModel) -> ca.SX:
+    """The generalised forces (n x 1) that may put energy in: those of drives, and those of
+    [[linkage.force]] apart from their potentials."""
+    driven = drives.efforts(model)
+    found = [] if driven is None else [driven]
+    for force in named(model.linkage):
+        found.append(ca.SX(force.efforts(model)) + ca.gradient(force.energy(model), model.q))
+    return sum(found, start=ca.SX(model.q.numel(), 1))
 
 
 def energy(model: LinkageModel) -> ca.SX:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from hapticlink.components.integrators import dormand_prince_8, heun, rk4
 from hapticlink.components.integrators.base import Integrator
 from hapticlink.components.integrators.linearly_implicit import LinearlyImplicit
+from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
 from hapticlink.components.integrators.semi_implicit_euler import SemiImplicitEuler
 from hapticlink.components.registry import Registry, no_instance
 
@@ -27,6 +28,7 @@ METHODS: Registry[Integrator] = Registry(
         "linearly-implicit": LinearlyImplicit(),
         "rk4": rk4.METHOD,
         "dormand-prince-8": dormand_prince_8.METHOD,
+        "passive-midpoint": PassiveMidpoint(),
     },
     lambda part: no_instance(part, Integrator),
 )

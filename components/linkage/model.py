@@ -190,13 +190,21 @@ class LinkageModel:
     @cached_property
     def C_qd(self) -> ca.SX:
         """Centripetal and Coriolis terms C qd, n x 1."""
+        return self.momentum(self.rate(self.velocities))
+
+    @cached_property
+    def velocities(self) -> ca.SX:
+        """V = J qd of all bodies' centres of mass, 3k x 1."""
+        return self.rate(self._bodies[0])
+
+    def momentum(self, velocities: ca.SX) -> ca.SX:
+        """The generalised momentum J' M V of velocities V of all bodies (3k x 1), n x 1."""
         poses, weights = self._bodies
-        return ca.jtimes(poses, self.q, weights * self.rate(self.rate(poses)), True)
+        return ca.jtimes(poses, self.q, weights * velocities, True)
 
     @cached_property
     def kinetic_energy(self) -> ca.SX:
-        poses, weights = self._bodies
-        return 0.5 * ca.dot(weights, self.rate(poses) ** 2)
+        return 0.5 * ca.dot(self._bodies[1], self.velocities**2)
 
     @cached_property
     def closures(self) -> list[Closure]:

@@ -19,11 +19,14 @@ BENCHES = {
     "local-model": "benchmarks.local_model:bench",
     "master": "benchmarks.master:bench",
     "real-time": "benchmarks.real_time:bench",
+    "stress": "benchmarks.stress:bench",
 }
+FOLDERS = {"stress": "stability"}
+"""Folders in results/ that are not named like the benchmark."""
 
 
 def bench(
-    what: Literal["mechanism", "singular", "local-model", "master", "real-time"],
+    what: Literal["mechanism", "singular", "local-model", "master", "real-time", "stress"],
     /,
     *,
     out: Out = None,
@@ -31,10 +34,11 @@ def bench(
 ) -> int:
     """Benchmark the mechanism: run time against error, with the multibody codes that are installed;
     errors over many rates on motions through singular poses; cost and error of the local model; the
-    event loop, with the masters that are installed; and deadlines missed in real time.
+    event loop, with the masters that are installed; deadlines missed in real time; and stress: hard
+    scenes at the edge of stability and beyond it, each with the outcome that it has to have.
 
-    Writes a page with tables and figures to OUT (default results/<what>). An interrupted benchmark
-    is continued by the same command.
+    Writes a page with tables and figures to OUT (default results/<what>, for stress
+    results/stability). An interrupted benchmark is continued by the same command.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -44,7 +48,7 @@ def bench(
     # Imported by name, as the benchmarks are not part of the package.
     module, _, name = BENCHES[what].partition(":")
     make = getattr(importlib.import_module(module), name)
-    folder = out or root / "results" / what
+    folder = out or root / "results" / FOLDERS.get(what, what)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(what)
@@ -54,8 +58,8 @@ def bench(
             bar.update(task, description=text, completed=done, total=total)
 
         command = f"hapticlink bench {what}{' --quick' * quick}"
-        make(folder, quick, told, command)
-    print(folder / "README.md")
+        page = make(folder, quick, told, command)
+    print(page or folder / "README.md")
     return 0
 
 

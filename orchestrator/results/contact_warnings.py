@@ -32,7 +32,8 @@ def lines(results: Results) -> Iterator[str]:
     if COORDINATES in table:  # both are recorded
         yield from _deep(linkage, contacts, table)
     mechanism = TypeAdapter(Mechanism).validate_python(scene["mechanism"])
-    if mechanism.integrator != "linearly-implicit" and len(table["time"]) > 1:
+    implicit = mechanism.integrator in ("linearly-implicit", "passive-midpoint")
+    if not implicit and len(table["time"]) > 1:
         rate = results.run["fmus"][GAP.partition(".")[0]]["rate"]
         step_s = results.run["clocks"][rate]["longest"] / mechanism.substeps
         yield from _stiff(linkage, contacts, step_s)

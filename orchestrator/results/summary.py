@@ -29,6 +29,7 @@ from hapticlink.orchestrator.results.user_port import user_port
 MECHANISM = "virtual_mechanism"
 MARGIN = "haptic_device.workspace_margin"
 CLOSURE = "virtual_mechanism.closure_error"
+STOPS = "virtual_mechanism.stops"
 
 
 def ending(results: Results) -> str:
@@ -100,6 +101,7 @@ def lines(results: Results) -> Iterator[str]:
     for fmu, errors in run.get("step_errors", {}).items():
         yield from long_steps(fmu, errors, run["fmus"][fmu].get("block"))
     yield from friction_speed.coarse(results)
+    yield from _stopped(results)
     yield from _contacts(results)
     for clock, steps in run["controlled_steps"].items():
         if steps["forced"]:
@@ -116,6 +118,16 @@ def lines(results: Results) -> Iterator[str]:
         misfits = [f"{name} ({why['reason']})" for name, why in group]
         more = f" and {len(misfits) - 1} more" if len(misfits) > 1 else ""
         yield f"hold {hold} does not fit {misfits[0]}{more}: zoh there"
+
+
+def _stopped(results: Results) -> Iterator[str]:
+    """A line if the passive midpoint method had to stop the mechanism."""
+    table = of_block(results, STOPS)
+    if table and len(table["time"]) and (stops := int(table[STOPS][-1])):
+        yield (
+            f"warning: virtual_mechanism was stopped in {stops} steps, which its energy did not "
+            "allow: take more mechanism.substeps or a higher rate"
+        )
 
 
 def _contacts(results: Results) -> Iterator[str]:

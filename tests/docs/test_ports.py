@@ -20,6 +20,7 @@ WALL = {
 SCENES: list[tuple[str, Mapping[str, Any]]] = [
     ("closed-loop", {"sensing": "encoders", "controller.bias": "full"}),
     ("closed-loop", {"mechanism.directions": True, "mechanism.diagnostics": True}),
+    ("closed-loop", {"mechanism.integrator": "passive-midpoint"}),
     ("closed-loop", {"graphics.sync": "operational", "hand.damping": (1.0, 1.0, 0.1)}),
     ("enclosure", {"controller.contact": True}),
     ("local-model", {}),

@@ -83,7 +83,9 @@ def test_dead_beat_defaults(method):
     assert closure_after(mechanism(method), 3) < 1e-10
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "method", [m for m in METHODS if m != "passive-midpoint"]
+)  # which refuses the terms
 def test_default_leaves_less_gap_than_none(method):
     worst = {}
     for kind in ("none", "baumgarte"):

@@ -1,0 +1,182 @@
+"""The passive midpoint method: no step gains more energy than its inputs put in, whatever the
+linkage, the step size and the forces; and its order, against SciPy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.linkage import (
+    Body,
+    ConstantDrive,
+    Joint,
+    Linkage,
+    Mechanism,
+    OperationalPoint,
+    ProfileDrive,
+    Spring,
+)
+from hapticlink.orchestrator.open_scene import load
+from tests.blocks import Running
+from tests.mechanisms import five_bar, linkages, terms
+
+PASSIVE = Mechanism(integrator="passive-midpoint")
+
+
+def gains(block, rng, steps, size=1.0, longest=0.2):
+    """E_{k+1} - E_k - F_k . (x_{k+1} - x_k) of each step, and the energies in play."""
+    found, names = [], ("x", "energy")
+    before = block.outputs(*names)
+    for _ in range(steps):
+        F = size * rng.normal(size=3) * 10 ** rng.uniform(-3, 2)
+        block.set(F_hand=F)
+        block.step(longest * 10 ** rng.uniform(-3, 0))
+        after = block.outputs(*names)
+        work = F @ (after["x"] - before["x"])
+        found.append((after["energy"] - before["energy"] - work, abs(before["energy"]) + abs(work)))
+        before = after
+    return np.array(found).T
+
+
+@st.composite
+def with_forces(draw):
+    """A random linkage with gravity, springs with and without a length, friction and limits."""
+    linkage, _, qd = draw(linkages(max_bodies=6))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+
+    def some(scale):
+        return float(scale * 10 ** rng.uniform(-1, 3)) if rng.random() < 0.5 else None
+
+    names = [body.name for body in linkage.body]
+    joints = tuple(
+        replace(j, stiffness=some(1.0), damping=some(0.01), friction=some(0.1))
+        for j in linkage.joint
+    )
+    springs = tuple(
+        Spring(
+            bodies=("ground", str(rng.choice(names))),
+            at=(tuple(rng.uniform(-1, 1, 2)), (0.1, 0.0)),
+            stiffness=float(10 ** rng.uniform(0, 6)),
+            damping=some(0.1),
+            length=0.3 if rng.random() < 0.5 else None,
+        )
+        for _ in range(rng.integers(0, 3))
+    )
+    free = {j.name: v for j, v in zip(joints, 5 * qd, strict=True)} if not linkage.loop else {}
+    weight = tuple(rng.uniform(-10, 10, 2)) if rng.random() < 0.7 else None
+    return replace(linkage, joint=joints, spring=springs, gravity=weight, start_velocity=free), rng
+
+
+@settings(max_examples=15, deadline=None)
+@given(with_forces())
+def test_no_step_makes_energy(made):
+    linkage, rng = made
+    block = Running(virtual_mechanism(linkage, PASSIVE))
+    gained, scale = gains(block, rng, 60)
+    assert np.isfinite(block.x).all()
+    assert (gained <= 1e-11 * (scale + scale.max() * 1e-3)).all()
+
+
+@pytest.mark.parametrize("scene", ["obstacles", "enclosure", "push-disc", "two-hands"])
+def test_neither_do_contacts_limits_and_further_hands(scene):
+    """Contacts of the shipped scenes at the rates of a graphics loop, with a wrench that varies."""
+    read = load(scene)
+    block = Running(virtual_mechanism(read.linkage, PASSIVE, None, read.contacts))
+    rng = np.random.default_rng(3)
+    gained, scale = gains(block, rng, 300, np.array([0.3, 0.3, 0.01]), longest=0.1)
+    assert (gained <= 1e-11 * (scale + scale.max() * 1e-3)).all()
+    assert block.y.get("closure_error", 0.0) < 1e-3
+
+
+@pytest.mark.parametrize(
+    "drive", [ConstantDrive(effort=2.0), ProfileDrive(table=[[0.0, 2.0], [1.0, 2.0]])]
+)
+def test_a_drive_may_put_energy_in(drive):
+    """A constant torque on an axle: its work, and no more."""
+    axle = Joint(name="axle", child="disc", drive=drive)
+    linkage = Linkage(
+        body=(Body(name="disc", mass=1.0, inertia=0.5),),
+        joint=(axle,),
+        operational_point=OperationalPoint(body="disc"),
+    )
+    block = Running(virtual_mechanism(linkage, PASSIVE))
+    for _ in range(20):
+        block.step(0.05)
+    assert block.y["energy"] == pytest.approx(0.5 * 0.5 * 4.0**2, rel=1e-12)  # w = 2 t/.5, t = 1
+
+
+def accelerations(linkage):
+    """qdd of D qdd + C qd = Q + W' lambda, W qdd + w = 0 by NumPy, with Q = -2 q - 0.002 qd."""
+    at = terms(linkage, "D", "C_qd", "W", "w")
+
+    def rate(_, x):
+        q, qd = np.split(x, 2)
+        D, C_qd, W, w = at(q, qd)
+        m = len(W)
+        system = np.block([[D, W.T], [W, np.zeros((m, m))]])
+        Q = -0.02 * q - 2e-4 * qd
+        return np.concatenate(
+            [qd, np.linalg.solve(system, [*(Q - C_qd.ravel()), *-w.ravel()])[: len(q)]]
+        )
+
+    return rate
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("varying", [False, True])
+def test_order_two(closed, varying):
+    """Five-bar with joint springs and dampers, loops closed or cut; steps of one size or of two."""
+    linkage = five_bar()
+    linkage = replace(
+        linkage,
+        loop=linkage.loop if closed else (),
+        joint=tuple(replace(j, stiffness=0.02, damping=2e-4) for j in linkage.joint),
+        start_velocity={"shoulder1": 4.0, "shoulder2": -2.0},
+    )
+    component = virtual_mechanism(linkage, PASSIVE)
+    start = Running(component).x[:8]
+    exact = solve_ivp(accelerations(linkage), (0, 0.5), start, "DOP853", rtol=1e-11, atol=1e-13)
+
+    def error(steps):
+        block = Running(component)
+        for k in range(steps):
+            block.step(0.5 / steps * ((0.5, 1.5)[k % 2] if varying else 1))
+        assert block.state["stops"] == 0
+        return np.linalg.norm(block.x[:8] - exact.y[:, -1])
+
+    coarse, fine = error(200), error(400)
+    assert fine < 2e-2
+    assert np.log2(coarse / fine) == pytest.approx(2, abs=0.25)
+
+
+def test_a_stiff_spring_keeps_its_energy():
+    """A spring of 1e8 N.m/rad at 30 Hz, where an explicit step of it has no stable size: the
+    linearly implicit midpoint conserves a linear spring's energy to rounding."""
+    axle = Joint(name="axle", child="disc", stiffness=1e8)
+    linkage = Linkage(
+        body=(Body(name="disc", mass=1.0, inertia=1.0),),
+        joint=(axle,),
+        operational_point=OperationalPoint(body="disc"),
+        start={"axle": 0.1},
+    )
+    block = Running(virtual_mechanism(linkage, PASSIVE))
+    for h in np.random.default_rng(1).uniform(0.01, 0.05, 300):
+        block.step(h)
+    assert block.y["energy"] == pytest.approx(0.5e6, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("settings", "held", "told"),
+    [
+        ({"stabilization": "baumgarte"}, None, "projection"),
+        ({"formulation": "partitioning"}, None, "multipliers"),
+        ({}, 1 / 30, "local_model"),
+    ],
+)
+def test_what_does_not_fit_is_refused(settings, held, told):
+    with pytest.raises(ValueError, match=told):
+        virtual_mechanism(five_bar(), replace(PASSIVE, **settings), frame_s=held)

@@ -1,0 +1,71 @@
+"""A handle that meets a virtual wall at speed: the impulse of the sampled penalty and its rebound.
+
+A spring K that is held over T lags by T/2, which is a damping of -K T/2. Over half a period of
+w = sqrt(K/m) the speed grows by
+
+    e = exp(pi w T/4)  for small w T, at any speed;   sum F T = -m v (1 + e)
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+
+MASS, T = 0.3, 1 / 512
+
+
+def thrown(K, v, distance, options=None):
+    """Times, velocities, and the forces of the wall, of a handle thrown at it without friction."""
+    run = hl.run(
+        "virtual-wall",
+        {
+            "hand": {"type": "constant", "wrench": [0.0, 0.0, 0.0]},
+            "linkage.joint.0.damping": 0.0,
+            "linkage.start": {"rail": -distance},
+            "linkage.start_velocity": {"rail": v},
+            "fmu.wall.start.stiffness": K,
+            "duration": 0.35,
+        }
+        | (options or {}),
+        figures=False,
+    )
+    assert run.fault is None
+    return run["virtual_mechanism.v"][:, 0], np.ravel(run["wall.F"])
+
+
+def rebound(K, v, distance):
+    """The same speed by hand: a mass under a force that is held between samples."""
+    x, u = -distance, v
+    for _ in range(round(0.35 / T)):
+        F = -K * max(x, 0.0)
+        x, u = x + u * T + 0.5 * F / MASS * T**2, u + F / MASS * T
+    return u
+
+
+@pytest.mark.parametrize("v", [0.1, 1.0])
+@pytest.mark.parametrize("K", [300.0, 3000.0])
+def test_impulse_and_rebound_of_a_sampled_wall(K, v):
+    speeds, F = thrown(K, v, 0.01 * v)
+    e = -speeds[-1] / v
+    assert e > 1.0  # it sends the handle back faster
+    assert -speeds[-1] == pytest.approx(-rebound(K, v, 0.01 * v), rel=1e-9)
+    assert -np.sum(F) * T == pytest.approx(MASS * v * (1 + e), rel=1e-9)
+
+
+@pytest.mark.parametrize("K", [100.0, 300.0, 1000.0])
+def test_mean_rebound_over_the_phases_of_the_first_sample(K):
+    wT = math.sqrt(K / MASS) * T
+    phases = (np.arange(200) + 0.5) / 200
+    speeds = np.array([-rebound(K, 1.0, 0.01 + phase * T) for phase in phases])
+    assert np.mean(speeds) == pytest.approx(math.exp(math.pi / 4 * wT), rel=0.1 * wT**2)
+
+
+def test_a_damper_takes_what_the_samples_generate():
+    """B = K T/2 takes back what the lag of half a period generates."""
+    K = 300.0
+    settings = {"fmu.wall.settings": {"stiffness": K, "damping": K * T / 2}}
+    speeds, _ = thrown(K, 0.5, 0.005, settings)
+    assert -speeds[-1] / 0.5 == pytest.approx(1.0, abs=5e-3)
+    assert -thrown(K, 0.5, 0.005)[0][-1] / 0.5 > 1.04
