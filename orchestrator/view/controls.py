@@ -105,6 +105,10 @@ class Controls:
                 for name in TOPOLOGY:
                     self._set(name)
 
+    def fits(self, message: messages.Hold) -> bool:
+        """Whether the connection can have the hold, in a run that begins with it at least."""
+        return message.hold in self._holds.get(message.connection, ())
+
     def _require(self, name: str, known: dict[str, Any]) -> None:
         if name not in known:
             raise InputFault(unknown("control", name, known))

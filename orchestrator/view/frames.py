@@ -6,7 +6,7 @@ from collections import deque
 from typing import Any
 
 from hapticlink.orchestrator.api.real_time import RealTime
-from hapticlink.orchestrator.run.energy.balance import LEAST, generated_and_put_in
+from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
 
 SHOWN = {
     "q": ("virtual_mechanism.q",),
@@ -28,6 +28,8 @@ SHOWN = {
 """By name in a frame, the output that it is, the first that the scene has."""
 SELDOM = 5
 """Turns between two readings of energies and deadlines, which take longer."""
+FELT = 1e-3
+"""Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
 WINDOW = 1.0
 """Time (s) over which the light judges the energy."""
 
@@ -74,11 +76,10 @@ class Frames:
 
 def light(generated: float, put_in: float) -> str:
     """What the energies (J) of the last second say: red where sampling and holding generated more
-    than hands and mechanism put in, as in the judgement of a whole run; amber where they generated
-    a tenth of it; green otherwise."""
-    if generated > max(put_in, 0.0) + LEAST:
-        return "red"
-    return "amber" if generated > 0.1 * put_in + LEAST else "green"
+    than hands and mechanism put in, as in the judgement of a whole run, by more than is `FELT`;
+    amber from a tenth of that on; green otherwise."""
+    most = max(put_in, 0.0) + FELT
+    return "red" if generated > most else "amber" if generated > 0.1 * most else "green"
 
 
 def _has(fmus: Any, name: str) -> bool:

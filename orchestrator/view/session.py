@@ -7,6 +7,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.api.real_time import RealTime
 from hapticlink.orchestrator.api.result import Run
 from hapticlink.orchestrator.base import interrupt
@@ -44,7 +45,9 @@ class Session:
                 if out and (out / "run.json").exists():
                     self.recordings.append(out)
             if not self._again:
-                self._wait(made)
+                self._state["recording"] = None
+                if made.run["end"]["reason"] != "duration":
+                    self._wait(made)
 
     def _begin(self) -> Path | None:
         """The folder of the run that begins, None where it is not recorded."""
@@ -66,11 +69,23 @@ class Session:
             try:
                 self._controls.apply(message)
             except InputFault as fault:
-                self._link.send({"type": "refused", "why": str(fault)})
+                self._refuse(message, fault)
             if not isinstance(message, messages.Hand):
                 self._tell_controls()
         self._require_server()
         self._link.send({"type": "frame"} | self._frames.frame(live), frame=True)
+
+    def _refuse(self, message: messages.Message, fault: InputFault) -> None:
+        """Say why; a hold that only a run that begins with it can have begins anew with it."""
+        self._link.send({"type": "refused", "why": str(fault)})
+        assert self._controls
+        if isinstance(message, messages.Hold) and self._controls.fits(message):
+            option = {f'holds."{message.connection}"': message.hold}
+            self._scene = open_scene.load(self._scene, option)
+            self._link.send(
+                {"type": "refused", "why": f"{message.hold} begins at t = 0: it runs in Python"}
+            )
+            self._anew(self._state["recording"] and "again")
 
     def _start(self, live: RealTime) -> None:
         self._frames, self._controls = Frames(live), Controls(live, self._settings)
@@ -103,9 +118,9 @@ class Session:
                 self._live.step()
                 self._tell(paused=True)
             case "reset":
-                self._anew(recording=self._state["recording"] and "again")
+                self._anew(self._state["recording"] and "again")
             case "record":
-                self._anew(recording=None if self._state["recording"] else "new")
+                self._anew(None if self._state["recording"] else "new")
 
     def _anew(self, recording: str | None) -> None:
         """End this run, and begin one at t = 0."""

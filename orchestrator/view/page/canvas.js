@@ -15,7 +15,7 @@ export function fitted(canvas) {
 // A number with its unit, in three digits; a count, without a unit, as it is.
 export function text(value, unit) {
   const size = Math.abs(value);
-  if (unit === "count") return String(value);
+  if (unit === "count" || !size) return unit === "count" ? String(value) : `0 ${unit}`;
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
   return `${size && size < 0.01 ? value.toExponential(0) : value.toFixed(digits)} ${unit}`;
 }

@@ -48,8 +48,8 @@ class Chart {
     this.figure.hidden = true;
     this.figure.dataset.chart = title;
     const caption = document.createElement("figcaption");
-    this.value = document.createElement("b");
-    caption.append(title, this.value);
+    this.values = this.names.map(() => document.createElement("b"));
+    caption.append(title, ...this.values);
     this.canvas = document.createElement("canvas");
     this.figure.append(caption, this.canvas);
   }
@@ -71,7 +71,7 @@ class Chart {
     const shown = this.names.map((_, i) => this.rows.some((row) => row[i] !== null));
     const all = this.rows.flat().filter((v) => v !== null);
     const low = Math.min(0, ...all), high = Math.max(low + (this.unit === "count" ? 1 : 1e-18), ...all);
-    const top = low + nice(high - low), left = 40, base = height - 4;
+    const top = low + nice(high - low), left = 44, base = height - 4;
     const x = (t) => left + ((width - left - 2) * (t - end + SPAN)) / SPAN;
     const y = (v) => base - ((base - 12) * (v - low)) / (top - low);
     context.font = "11px system-ui, sans-serif";
@@ -85,7 +85,7 @@ class Chart {
       context.lineTo(width, y(v));
       context.stroke();
       context.fillStyle = "#667";
-      context.fillText(+v.toPrecision(2), left - 4, y(v));
+      context.fillText(tick(v), left - 4, y(v));
     }
     context.lineWidth = 1.6;
     context.save();
@@ -99,25 +99,24 @@ class Chart {
       context.stroke();
     });
     context.restore();
-    const last = this.rows.at(-1), several = shown.filter(Boolean).length > 1;
-    this.value.textContent = several ? this.unit : text(last[shown.indexOf(true)], this.unit);
-    if (several) this.label(context, shown, last, left);
+    this.label(shown, this.rows.at(-1));
   }
 
-  // The names of several series with their newest values, in the chart's upper rows.
-  label(context, shown, last, left) {
-    context.textAlign = "left";
-    let at = 12;
-    this.names.forEach((name, i) => {
-      if (!shown[i]) return;
-      const said = `${name} ${text(last[i] ?? 0, "")}`;
-      context.fillStyle = "#fffc";
-      context.fillRect(left + 2, at - 6, context.measureText(said).width + 4, 12);
-      context.fillStyle = this.colors[i % this.colors.length];
-      context.fillText(said, left + 4, at);
-      at += 12;
+  // The newest values in the caption, with their names where there are several.
+  label(shown, last) {
+    const several = shown.filter(Boolean).length > 1;
+    this.values.forEach((value, i) => {
+      value.hidden = !shown[i];
+      value.style.color = several ? this.colors[i % this.colors.length] : "";
+      value.textContent = (several ? `${this.names[i]} ` : "") + text(last[i] ?? 0, this.unit);
     });
   }
+}
+
+// A number at an axis, in two digits.
+function tick(v) {
+  const size = Math.abs(v);
+  return size >= 1e4 || (size && size < 1e-2) ? v.toExponential(1).replace(".0e", "e") : +v.toPrecision(2);
 }
 
 // The least of 1, 2, 5 times a power of ten that is not below a length.
