@@ -16,21 +16,17 @@ from typing import Any
 from playwright.sync_api import sync_playwright
 
 OUT = Path(__file__).parents[1] / "results" / "view"
-SHOTS: dict[str, tuple[str, tuple[int, int], tuple[tuple[float, float], ...], str]] = {
-    "closed_loop": ("closed-loop", (1360, 820), ((-0.02, 0.02), (0.012, 0.03)), ""),
-    "closed_loop_10_hz": ("closed-loop", (1360, 820), ((-0.02, 0.02), (0.02, 0.03)), "1"),
-    "enclosure": ("enclosure", (1360, 820), ((-0.01, 0.02), (-0.005, 0.035)), ""),
-    "narrow": ("closed-loop", (400, 860), ((-0.02, 0.02), (0.012, 0.03)), ""),
+SHOTS: dict[str, tuple[str, tuple[int, int], tuple[tuple[float, float], ...]]] = {
+    "closed_loop": ("closed-loop", (1360, 820), ((-0.02, 0.02), (0.012, 0.03))),
+    "enclosure": ("enclosure", (1360, 820), ((-0.01, 0.02), (-0.005, 0.035))),
+    "narrow": ("closed-loop", (400, 860), ((-0.02, 0.02), (0.012, 0.03))),
 }
-"""By file, the scene, the window (px), a path of the mouse from the operational point (m), and the
-logarithm of the graphics rate if it is changed."""
+"""By file, the scene, the window (px), and a path of the mouse from the operational point (m)."""
 
 
-def dragged(page: Any, path: tuple[tuple[float, float], ...], rate: str) -> None:
+def dragged(page: Any, path: tuple[tuple[float, float], ...]) -> None:
     """Drag along a path, and stay at its end for a while with the button down."""
     page.wait_for_function("() => view.frame && view.stage.limits && view.frame.t > 0.5")
-    if rate:
-        page.fill("[data-control=rate]", rate)
     x, y, scale = page.evaluate(
         """() => { const box = view.stage.canvas.getBoundingClientRect();
                    const [x, y] = view.stage.toScreen(view.frame.x);
@@ -49,7 +45,7 @@ def main() -> None:
         browser = started.chromium.launch(
             executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
         )
-        for name, (scene, (width, height), path, rate) in SHOTS.items():
+        for name, (scene, (width, height), path) in SHOTS.items():
             command = [sys.executable, "-m", "hapticlink.orchestrator", "view", scene]
             served = subprocess.Popen(
                 [*command, "--no-browser", "--port", "0"],
@@ -60,7 +56,7 @@ def main() -> None:
             assert found
             page = browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
             page.goto(found[0])
-            dragged(page, path, rate)
+            dragged(page, path)
             page.screenshot(path=OUT / f"{name}.png")
             page.close()
             served.send_signal(signal.SIGTERM)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import secrets
+import sys
 import webbrowser
 from contextlib import suppress
 from importlib.util import find_spec
@@ -52,7 +54,7 @@ def view(
         url = f"http://{f'[{host}]' if ':' in host else host}:{link.first['port']}/{token}/"
         say(f"{read.title}: {url}")
         say("  the mouse is the hand, in place of the scene's; Ctrl-C ends it")
-        if browser:
+        if browser and _has_screen():
             webbrowser.open(url)
         session = Session(read, link, root)
         with suppress(Interrupted, api.RunInterrupted):
@@ -60,6 +62,13 @@ def view(
     for folder in session.recordings:
         say(f"  {folder}/")
     return 0
+
+
+def _has_screen() -> bool:
+    """Whether a browser would open a window of its own, and not take over the terminal."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _served(host: str, port: int | None, token: str) -> Link:

@@ -31,8 +31,10 @@ const HANDLERS = {
     note();
   },
   frame(message) {
+    const first = !view.frame;
     view.frame = message;
     view.frames += 1;
+    if (first) note();
     if (message.light) $("light").className = `light ${message.light}`;
     charts.add(message);
   },
@@ -48,7 +50,7 @@ function note() {
   const { ended, recording } = view.state;
   const refused = performance.now() < refusedUntil && view.refused;
   $("note").textContent = refused || (ended && `${ended}. Reset begins anew.`) ||
-    (recording && `recording to ${recording}`) || "";
+    (recording && `recording to ${recording}`) || (!view.frame && "the FMUs are being built ...") || "";
 }
 
 function connect() {

@@ -39,6 +39,11 @@ export class Stage {
       sent = event.timeStamp;
       pull(this.target);
     });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const factor = Math.exp(event.deltaY / 500);
+      this.limits = this.limits?.map(([a, b]) => [a + b - factor * (b - a), a + b + factor * (b - a)].map((v) => v / 2));
+    }, { passive: false });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(end, release);
   }
 
