@@ -34,16 +34,20 @@ def margin(device: Device, poses: Field) -> Field:
     return found
 
 
-def links(device: Device, pose: Sequence[float]) -> Field:
-    """Base joint, elbow and crank end (x, y m) of the four arms at a pose, shape (4, 3, 2); the
-    elbow is NaN where an arm does not reach."""
+def link_function(device: Device) -> ca.Function:
+    """The points of `links`, (2, 12), as a function of the pose, (3,)."""
     p, at = numbers(device), ca.SX.sym("pose", 3)
     rows = []
     for arm in pantograph.arms(at, p):
         elbow = arm.base + p["proximal_length"] * arm.proximal_direction
         rows += [arm.base, elbow, at[:2] + arm.offset]
-    found = ca.Function("links", [at], [ca.horzcat(*rows)])(ca.DM(list(pose)))
-    return np.asarray(found).T.reshape(4, 3, 2)
+    return ca.Function("links", [at], [ca.horzcat(*rows)])
+
+
+def links(device: Device, pose: Sequence[float]) -> Field:
+    """Base joint, elbow and crank end (x, y m) of the four arms at a pose, shape (4, 3, 2); the
+    elbow is NaN where an arm does not reach."""
+    return np.asarray(link_function(device)(ca.DM(list(pose)))).T.reshape(4, 3, 2)
 
 
 @dataclass(frozen=True)

@@ -10,19 +10,26 @@ from numpy.typing import NDArray
 
 from hapticlink.components.component import Signals
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import body_parameters
+from hapticlink.components.linkage.parameters import body_parameters, coordinates
 from hapticlink.components.specs.linkage import Linkage
+
+
+def pose_function(linkage: Linkage) -> tuple[list[str], ca.Function]:
+    """The names of the bodies, "ground" among them, and their poses (x m, y m, theta rad), (3, k),
+    as a function of the joint coordinates, (n,). Raises ValueError as `LinkageModel` does."""
+    parameters = body_parameters(linkage)
+    p = Signals("p", parameters)
+    n = len(coordinates(linkage, {}))
+    model = LinkageModel(linkage, p, ca.SX.sym("q", n), ca.SX(n, 1))
+    found = ca.horzcat(*(ca.vertcat(f.origin, f.angle) for f in model.frames.values()))
+    values = [value for variable in parameters for value in variable.starts]
+    at = ca.Function("poses", [model.q, p.vector], [found])
+    return [*model.frames], ca.Function("poses", [model.q], [at(model.q, values)])
 
 
 def poses(linkage: Linkage, q: Sequence[Sequence[float]]) -> dict[str, NDArray[np.float64]]:
     """(x m, y m, theta rad) of each body's frame in the world, (k, 3), at joint coordinates q
     (k, n); "ground" is among the bodies. Raises ValueError as `LinkageModel` does."""
-    parameters = body_parameters(linkage)
-    p = Signals("p", parameters)
-    rows = np.atleast_2d(np.asarray(q, float))
-    model = LinkageModel(linkage, p, ca.SX.sym("q", rows.shape[1]), ca.SX(rows.shape[1], 1))
-    found = {name: ca.vertcat(f.origin, f.angle) for name, f in model.frames.items()}
-    at = ca.Function("poses", [model.q, p.vector], list(found.values()))
-    values = [value for variable in parameters for value in variable.starts]
-    results = [[np.array(r).ravel() for r in at(row, values)] for row in rows]
-    return {name: np.array([r[i] for r in results]) for i, name in enumerate(found)}
+    names, at = pose_function(linkage)
+    results = [np.array(at(row)) for row in np.atleast_2d(np.asarray(q, float))]
+    return {name: np.array([r[:, i] for r in results]) for i, name in enumerate(names)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -33,7 +34,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.assign_holds import misfit
 from hapticlink.orchestrator.system.ports import names
-from hapticlink.orchestrator.system.system import Connection
+from hapticlink.orchestrator.system.system import Connection, System
 
 TURN = 20_000_000
 """ns between two turns."""
@@ -50,22 +51,29 @@ class RealTime:
     """
 
     def __init__(self, scene: str | Path | Scene, options: Options = ()) -> None:
-        self._scene = open_scene.load(scene, options)
+        self.scene = open_scene.load(scene, options)
+        """The scene that runs."""
         self._schedule: Callable[[Callable[..., object]], RealTimeRun] = RealTimeRun
         self.paused = False
         """Whether time stands still; turns go on."""
 
-    def run(self, turn: Callable[[RealTime], object], out: str | Path | None = None) -> Run:
+    def run(
+        self,
+        turn: Callable[[RealTime], object],
+        out: str | Path | None = None,
+        tables: bool = True,
+    ) -> Run:
         """Run the scene to its duration, or until `stop`; results as of `hl.run`. After a `reset`
-        they are those from then on."""
+        they are those from then on. Without `out` and `tables` they have no tables."""
         self._called = turn
         while True:
             self._until: int | None = None
             self._again = False
             self._settings: dict[str, tuple[list[Scalar], Callable[[Any], object]]] = {}
             self._connections: dict[str, Connection] = {}
+            self._places: dict[str, list[int]] = {}
             self._run = self._schedule(self._turn)
-            made = runs.run_paced(self._scene, out, self._run)
+            made = runs.run_paced(self.scene, out, self._run, tables=tables)
             if not self._again:
                 return made
 
@@ -77,13 +85,18 @@ class RealTime:
         haptics = self._simulation.system.timeline.clocks[0].name
         return self._simulation.seconds(self._loop.previous(haptics))
 
+    @property
+    def system(self) -> System:
+        """The FMUs, connections and clocks that run, as they were at the start."""
+        return self._simulation.system
+
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """The newest sample of an output, `fmu.port`, that the haptic loop has: its entries in the
         order of their indices. Raises InputFault for an unknown name."""
-        scalars = self._scalars(name, "output")
-        fmu = name.partition(".")[0]
-        places = [self._simulation.signals.scalar(fmu, s.name) for s in scalars]
-        return self._simulation.signals.values[places]
+        if name not in self._places:
+            fmu, place = name.partition(".")[0], self._simulation.signals.scalar
+            self._places[name] = [place(fmu, s.name) for s in self._scalars(name, "output")]
+        return self._simulation.signals.values[self._places[name]]
 
     def energies(self) -> dict[str, Energy]:
         """The energies (J) of each connection that carries power, until now."""
@@ -132,6 +145,20 @@ class RealTime:
             self._simulation.holds[connection.name].push(stamp, sample, stamp)
         self._note(f"hold of {name}: {changed[0].hold}, delay {delay or 0.0:g} s")
 
+    def holds(self) -> dict[str, list[str]]:
+        """By connection that has a hold, the holds that `hold` can give it, its present one
+        first."""
+        found: dict[str, list[str]] = {}
+        for c in self.system.connections:
+            if c.hold:
+                present = self._connections.get(c.name, c)
+                found[c.name] = [present.hold or ""]
+                for hold in HOLDS:
+                    with suppress(InputFault):
+                        self._with(present, hold, None)
+                        found[c.name] += [hold] if hold != present.hold else []
+        return found
+
     def rate(self, clock: str, rate: float) -> None:
         """Change the rate (Hz) of a clock other than the haptic one, such as `graphics`, from the
         end of its current step on; steps then end on haptic ticks. Raises InputFault where an FMU
@@ -174,7 +201,7 @@ class RealTime:
 
     def reset(self, options: Options = ()) -> None:
         """Begin anew at t = 0, with the scene changed by `options`. Raises what `hl.scene` does."""
-        self._scene = open_scene.load(self._scene, options)
+        self.scene = open_scene.load(self.scene, options)
         self._again = True
         raise Ended("reset")
 

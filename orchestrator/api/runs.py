@@ -67,14 +67,16 @@ def run_paced(
     real_time: RealTimeRun | None,
     figures: bool = True,
     progress: Callable[[float], None] | None = None,
+    tables: bool = True,
 ) -> Run:
-    """As `run`."""
+    """As `run`; without `out` and `tables` the results have no tables."""
     with interrupt.held():
         if out is None:
             with temporary_folders.room() as room:
-                found = simulate(scene, room, (), progress, real_time=real_time).results
-            warned = found.run | _told(found)
-            made = Run(None, warned, found.tables)
+                ended = simulate(scene, room, (), progress, csv=tables, real_time=real_time)
+                found = ended.results if tables else None
+            told = ended.run | _told(found) if found else ended.run
+            made = Run(None, told, found.tables if found else {})
         else:
             made = _in_folder(scene, Path(out), progress, figures, real_time)
         if interrupt.came() or made.run["end"]["reason"] == "interrupted":

@@ -24,6 +24,7 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
     "command",
     {
         "run": "Run a scene: results, run.json and figures.",
+        "view": "Drag a scene's mechanism on a page, in real time.",
         "build": "Build the FMUs of a scene.",
         "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
         "info": "Describe a scene, or list the shipped scenes.",

@@ -14,6 +14,12 @@ from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop
 from hapticlink.orchestrator.results import workspace
+from hapticlink.orchestrator.results.mechanism_geometry import (
+    BODIES,
+    attached,
+    contact_shape,
+    outline,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,8 +32,6 @@ NAMED = 10
 """Number of bodies up to which names are written beside them."""
 MM = 1e3
 RED = "#cc3311"
-BODIES = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")
-"""The bright scheme of P. Tol, which colour-blind readers can tell apart."""
 
 
 def draw(
@@ -98,43 +102,19 @@ class _Drawing:
         return np.array([x + c * px - s * py, y + s * px + c * py]) * MM
 
     def _attached(self, body: str) -> Iterator[Pose]:
-        """What a body holds together: its joints, closures and operational points."""
-        for joint in self.linkage.joint:
-            if joint.child == body:
-                yield self._world(body, joint.at_child)
-            if joint.parent == body and joint.type != "free":
-                yield self._world(body, joint.at_parent)
+        """What a body holds together (mm), and the pins that slide in it."""
+        yield from (self._world(body, at) for at in attached(self.linkage, body))
         for loop in self.linkage.loop:
-            for name, at in zip(loop.bodies, loop.at, strict=True):
-                if name == body:
-                    yield self._world(body, at)
             if loop.type != "revolute" and loop.bodies[1] == body:
                 yield self._world(loop.bodies[0], loop.at[0])
-        for point in (self.linkage.operational_point, *self.linkage.point):
-            if point.body == body:
-                yield self._world(body, point.at)
 
     def _outline(self, body: Body) -> Pose:
-        """The corners of the convex hull of what is attached, (k, 2): two for points on a line, one
-        for a single point."""
-        found = np.unique(np.round(np.array(list(self._attached(body.name))), 9), axis=0)
-        if len(found) <= 2:
-            return found
-        _, sizes, (direction, _) = np.linalg.svd(found - found.mean(axis=0), full_matrices=False)
-        if sizes[1] > 1e-6 * sizes[0]:
-            return _hull(found)
-        along = found @ direction
-        return found[[along.argmin(), along.argmax()]]
+        """As of mechanism_geometry, with the pins that slide in the body."""
+        return outline([*self._attached(body.name)])
 
     def _shape(self, body: Body) -> Pose:
-        """The outline of what a body touches with, (k, 2): the hull of discs at its corners."""
-        from scipy.spatial import ConvexHull
-
-        angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-        round_it = np.column_stack([np.cos(angle), np.sin(angle)]) * (body.radius or 0.0) * MM
-        discs = [self._world(body.name, at) + round_it for at in body.shape]
-        found = np.unique(np.round(np.vstack(discs), 9), axis=0)
-        return found[ConvexHull(found).vertices]
+        """The outline (mm) of what a body touches with."""
+        return np.array([self._world(body.name, at) for at in contact_shape(body).tolist()])
 
     def outlines(self) -> None:
         """The bodies as thin lines."""
@@ -310,27 +290,6 @@ def obstacles(axes: Axes, contacts: Contacts) -> None:
         found.append(Polygon(walls, fill=False, edgecolor="0.4", label="enclosure"))
     for patch in found:
         axes.add_patch(patch)
-
-
-def _hull(points: Pose) -> Pose:
-    """The corners of the convex hull of points that are sorted by x and then y, anticlockwise, by
-    Andrew's monotone chain (Information Processing Letters 9, 1979, 216). scipy.spatial, which has
-    one, takes as long to load as a figure to draw."""
-
-    def chain(ordered: Pose) -> list[Pose]:
-        kept: list[Pose] = []
-        for point in ordered:
-            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
-                kept.pop()
-            kept.append(point)
-        return kept[:-1]
-
-    return np.array(chain(points) + chain(points[::-1]))
-
-
-def _turn(a: Pose, b: Pose, c: Pose) -> float:
-    """Twice the area of the triangle a, b, c, positive where it turns anticlockwise."""
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def _rgb(color: str) -> tuple[float, float, float]:

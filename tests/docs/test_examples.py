@@ -48,6 +48,7 @@ NOT_RUN = {
     "hapticlink bench master": "is long, and measures the machine",
     "hapticlink bench real-time": "takes a minute, and measures the machine",
     "hapticlink bench stress": "is long; its short form: tests/reference/test_stress.py",
+    "hapticlink view closed-loop": "runs until Ctrl-C; tests/orchestrator/view",
     "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
         "compiles for minutes; tests/orchestrator/scene/test_packaging.py",
     "hapticlink sweep closed-loop --vary graphics.rate=10..60 --scheduler tcp://10.0.0.5:8786":

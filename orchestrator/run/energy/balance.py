@@ -51,12 +51,17 @@ class Balance:
         return Diverged(MECHANISM, f"{what} {remedy}", time, repeatable=True)
 
 
-def unstable(system: System, booked: Mapping[str, Energy]) -> str:
-    """A message if sampling and holding have generated more energy than was put in, else "". What a
-    controller passes on was not put in by it."""
-    generated = sum(e.generated for e in booked.values())
+def generated_and_put_in(system: System, booked: Mapping[str, Energy]) -> tuple[float, float]:
+    """The energies (J) that sampling and holding have generated, and that hands and mechanism have
+    put in. What a controller passes on was not put in by it."""
     source = {name: system.block(system.connection[name].source) for name in booked}
     put_in = sum(max(e.ideal, 0.0) for n, e in booked.items() if source[n] != CONTROLLER)
+    return sum(e.generated for e in booked.values()), put_in
+
+
+def unstable(system: System, booked: Mapping[str, Energy]) -> str:
+    """A message if sampling and holding have generated more energy than was put in, else ""."""
+    generated, put_in = generated_and_put_in(system, booked)
     if generated <= put_in + LEAST:
         return ""
     return f"sampling and holding generated {generated:.3g} J, where {put_in:.3g} J were put in"

@@ -1,0 +1,87 @@
+"""What a page is sent of a running scene: outputs of its FMUs, energies and deadlines."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from hapticlink.orchestrator.api.real_time import RealTime
+from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
+
+SHOWN = {
+    "q": ("virtual_mechanism.q",),
+    "ghost": ("virtual_environment.q",),
+    "x": ("virtual_mechanism.x",),
+    "handle": ("haptic_device.x_true", "virtual_mechanism.x"),
+    "F_hand": ("hand.F",),
+    "F_drift": ("controller.F_drift",),
+    "F_constraint": ("controller.F_constraint",),
+    "F_env": ("virtual_mechanism.F_env",),
+    "lambda": ("virtual_mechanism.lambda",),
+    "closure_error": ("virtual_mechanism.closure_error",),
+    "gap": ("virtual_mechanism.contact_gap",),
+    "n": ("virtual_environment.n_constraints", "virtual_mechanism.n_constraints"),
+    "P_c": ("virtual_environment.P_c", "virtual_mechanism.P_c"),
+    "branch_ok": ("virtual_environment.branch_ok",),
+    "margin": ("haptic_device.workspace_margin",),
+}
+"""By name in a frame, the output that it is, the first that the scene has."""
+SELDOM = 5
+"""Turns between two readings of energies and deadlines, which take longer."""
+FELT = 1e-3
+"""Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
+WINDOW = 1.0
+"""Time (s) over which the light judges the energy."""
+
+
+class Frames:
+    """The frames of one run, a few numbers each."""
+
+    def __init__(self, live: RealTime) -> None:
+        fmus = live.system.fmu
+        self._outputs = {
+            key: next(name for name in names if _has(fmus, name))
+            for key, names in SHOWN.items()
+            if any(_has(fmus, name) for name in names)
+        }
+        self._turns = 0
+        self._past: deque[tuple[float, float, float]] = deque()
+        self._slow: dict[str, Any] = {}
+
+    def frame(self, live: RealTime) -> dict[str, Any]:
+        """The newest samples, and now and then `energy` (generated, J, by connection), `light` and
+        the deadlines `missed`."""
+        found: dict[str, Any] = {k: live[name].tolist() for k, name in self._outputs.items()}
+        if self._turns % SELDOM == 0:
+            self._slow = self._energies(live)
+        elif self._turns % SELDOM == 2:
+            self._slow = {"missed": live.report()["deadlines_missed"]}
+        else:
+            self._slow = {}
+        self._turns += 1
+        return {"t": live.time} | found | self._slow
+
+    def _energies(self, live: RealTime) -> dict[str, Any]:
+        booked = live.energies()
+        generated, put_in = generated_and_put_in(live.system, booked)
+        self._past.append((live.time, generated, put_in))
+        while live.time - self._past[0][0] > WINDOW:
+            self._past.popleft()
+        _, before, put_before = self._past[0]
+        return {
+            "energy": {name: e.generated for name, e in booked.items()},
+            "light": light(generated - before, put_in - put_before),
+        }
+
+
+def light(generated: float, put_in: float) -> str:
+    """What the energies (J) of the last second say: red where sampling and holding generated more
+    than hands and mechanism put in, as in the judgement of a whole run, by more than is `FELT`;
+    amber from a tenth of that on; green otherwise."""
+    most = max(put_in, 0.0) + FELT
+    return "red" if generated > most else "amber" if generated > 0.1 * most else "green"
+
+
+def _has(fmus: Any, name: str) -> bool:
+    fmu, _, port = name.partition(".")
+    return fmu in fmus and bool(fmus[fmu].description.port(port, "output"))

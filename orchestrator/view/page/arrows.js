@@ -1,0 +1,76 @@
+// Forces as arrows, and the legend, with the newest values.
+import { text } from "./canvas.js";
+
+const PER_NEWTON = 22, MOST = 170; // px
+const FORCES = [
+  ["F_hand", "hand", "#b85c00"],
+  ["F_constraint", "topology controller", "#aa3377"],
+  ["F_env", "contacts", "#cc3311"],
+  ["lambda", "in the cut joints", "#228833"],
+];
+
+export class Arrows {
+  constructor(legend) { this.legend = legend; }
+
+  draw(context, frame, shapes, toScreen, at) {
+    if (this.shown !== shapes) this.begin(frame, shapes);
+    for (const [key, , color] of FORCES) {
+      if (!frame[key]) continue;
+      const values = frame[key];
+      let size = Math.hypot(values[0], values[1]);
+      if (key === "lambda") {
+        size = 0;
+        shapes.loops.forEach((loop, i) => {
+          if (loop.type !== "revolute") return; // whose multipliers are not along x and y
+          const force = values.slice(shapes.rows[i], shapes.rows[i] + 2);
+          size = Math.max(size, Math.hypot(...force));
+          arrow(context, at(...loop.at), force, color);
+        });
+      } else arrow(context, toScreen(key === "F_env" ? frame.x : frame.handle), values, color);
+      this.values[key].textContent = text(size, "N");
+    }
+  }
+
+  begin(frame, shapes) {
+    this.shown = shapes;
+    this.values = {};
+    // Rows of lambda: two for a joint or a sliding body, one for a slot.
+    let row = 0;
+    shapes.rows = shapes.loops.map((loop) => { const first = row; row += loop.type === "slot" ? 1 : 2; return first; });
+    const items = FORCES.filter(([key]) => frame[key]?.length).map(([key, name, color]) => {
+      this.values[key] = document.createElement("b");
+      return entry(color, `force, ${name} `, this.values[key]);
+    });
+    for (const [key] of FORCES) this.values[key] ??= document.createElement("b");
+    if (frame.directions) items.push(entry("#aa3377", "constrained directions", null, true));
+    if (frame.ghost) items.push(entry("#333", "as the graphics block has it", null, true));
+    if (frame.arms) items.push(entry("#c3c7d0", "device"));
+    this.legend.replaceChildren(...items);
+  }
+}
+
+function entry(color, name, value, dashed) {
+  const item = document.createElement("li"), chip = document.createElement("i");
+  chip.style.borderTopColor = color;
+  if (dashed) chip.className = "dashed";
+  item.append(chip, name);
+  if (value) item.append(value);
+  return item;
+}
+
+function arrow(context, [x, y], [fx, fy], color) {
+  const size = Math.hypot(fx, fy), length = Math.min(PER_NEWTON * size, MOST);
+  if (!(length > 4)) return;
+  const ux = fx / size, uy = -fy / size, tip = [x + length * ux, y + length * uy];
+  context.strokeStyle = context.fillStyle = color;
+  context.lineWidth = 3;
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(tip[0] - 6 * ux, tip[1] - 6 * uy);
+  context.stroke();
+  context.beginPath();
+  context.moveTo(...tip);
+  context.lineTo(tip[0] - 10 * ux + 5 * uy, tip[1] - 10 * uy - 5 * ux);
+  context.lineTo(tip[0] - 10 * ux - 5 * uy, tip[1] - 10 * uy + 5 * ux);
+  context.fill();
+}

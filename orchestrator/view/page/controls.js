@@ -1,0 +1,103 @@
+// The controls of the running FMUs; what they show is what the run says.
+import { text } from "./canvas.js";
+
+const NAMES = {
+  "hand.stiffness": "Hand: stiffness", "hand.damping": "Hand: damping",
+  "controller.K_pc": "Virtual coupling: stiffness", "controller.B_pc": "Virtual coupling: damping",
+  "controller.k_j": "Topology: stiffness k_j", "controller.b_j": "Topology: damping b_j",
+  "controller.K_d": "Desired stiffness", "controller.B_d": "Desired damping",
+  "virtual_mechanism.k_contact": "Contact: stiffness", "virtual_mechanism.b_contact": "Contact: damping",
+};
+const named = (connection) => connection.split(" -> ")[0].split(".")[1];
+
+export class Controls {
+  constructor(host, send) {
+    this.host = host;
+    this.send = send;
+    host.addEventListener("submit", (event) => event.preventDefault());
+  }
+
+  show(found) {
+    const shape = JSON.stringify([found.rate?.max, found.topology === null,
+      found.holds.map((h) => [h.connection, [...h.choices].sort()]), found.gains.map((g) => g.name)]);
+    if (shape !== this.shape) this.build(found);
+    this.shape = shape;
+    this.updates.forEach((update) => update(found));
+  }
+
+  build(found) {
+    this.updates = [];
+    this.host.replaceChildren();
+    if (found.rate) {
+      this.group("Graphics block");
+      this.slider("rate", "Rate", 0, Math.log10(Math.min(found.rate.max, 200)), 0.01,
+        (s) => ({ type: "rate", value: Math.round(10 ** s * 10) / 10 }),
+        (f) => (f.rate.value ? [Math.log10(f.rate.value), text(f.rate.value, "Hz")] : [0, "varying"]));
+    }
+    if (found.topology !== null) {
+      this.group("Controller");
+      this.checkbox("topology", "Topology controller", (on) => ({ type: "topology", on }), (f) => f.topology);
+    }
+    found.holds.forEach((hold, i) => {
+      if (!i) this.group("Holds, from graphics to haptics");
+      const name = hold.connection;
+      this.choice(name, `Hold of ${named(name)}`, [...hold.choices].sort(),
+        (value) => ({ type: "hold", connection: name, hold: value }), (f) => f.holds[i].hold);
+      this.slider(`delay ${name}`, `Delay of ${named(name)}`, 0, 100, 1,
+        (ms) => ({ type: "delay", connection: name, value: ms / 1e3 }),
+        (f) => [1e3 * f.holds[i].delay, `${(1e3 * f.holds[i].delay).toFixed(0)} ms`]);
+    });
+    found.gains.forEach((gain, i) => {
+      if (!i) this.group("Gains");
+      // 0 at the left end, then 0.1 to 10 times the scene's value.
+      this.slider(gain.name, NAMES[gain.name] ?? gain.name, -1.05, 1, 0.05,
+        (s) => ({ type: "gain", name: gain.name, factor: s < -1 ? 0 : 10 ** s }),
+        (f) => {
+          const { factor, value, units } = f.gains[i];
+          return [factor ? Math.log10(factor) : -1.05, text(factor * value[0], units[0])];
+        });
+    });
+  }
+
+  group(title) {
+    this.fieldset = document.createElement("fieldset");
+    const legend = document.createElement("legend");
+    legend.textContent = title;
+    this.fieldset.append(legend);
+    this.host.append(this.fieldset);
+  }
+
+  labelled(id, title, input) {
+    const label = document.createElement("label"), output = document.createElement("output");
+    input.dataset.control = id;
+    label.append(title, output, input);
+    this.fieldset.append(label);
+    return output;
+  }
+
+  slider(id, title, min, max, step, message, shown) {
+    const input = Object.assign(document.createElement("input"), { type: "range", min, max, step });
+    const output = this.labelled(id, title, input);
+    input.addEventListener("input", () => this.send(message(Number(input.value))));
+    this.updates.push((found) => {
+      const [value, said] = shown(found);
+      if (!input.matches(":active")) input.value = value;
+      output.textContent = said;
+    });
+  }
+
+  choice(id, title, choices, message, shown) {
+    const select = document.createElement("select");
+    select.append(...choices.map((name) => new Option(name, name)));
+    this.labelled(id, title, select);
+    select.addEventListener("change", () => this.send(message(select.value)));
+    this.updates.push((found) => { select.value = shown(found); });
+  }
+
+  checkbox(id, title, message, shown) {
+    const input = Object.assign(document.createElement("input"), { type: "checkbox" });
+    this.labelled(id, title, input);
+    input.addEventListener("change", () => this.send(message(input.checked)));
+    this.updates.push((found) => { input.checked = shown(found); });
+  }
+}

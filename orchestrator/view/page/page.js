@@ -1,0 +1,89 @@
+// The page: the socket to the run, the buttons, and who draws what.
+import { Charts } from "./charts.js";
+import { Controls } from "./controls.js";
+import { Stage } from "./stage.js";
+
+const $ = (id) => document.getElementById(id);
+const stage = new Stage($("scene"), $("legend"), (at) => send({ type: "hand", at }));
+const charts = new Charts($("charts"));
+const controls = new Controls($("controls"), send);
+const view = { frame: null, state: {}, frames: 0, refused: null, stage };
+window.view = view; // for tests and for the curious, in the browser's console
+let socket = null, refusedUntil = 0;
+
+function send(message) {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+}
+
+const HANDLERS = {
+  scene(message) {
+    document.title = $("title").textContent = message.title;
+    stage.begin(message.shapes);
+    charts.begin(message.energies);
+    view.frame = null;
+  },
+  controls: (message) => controls.show(message),
+  state(message) {
+    view.state = message;
+    $("pause").textContent = message.paused ? "Go on" : "Pause";
+    $("record").classList.toggle("on", Boolean(message.recording));
+    $("record").textContent = message.recording ? "End recording" : "Record";
+    note();
+  },
+  frame(message) {
+    const first = !view.frame;
+    view.frame = message;
+    view.frames += 1;
+    if (first) note();
+    if (message.light) $("light").className = `light ${message.light}`;
+    charts.add(message);
+  },
+  refused(message) {
+    view.refused = message.why;
+    refusedUntil = performance.now() + 4000;
+    note();
+    setTimeout(note, 4100);
+  },
+};
+
+function note() {
+  const { ended, recording } = view.state;
+  const refused = performance.now() < refusedUntil && view.refused;
+  $("note").textContent = refused || (ended && `${ended}. Reset begins anew.`) ||
+    (recording && `recording to ${recording}`) || (!view.frame && "the FMUs are being built ...") || "";
+}
+
+function connect() {
+  const url = new URL("run", location.href);
+  url.protocol = "ws:";
+  socket = new WebSocket(url);
+  socket.onopen = note;
+  socket.onmessage = (event) => {
+    const message = JSON.parse(event.data);
+    HANDLERS[message.type]?.(message);
+  };
+  socket.onclose = () => {
+    $("note").textContent = "The run has ended, or its connection: start hapticlink view again.";
+    setTimeout(connect, 2000);
+  };
+}
+
+const act = (what) => send({ type: "time", do: what });
+$("pause").onclick = () => act(view.state.paused ? "resume" : "pause");
+for (const what of ["step", "reset", "record"]) $(what).onclick = () => act(what);
+document.addEventListener("keydown", (event) => {
+  if (event.target.closest("input, select, button")) return;
+  const button = { " ": "pause", ".": "step", r: "reset" }[event.key];
+  if (button && !event.ctrlKey && !event.metaKey) { event.preventDefault(); $(button).click(); }
+});
+
+function draw() {
+  if (view.frame) {
+    stage.draw(view.frame);
+    $("time").textContent = `${view.frame.t.toFixed(2)} s`;
+  }
+  charts.draw();
+  requestAnimationFrame(draw);
+}
+connect();
+draw();

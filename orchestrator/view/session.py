@@ -1,0 +1,153 @@
+"""A scene that runs again and again behind a page: what the page asks for, what it is sent."""
+
+from __future__ import annotations
+
+import time
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.api.real_time import RealTime
+from hapticlink.orchestrator.api.result import Run
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.view import messages
+from hapticlink.orchestrator.view.controls import Controls, Settings
+from hapticlink.orchestrator.view.frames import Frames
+from hapticlink.orchestrator.view.link import Link
+
+WAIT = 0.02
+"""Time (s) between two looks at the messages while nothing runs."""
+
+
+class Session:
+    """The runs of a scene behind a page. `recordings` get folders `<root>-1`, `<root>-2`, ..."""
+
+    def __init__(self, scene: Scene, link: Link, root: Path) -> None:
+        self._scene, self._link, self._root = scene, link, root
+        self._controls: Controls | None = None
+        self._settings = Settings()
+        self._state: dict[str, Any] = {"paused": False, "recording": None, "ended": None}
+        self.recordings: list[Path] = []
+
+    def run(self) -> None:
+        """Run until Ctrl-C, which raises RunInterrupted or Interrupted, or until the server has
+        ended, which raises Fault."""
+        while True:
+            out = self._begin()
+            live = RealTime(self._scene)
+            self._live, self._controls, self._again = live, None, False
+            try:
+                made = live.run(self._turn, out, tables=False)
+            finally:
+                if out and (out / "run.json").exists():
+                    self.recordings.append(out)
+            if not self._again:
+                self._state["recording"] = None
+                if made.run["end"]["reason"] != "duration":
+                    self._wait(made)
+
+    def _begin(self) -> Path | None:
+        """The folder of the run that begins, None where it is not recorded."""
+        if not self._state["recording"]:
+            return None
+        free = (self._root.with_name(f"{self._root.name}-{i}") for i in count(1))
+        folder = next(path for path in free if not path.exists())
+        self._state["recording"] = str(folder)
+        return folder
+
+    def _turn(self, live: RealTime) -> None:
+        if self._controls is None:
+            self._start(live)
+        assert self._controls
+        for message in self._link.received():
+            if isinstance(message, messages.Time):
+                self._time(message.do)
+                continue
+            try:
+                self._controls.apply(message)
+            except InputFault as fault:
+                self._refuse(message, fault)
+            if not isinstance(message, messages.Hand):
+                self._tell_controls()
+        self._require_server()
+        self._link.send({"type": "frame"} | self._frames.frame(live), frame=True)
+
+    def _refuse(self, message: messages.Message, fault: InputFault) -> None:
+        """Say why; a hold that only a run that begins with it can have begins anew with it."""
+        self._link.send({"type": "refused", "why": str(fault)})
+        assert self._controls
+        if isinstance(message, messages.Hold) and self._controls.fits(message):
+            option = {f'holds."{message.connection}"': message.hold}
+            self._scene = open_scene.load(self._scene, option)
+            self._link.send(
+                {"type": "refused", "why": f"{message.hold} begins at t = 0: it runs in Python"}
+            )
+            self._anew(self._state["recording"] and "again")
+
+    def _start(self, live: RealTime) -> None:
+        self._frames, self._controls = Frames(live), Controls(live, self._settings)
+        self._controls.restore()
+        scene = self._scene
+        timeline = live.system.timeline
+        self._link.send(
+            {
+                "type": "scene",
+                "title": scene.title,
+                "picture": (scene.linkage, scene.device, scene.contacts),
+                "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
+                "energies": [*live.energies()],
+            }
+        )
+        self._tell_controls()
+        if self._state["paused"]:
+            live.pause()
+        self._tell(ended=None)
+
+    def _time(self, do: str) -> None:
+        match do:
+            case "pause":
+                self._live.pause()
+                self._tell(paused=True)
+            case "resume":
+                self._live.resume()
+                self._tell(paused=False)
+            case "step":
+                self._live.step()
+                self._tell(paused=True)
+            case "reset":
+                self._anew(self._state["recording"] and "again")
+            case "record":
+                self._anew(None if self._state["recording"] else "new")
+
+    def _anew(self, recording: str | None) -> None:
+        """End this run, and begin one at t = 0."""
+        self._state["recording"], self._again = recording, True
+        self._live.stop()
+
+    def _wait(self, made: Run) -> None:
+        """Say how a run has ended by itself, and wait for a reset or recording."""
+        reason = made.run["end"]["reason"]
+        self._tell(ended=str(made.fault or f"the run has ended: {reason}"), recording=None)
+        while True:
+            interrupt.check()
+            self._require_server()
+            for message in self._link.received():
+                if isinstance(message, messages.Time) and message.do in ("reset", "record"):
+                    self._state["recording"] = "new" if message.do == "record" else None
+                    return
+            time.sleep(WAIT)
+
+    def _require_server(self) -> None:
+        if not self._link.alive:
+            raise Fault("the page's server has ended: start `hapticlink view` again")
+
+    def _tell_controls(self) -> None:
+        assert self._controls
+        self._link.send({"type": "controls"} | self._controls.described())
+
+    def _tell(self, **state: Any) -> None:
+        self._state |= state
+        self._link.send({"type": "state"} | self._state)

@@ -1,0 +1,92 @@
+"""Messages of a page, the light, and the constrained directions, without a page."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.view.frames import light
+from hapticlink.orchestrator.view.messages import Hand, parse
+from hapticlink.orchestrator.view.picture import directions
+from hapticlink.orchestrator.view.scene import viewed
+
+
+def test_a_pull_is_read() -> None:
+    assert parse('{"type": "hand", "at": [0.1, -0.2]}') == Hand("hand", (0.1, -0.2))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        '"hand"',
+        "{}",
+        '{"type": "exec", "at": null}',
+        '{"type": "hand"}',
+        '{"type": "hand", "at": [0.1]}',
+        '{"type": "hand", "at": [0.1, 0.2, 0.3]}',
+        '{"type": "hand", "at": [0.1, "0.2"]}',
+        '{"type": "hand", "at": [0.1, NaN]}',
+        '{"type": "hand", "at": [0.1, 1e999]}',
+        '{"type": "hand", "at": [0.1, 0.2], "more": 1}',
+        '{"type": "rate", "value": 0}',
+        '{"type": "rate", "value": -3}',
+        '{"type": "rate", "value": true}',
+        '{"type": "delay", "connection": "a", "value": 2}',
+        '{"type": "gain", "name": "controller.K_pc", "factor": -1}',
+        '{"type": "topology", "on": 1}',
+        '{"type": "time", "do": "stop"}',
+        json.dumps({"type": "hold", "connection": "x" * 201, "hold": "zoh"}),
+        json.dumps({"type": "hold", "connection": "x", "hold": "z" * 5000}),
+        b'{"type": "hand", "at": null}',
+    ],
+)
+def test_what_is_no_message_is_refused(text: str | bytes) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        parse(text)
+
+
+@pytest.mark.parametrize(
+    ("generated", "put_in", "color"),
+    [(0.0, 0.0, "green"), (-1.0, 0.5, "green"), (5e-5, 0.0, "green"), (5e-4, 0.0, "amber"),
+     (0.2, 1.0, "amber"), (1.1, 1.0, "red"), (0.1, -1.0, "red")],
+)  # fmt: skip
+def test_the_light_compares_what_was_generated_with_what_was_put_in(
+    generated: float, put_in: float, color: str
+) -> None:
+    assert light(generated, put_in) == color
+
+
+def test_constrained_directions_are_those_of_the_projector() -> None:
+    c, s = math.cos(0.3), math.sin(0.3)
+    line = np.array([c, s, 0.0])
+    (found,) = directions(np.outer(line, line).ravel().tolist())
+    assert abs(np.dot(found, [c, s])) == pytest.approx(1.0)
+    turn = np.diag([0.0, 0.0, 1.0])
+    assert directions(turn.ravel().tolist()) == []
+    both = np.array(directions(np.diag([1.0, 1.0, 0.0]).ravel().tolist()))
+    assert np.allclose(both @ both.T, np.eye(2))
+
+
+def test_a_scene_without_a_mechanism_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "device.toml"
+    path.write_text('title = "A device"\nduration = 1.0\n[device]\n')
+    with pytest.raises(InputFault, match=r"device.toml: has no \[linkage\].*closed-loop"):
+        viewed(str(path))
+
+
+def test_the_mouse_takes_the_place_of_the_hand() -> None:
+    scene = viewed("two-hands", ["graphics.rate=20"])
+    assert scene.hand
+    assert scene.hand.type == "spring"
+    assert scene.hands["left"].type == "arm"
+    assert scene.packaging == "native"
+    assert viewed("closed-loop", ["packaging=python"]).packaging == "python"
