@@ -103,6 +103,8 @@ def _virtual_wall(
     quantum: Annotated[float, Quantity("m", ge=0)] | None = None,
     unilateral: bool = True,
     velocity: Literal["difference", "measured"] = "difference",
+    pulse: Annotated[float, Quantity("kg", ge=0)] | None = None,
+    pulse_duration: Annotated[float, Quantity("s", ge=0)] = 0.01,
 ) -> Component:
     from hapticlink.components.blocks.virtual_wall import virtual_wall
 
@@ -113,6 +115,7 @@ def _virtual_wall(
         quantum=quantum,
         unilateral=unilateral,
         measured_velocity=velocity == "measured",
+        pulse=None if pulse is None else (pulse, pulse_duration),
     )
 
 

@@ -4,6 +4,14 @@
     F_k = -K p_k - B v_k       v_k: measured velocity, or (x_k - x_{k-1})/T
 
 A unilateral wall fills x > x_w: F = 0 where p <= 0, and it never pulls (F <= 0).
+
+A pulse (event-based feedback: Kuchenbecker, Fiene, Niemeyer, IEEE Trans. Visualization and Computer
+Graphics 12 (2006), 219) adds, from the first sample inside, at the velocity v_in, and for a time D
+
+    F = -M v_in/D
+
+open loop, on whichever side the device is then. Its impulse M v_in is that of a collision with
+M = m (1 + e), which takes a mass m from v_in to -e v_in.
 """
 
 from __future__ import annotations
@@ -21,18 +29,21 @@ def virtual_wall(
     quantum: float | None,
     unilateral: bool,
     measured_velocity: bool,
+    pulse: tuple[float, float] | None = None,
     step_s: float = 1e-3,
 ) -> Component:
     """The FMU `virtual_wall`, sampled: F of t_k from the inputs at t_k.
 
     stiffness: K (N/m). damping: B (N.s/m), None without a damper. position: x_w (m). quantum: of
     the encoder (m), whose reading is rounded down to a whole number of them; None reads x exactly,
-    and so does the parameter 0. The backward difference starts with v = 0; its T is the parameter
+    and so does the parameter 0. pulse: M (kg) and D (s), None without; D is rounded to whole
+    periods, at least one. The backward difference starts with v = 0; its T is the parameter
     `step_size`, which starts at step_s (s).
     """
-    differenced = damping is not None and not measured_velocity
+    moved = damping is not None or pulse is not None
+    differenced = moved and not measured_velocity
     inputs = [Variable("x", (), "m", description="position of the device")]
-    if damping is not None and measured_velocity:
+    if moved and measured_velocity:
         inputs += [Variable("v", (), "m/s", description="velocity of the device")]
     parameters = [
         Variable("stiffness", (), "N/m", stiffness, "K"),
@@ -42,29 +53,54 @@ def virtual_wall(
         parameters += [Variable("damping", (), "N.s/m", damping, "B")]
     if quantum is not None:
         parameters += [Variable("quantum", (), "m", quantum, "resolution of the encoder")]
-    if differenced:
-        parameters += [Variable(STEP_SIZE, (), "s", step_s, "T of the difference", "fixed")]
+    if pulse is not None:
+        parameters += [
+            Variable("pulse", (), "kg", pulse[0], "impulse of a contact by its velocity"),
+            Variable("pulse_duration", (), "s", pulse[1], "duration of the impulse"),
+        ]
+    if differenced or pulse is not None:
+        parameters += [Variable(STEP_SIZE, (), "s", step_s, "period T", "fixed")]
+    states = [Variable("x_last", (), "m")] if differenced else []
+    if pulse is not None:
+        states += [Variable("inside"), Variable("pulse_force", (), "N"), Variable("samples_left")]
     block = Block(
         inputs=inputs,
         parameters=parameters,
-        states=[Variable("x_last", (), "m")] if differenced else [],
+        states=states,
         outputs=[Variable("F", (), "N", description="force of the wall on the device")],
     )
     u, p = block.u, block.p
     x = _reading(u["x"], p["quantum"]) if quantum is not None else u["x"]
     F = -p["stiffness"] * (x - p["position"])
     if differenced:
-        F -= p["damping"] * (x - block.x["x_last"]) / p[STEP_SIZE]
-    elif damping is not None:
-        F -= p["damping"] * u["v"]
+        v = (x - block.x["x_last"]) / p[STEP_SIZE]
+    elif moved:
+        v = u["v"]
+    if damping is not None:
+        F -= p["damping"] * v
     if unilateral:
         F = ca.if_else(x > p["position"], ca.fmin(F, 0.0), 0.0)
+    initial, after = ({"x_last": x}, {"x_last": x}) if differenced else ({}, {})
+    if pulse is not None:
+        inside = x > p["position"]
+        samples = ca.fmax(ca.floor(p["pulse_duration"] / p[STEP_SIZE] + 0.5), 1.0)
+        begun = ca.logic_and(inside, ca.logic_not(block.x["inside"]))
+        strength = -p["pulse"] * ca.fmax(v, 0.0) / (samples * p[STEP_SIZE])
+        force = ca.if_else(begun, strength, block.x["pulse_force"])
+        left = ca.if_else(begun, samples, block.x["samples_left"])
+        F += ca.if_else(left > 0.0, force, 0.0)
+        initial |= {"inside": inside, "pulse_force": ca.SX(0), "samples_left": ca.SX(0)}
+        after |= {
+            "inside": inside,
+            "pulse_force": force,
+            "samples_left": ca.fmax(left - 1.0, 0.0),
+        }
     return block.component(
         "virtual_wall",
         "A virtual wall: a sampled spring and damper",
         "sampled",
-        initial={"x_last": x} if differenced else {},
-        step={"x_last": x} if differenced else {},
+        initial=initial,
+        step=after,
         output={"F": F},
         documentation=__doc__ or "",
     )

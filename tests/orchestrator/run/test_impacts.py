@@ -69,3 +69,28 @@ def test_a_damper_takes_what_the_samples_generate():
     speeds, _ = thrown(K, 0.5, 0.005, settings)
     assert -speeds[-1] / 0.5 == pytest.approx(1.0, abs=5e-3)
     assert -thrown(K, 0.5, 0.005)[0][-1] / 0.5 > 1.04
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("samples", [1, 5])
+def test_a_pulse_has_the_impulse_of_a_collision(e, samples):
+    """M = m (1 + e) alone, without a spring: the handle goes back with e v."""
+    pulse = {"stiffness": 0.0, "pulse": MASS * (1 + e), "pulse_duration": samples * T}
+    speeds, F = thrown(0.0, 0.5, 0.005, {"fmu.wall.settings": pulse})
+    assert np.count_nonzero(F) == samples
+    assert -np.sum(F) * T == pytest.approx(MASS * 0.5 * (1 + e), rel=1e-9)
+    assert speeds[-1] == pytest.approx(-e * 0.5, abs=1e-9)
+
+
+def test_a_pulse_comes_once_a_contact():
+    """A hand of 2 N holds the handle inside: a harder first contact, and the same wall at rest."""
+    settings = {"fmu.wall.settings": {"stiffness": 3000.0, "pulse": 0.1, "pulse_duration": 0.004}}
+    held = {"linkage.joint.0.damping": 5.0, "duration": 2.0}
+    held["hand"] = {"type": "constant", "wrench": [2.0, 0.0, 0.0]}
+    (_, with_pulse), (_, without) = (
+        thrown(3000.0, 0.05, 0.001, held | more) for more in (settings, {})
+    )
+    first = np.flatnonzero(without)[0]
+    assert np.flatnonzero(with_pulse)[0] == first
+    assert with_pulse[first] < 2 * without[first]
+    assert with_pulse[-1] == pytest.approx(-2.0, rel=0.01)
