@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from typing import Any
 
 from hapticlink.orchestrator.api.real_time import RealTime
 from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
+from hapticlink.orchestrator.run.energy.meter import Energy
 
 SHOWN = {
     "q": ("virtual_mechanism.q",),
@@ -26,6 +28,7 @@ SHOWN = {
     "margin": ("haptic_device.workspace_margin",),
 }
 """By name in a frame, the output that it is, the first that the scene has."""
+PORT = "user's port"
 SELDOM = 5
 """Turns between two readings of energies and deadlines, which take longer."""
 FELT = 1e-3
@@ -44,13 +47,13 @@ class Frames:
             for key, names in SHOWN.items()
             if any(_has(fmus, name) for name in names)
         }
-        self._turns = 0
+        self._turns, self._start = 0, float(live["virtual_mechanism.energy"][0])
         self._past: deque[tuple[float, float, float]] = deque()
         self._slow: dict[str, Any] = {}
 
     def frame(self, live: RealTime) -> dict[str, Any]:
-        """The newest samples, and now and then `energy` (generated, J, by connection), `light` and
-        the deadlines `missed`."""
+        """The newest samples, and now and then `energy` (generated, J, at the user's port and by
+        connection), `light` and the deadlines `missed`."""
         found: dict[str, Any] = {k: live[name].tolist() for k, name in self._outputs.items()}
         if self._turns % SELDOM == 0:
             self._slow = self._energies(live)
@@ -69,9 +72,18 @@ class Frames:
             self._past.popleft()
         _, before, put_before = self._past[0]
         return {
-            "energy": {name: e.generated for name, e in booked.items()},
+            "energy": {PORT: self._port(live, booked)}
+            | {name: e.generated for name, e in booked.items()},
             "light": light(generated - before, put_in - put_before),
         }
+
+    def _port(self, live: RealTime, booked: Mapping[str, Energy]) -> float:
+        """The energy generated at the user's port, as results/user_port has it: what the mechanism
+        has stored beyond the work of the hands on the handle and on further points."""
+        handle = "haptic_device" if "haptic_device" in live.system.fmu else "virtual_mechanism"
+        hands = [n for n in booked if n.startswith("hand_") or n.startswith(f"hand.F -> {handle}.")]
+        stored = float(live["virtual_mechanism.energy"][0]) - self._start
+        return stored - sum(booked[name].held for name in hands)
 
 
 def light(generated: float, put_in: float) -> str:

@@ -33,7 +33,8 @@ def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scen
         "damping": DAMPING,
         "target": [[0.0, 0.0, 0.0, 0.0]],
     }
-    changes: dict[str, object] = {"hand": hand, "duration": duration}
+    record = {"signals": "all"}  # what is not recorded is not read from its FMU
+    changes: dict[str, object] = {"hand": hand, "duration": duration, "record": record}
     if read.stop_when is None and read.ends_when:
         changes["stop_when"] = ""
     return open_scene.load(read, changes)

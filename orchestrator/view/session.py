@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.view import messages
 from hapticlink.orchestrator.view.controls import Controls, Settings
-from hapticlink.orchestrator.view.frames import Frames
+from hapticlink.orchestrator.view.frames import PORT, Frames
 from hapticlink.orchestrator.view.link import Link
 
 WAIT = 0.02
@@ -98,7 +98,7 @@ class Session:
                 "title": scene.title,
                 "picture": (scene.linkage, scene.device, scene.contacts),
                 "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
-                "energies": [*live.energies()],
+                "energies": [PORT, *live.energies()],
             }
         )
         self._tell_controls()

@@ -27,11 +27,12 @@ export class Charts {
   draw() { for (const chart of this.charts) chart.draw(); }
 }
 
-// hand.F -> haptic_device.F_hand: the user's port; else what is held, and where.
+// The user's port, or what is held by a connection, and where.
 function named(connection) {
   const [source, target] = connection.split(" -> ");
-  if (source === "hand.F" && target.startsWith("haptic_device")) return "user's port";
-  return `${source.split(".")[1]} to ${target.split(".")[0].replace("virtual_", "").replace("haptic_", "")}`;
+  if (!target) return source;
+  const what = source.startsWith("hand") ? "F_hand" : source.split(".")[1];
+  return `${what} to ${target.split(".")[0].replace("virtual_", "").replace("haptic_", "")}`;
 }
 
 class Chart {

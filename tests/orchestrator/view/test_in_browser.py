@@ -23,6 +23,7 @@ def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
     served: Served, browser: Any, way: tuple[float, float], moved: float
 ) -> None:
     page = Page(browser, served.url)
+    page.until("view.frame?.t > 0.4")
     page.page.click("#reset")
     page.until("view.frame?.t < 0.3 && view.stage.limits")
     start = np.array(page.get("view.frame.x.slice(0, 2)"))

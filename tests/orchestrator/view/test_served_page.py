@@ -74,6 +74,7 @@ def test_the_free_direction_yields_and_the_constrained_one_resists(served: Serve
     moved = {}
     for name, way in (("free", np.array(FREE)), ("constrained", np.array(CONSTRAINED))):
         with served.window() as window:
+            window.until(lambda new: new["frame"]["t"] > 0.3)
             window.send(type="time", do="reset")
             start = window.until(lambda new: "state" in new and new["frame"]["t"] < 0.2)["frame"]
             x = np.array(start["x"][:2])
