@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
@@ -36,7 +37,8 @@ SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
 # vectorisation: its time grows with the square of the length of straight-line code, and it did not
 # make the code faster.
 _ARITHMETIC = ("-ffp-contract=off", "-fno-slp-vectorize")
-FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", *_ARITHMETIC, "-g0", "-s", "-fvisibility=hidden")
+FLAGS = ("-fPIC", "-std=gnu11", "-O2", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
+LINK = ("-shared", "-s")
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
@@ -63,7 +65,7 @@ def compile_library(
     source: Path | str | Sequence[Path],
     library: Path | str,
     platform: str | None = None,
-    options: Iterable[str] = (),
+    options: Sequence[str] = (),
 ) -> Path:
     """Compile the C file `source` to the shared library `library` and return its path; several
     files are compiled side by side.
@@ -85,25 +87,36 @@ def compile_library(
     return library
 
 
-def _compiled(sources: list[Path], room: Path, target: str, options: Iterable[str]) -> bytes:
+def _compiled(sources: list[Path], room: Path, target: str, options: Sequence[str]) -> bytes:
     made = room / target
     made.mkdir()
-    flags = [*FLAGS, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags, *options]
+    link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     # A Mach-O file contains the path that it was written to, so this is the same everywhere.
-    command += [f"-I{_HEADERS}", "-o", "library", *map(str, sources)]
-    # zig keeps its own C library in its cache, but not our code.
-    local = {"ZIG_LOCAL_CACHE_DIR": str(room / "cache")}
-    with compiler_cache() as own:
-        environment = {**os.environ, **own, **local}
+    if len(sources) == 1:
+        _zig([*link, *options, "-o", "library", str(sources[0])], made, target)
+    else:
+        objects = [f"{k}.o" for k in range(len(sources))]
+        both = zip(sources, objects, strict=True)
+        commands = [[*options, "-c", "-o", o, str(source)] for source, o in both]
+        commands.reverse()  # the last includes all that is not in pieces, and takes longest
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(lambda command: _zig(command, made, target), commands))
+        _zig([*link, *options, "-o", "library", *objects], made, target)
+    return (made / "library").read_bytes()
+
+
+def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *FLAGS]
+    command += [f"-I{_HEADERS}", *arguments]
+    with tempfile.TemporaryDirectory(dir=folder) as local, compiler_cache() as own:
+        # zig keeps its own C library in its cache, but not our code.
+        environment = {**os.environ, **own, "ZIG_LOCAL_CACHE_DIR": local}
         done = subprocess.run(
-            command, cwd=made, env=environment, capture_output=True, text=True, check=False
+            command, cwd=folder, env=environment, capture_output=True, text=True, check=False
         )
     if done.returncode:
-        raise CompilerError(
-            f"{sources[0].name} does not compile for {target}:\n{done.stderr.strip()}"
-        )
-    return (made / "library").read_bytes()
+        name = Path(command[-1]).name
+        raise CompilerError(f"{name} does not compile for {target}:\n{done.stderr.strip()}")
 
 
 _CPU = {0x01000007: 3, 0x0100000C: 0}  # x86-64 and ARM64, with the subtype "all" of each
