@@ -33,11 +33,11 @@ def lines(results: Results) -> Iterator[str]:
     if COORDINATES in table:  # both are recorded
         yield from _deep(linkage, contacts, table)
     mechanism = TypeAdapter(Mechanism).validate_python(scene["mechanism"])
-    implicit = mechanism.integrator in ("linearly-implicit", "passive-midpoint")
-    if not implicit and len(table["time"]) > 1:
+    if mechanism.integrator != "passive-midpoint" and len(table["time"]) > 1:
         rate = results.run["fmus"][GAP.partition(".")[0]]["rate"]
         step_s = results.run["clocks"][rate]["longest"] / mechanism.substeps
-        yield from _stiff(linkage, contacts, step_s)
+        implicit = mechanism.integrator == "linearly-implicit"
+        yield from _stiff(linkage, contacts, step_s, implicit)
 
 
 def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
@@ -60,15 +60,19 @@ def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
         )
 
 
-def _stiff(linkage: Linkage, contacts: Contacts, step_s: float) -> Iterator[str]:
-    pushing, sticking = poles(linkage, contacts), sticking_poles(linkage, contacts, step_s)
-    kinds = ((pushing, "", "damping or stiffness"), (sticking, " that stick", "stiffness"))
-    for found, which, less in kinds:
+def _stiff(linkage: Linkage, contacts: Contacts, step_s: float, implicit: bool) -> Iterator[str]:
+    pushing = () if implicit else poles(linkage, contacts)
+    sticking = sticking_poles(linkage, contacts, step_s)
+    kinds = (
+        (pushing, "", "damping or stiffness", "linearly-implicit"),
+        (sticking, " that stick", "stiffness", "passive-midpoint"),
+    )
+    for found, which, less, method in kinds:
         pair, pole = max(found, key=lambda item: item[1], default=(None, 0.0))
         if pair and pole * step_s > STABLE:
             yield (
                 f"warning: contacts of {pair.body} with {pair.obstacle}{which} have a pole at "
                 f"{pole:.3g} 1/s, too fast for steps of {step_s:.3g} s: take a smaller "
                 f"contacts.{less}, steps below {STABLE / pole:.2g} s (mechanism.substeps), or "
-                "mechanism.integrator = 'linearly-implicit'"
+                f"mechanism.integrator = {method!r}"
             )
