@@ -2,8 +2,10 @@
 
 Beyond the middle of the thinner one of two shapes the nearest side is another one than that on
 which they met: the force changes its direction, and a corner that has sunk past the axis of a
-capsule can lose or gain its spring (detection.py), and with it energy. The walls of the enclosure
-are half planes, in which any depth is meaningful.
+capsule can lose or gain its spring (detection.py), and with it energy. Two polygons that go right
+through each other, and shapes that cross with no corner in the other, have no deep corner that says
+so: `overlaps` tells by separating axes. The walls of the enclosure are half planes, in which any
+depth is meaningful.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from hapticlink.components.contact.contact_forces import detection_parameters, g
 from hapticlink.components.contact.detection import touches
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import body_parameters
-from hapticlink.components.specs.bodies import edges
+from hapticlink.components.specs.bodies import counterclockwise, edges
 from hapticlink.components.specs.contacts import Contacts, Pair
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Point
@@ -74,3 +76,44 @@ def depths(
         last = first + pair.places
         yield pair, -found[:, first:last].min(axis=1)
         first = last
+
+
+def overlaps(
+    linkage: Linkage, contacts: Contacts, q: NDArray[np.float64]
+) -> Iterator[tuple[Pair, NDArray[np.float64]]]:
+    """Each pair of segments or polygons that can touch, and the length (m) of the shortest shift
+    that parts them, (k,), at joint coordinates q (k, n); -inf where their cores are apart (Ericson,
+    Real-Time Collision Detection, section 5.2.1)."""
+    p = Signals("p", body_parameters(linkage))
+    model = LinkageModel(linkage, p, ca.SX.sym("q", q.shape[1]), ca.SX(q.shape[1], 1))
+    values = [value for variable in p.variables for value in variable.starts]
+    bodies = {b.name: b for b in linkage.body}
+
+    def placed(name: str) -> NDArray[np.float64]:
+        """The corners of a body in the world, (k, corners, 2)."""
+        corners = [model.frames[name].point(ca.SX(ca.DM(at))) for at in bodies[name].shape]
+        at = ca.Function("corners", [model.q, p.vector], [ca.vertcat(*corners)])
+        return np.array(at(q.T, np.tile(values, (len(q), 1)).T)).T.reshape(len(q), -1, 2)
+
+    for pair in near(linkage, contacts):
+        if pair.kind == "body":
+            other: tuple[Point, ...] = bodies[pair.obstacle].shape
+        else:
+            other = contacts.polygon[pair.index].corners if pair.kind == "polygon" else ()
+        if min(len(other), len(bodies[pair.body].shape)) > 1:
+            fixed = np.tile(counterclockwise(other), (len(q), 1, 1))
+            both = placed(pair.body), placed(pair.obstacle) if pair.kind == "body" else fixed
+            apart = np.maximum(_apart(*both), _apart(*both[::-1]))
+            names = (pair.body, pair.obstacle) if pair.kind == "body" else (pair.body,)
+            radii = sum(bodies[name].radius or 0.0 for name in names)
+            yield pair, np.where(apart < 0, radii - apart, -math.inf)
+
+
+def _apart(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest distance (k,) of the corners `other` from an edge of `one`, along its normal."""
+    span = np.roll(one, -1, axis=1) - one
+    outward = np.stack([span[..., 1], -span[..., 0]], axis=-1)
+    outward /= np.linalg.norm(span, axis=-1, keepdims=True)
+    heights = np.einsum("kei,kci->kec", outward, other) - np.sum(outward * one, -1)[..., None]
+    found: NDArray[np.float64] = heights.min(axis=2).max(axis=1)
+    return found

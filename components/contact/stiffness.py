@@ -2,7 +2,8 @@
 
 With A the mobility of the point of contact, for two bodies the sum of both, a contact that pushes
 has the poles of e'' + b A e' + k A e = 0. Beyond |pole| h = 2 a step no longer follows them, and
-from 2.79 on (RK4) energy rises with each contact.
+from 2.79 on (RK4) energy rises with each contact. One that sticks has those with b = k tau along
+the surface, where A contains the turning of rounded shapes: beyond, it chatters and creeps.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.dynamics.start_mobility import start_mobility
+from hapticlink.components.forces import dry_friction
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts, Pair
 from hapticlink.components.specs.linkage import Linkage
@@ -25,18 +27,43 @@ STABLE = 2.0  # |pole| h
 def poles(linkage: Linkage, contacts: Contacts) -> Iterator[tuple[Pair, float]]:
     """Each pair that can touch, and the size (1/s) of its contacts' fastest pole, with the largest
     mobility of the corners of the bodies' shapes at the start pose."""
-    points = [(body.name, at) for body in linkage.body for at in body.shape]
+    yield from _poles(linkage, contacts, contacts.damping, False)
 
-    def places(model: LinkageModel) -> ca.SX:
-        return ca.vertcat(*(model.frames[body].point(ca.SX(ca.DM(at))) for body, at in points))
 
-    closed, _ = start_mobility(linkage, places)
-    mobility = {"ground": 0.0}
-    for i, (body, _) in enumerate(points):
-        own = closed[2 * i : 2 * i + 2, 2 * i : 2 * i + 2]
-        mobility[body] = max(mobility.get(body, 0.0), float(np.linalg.eigvalsh(own)[-1]))
+def sticking_poles(linkage: Linkage, contacts: Contacts, h: float) -> Iterator[tuple[Pair, float]]:
+    """The same along the surface for contacts that stick, at steps of h (s); none without
+    friction."""
+    if contacts.friction:
+        damping = contacts.stiffness * dry_friction.LAG * h
+        yield from _poles(linkage, contacts, damping, True)
+
+
+def _poles(
+    linkage: Linkage, contacts: Contacts, damping: float, along: bool
+) -> Iterator[tuple[Pair, float]]:
+    mobility = _mobilities(linkage, along)
     for pair in near(linkage, contacts):
         A = mobility[pair.body] + mobility[pair.obstacle if pair.kind == "body" else "ground"]
-        half, product = contacts.damping * A / 2, contacts.stiffness * A
+        half, product = damping * A / 2, contacts.stiffness * A
         overdamped = half**2 > product
         yield pair, half + math.sqrt(half**2 - product) if overdamped else math.sqrt(product)
+
+
+def _mobilities(linkage: Linkage, along: bool) -> dict[str, float]:
+    """The largest mobility of each body's corners in any direction, or of points of its surface
+    `along` it, at the radius r from a corner: u' A u, u = (cos, sin, r), in 64 directions."""
+    points = [(body, at) for body in linkage.body for at in body.shape]
+
+    def places(model: LinkageModel) -> ca.SX:
+        frames = [(model.frames[body.name], at) for body, at in points]
+        return ca.vertcat(*(ca.vertcat(f.point(ca.SX(ca.DM(at))), f.angle) for f, at in frames))
+
+    closed, _ = start_mobility(linkage, places)
+    found = {"ground": 0.0}
+    angles = np.arange(64) * math.pi / 32
+    for i, (body, _) in enumerate(points):
+        own = closed[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]
+        u = np.stack([np.cos(angles), np.sin(angles), np.full(64, body.radius or 0.0)])
+        most = np.max(np.sum(u * (own @ u), 0)) if along else np.linalg.eigvalsh(own[:2, :2])[-1]
+        found[body.name] = max(found.get(body.name, 0.0), float(most))
+    return found

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from hapticlink.components.contact.broad_phase import near
-from hapticlink.components.contact.depth import depths, middle
-from hapticlink.components.contact.stiffness import STABLE, poles
+from hapticlink.components.contact.depth import depths, middle, overlaps
+from hapticlink.components.contact.stiffness import STABLE, poles, sticking_poles
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
 from hapticlink.components.specs.linkage import Body
+from tests.components.contact import test_moving_bodies as moving
 from tests.components.contact.test_contact import FLOOR, R, block, loose
 from tests.components.contact.test_moving_bodies import disc, free
 
@@ -67,3 +68,39 @@ def test_energy_rises_in_a_tick_only_where_the_poles_are_too_fast(damping, rises
             energies.append(ball.outputs("energy")["energy"])
         most = max(most, np.diff(energies).max())
     assert (most > 1e-12) == rises
+
+
+@pytest.mark.parametrize(("mass", "rolls"), [(0.1, True), (0.05, False)])
+def test_a_light_disc_rolls_without_slip_only_where_sticking_is_slow_enough(mass, rolls):
+    """A force of 0.2 m g at its centre; mobility 1/m + r^2/I = 3/m along the floor, b = 4 h k."""
+    h, radius, k = 1e-3, 0.01, 15000.0
+    puck = disc("puck", mass, radius)
+    linkage = free(puck, gravity=(0.0, -9.81), start={"puck": (0.0, radius, 0.0)})
+    law = {"friction": 0.5, "damping": 5.0, **moving.FLOOR}
+    ((_, pole),) = sticking_poles(linkage, Contacts(**law), h)
+    exact = np.roots([mass / 3, 4 * h * k, k])
+    assert pole == pytest.approx(np.abs(exact).max(), rel=1e-9)
+    assert (pole * h < STABLE) == rolls
+    assert next(poles(linkage, Contacts(**law)))[1] * h < 1
+    found, slip = moving.block(linkage, law), 0.0
+    found.set(F_hand=(0.2 * mass * 9.81, 0.0, 0.0))
+    moving.steps(found, 1000, 0.8)
+    for _ in range(100):
+        found.step(h)
+        slip = max(slip, abs(found.state["qd"] @ (1.0, 0.0, radius)))
+    assert (slip < 1e-9) == rolls
+
+
+def test_shapes_that_cross_with_no_corner_inside_overlap():
+    """Bars of 0.2 m by 40 mm, a cross: parted by half of both sizes; a rounded segment likewise."""
+    sides = ((-0.1, -0.02), (0.1, -0.02), (0.1, 0.02), (-0.1, 0.02))
+    lying, standing = (Body(name=name, mass=1.0, corners=sides) for name in "ab")
+    axis = Body(name="c", mass=1.0, radius=0.01, capsule=((-0.1, 0.0), (0.1, 0.0)))
+    linkage, contacts = free(lying, standing, axis), Contacts()
+    q = np.array([(0, 0, 0, 0.03, 0, math.pi / 2, 0.05, 0.0, math.pi / 2)] * 2)
+    q[1, [4, 7]] = 0.13  # above the lying one
+    found = {p.body + p.obstacle: d for p, d in overlaps(linkage, contacts, q)}
+    np.testing.assert_allclose(found["ab"], (0.09 + 0.0, -math.inf), atol=1e-12)
+    np.testing.assert_allclose(found["ac"], (0.05 + 0.01, -math.inf), atol=1e-12)
+    gaps = {p.body + p.obstacle: d for p, d in depths(linkage, contacts, q[:1])}
+    assert gaps["ab"] < 0  # no corner is inside
