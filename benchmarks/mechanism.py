@@ -220,10 +220,15 @@ def _aggregate(rows: Rows, case: Case, exact: np.ndarray, floor: float) -> list[
 
 def advantage(rows: list[dict], peer: str) -> list[tuple[float, float, float]]:
     """(error, ms per simulated s, its ratio to ours at this error or less) of each Pareto-optimal
-    row of the peer; nan if none of ours is as accurate."""
-    mine = [r for r in rows if r["code"] == NATIVE and r["error"] > 10 * r["floor"]]
+    row of the peer; nan if none of ours is as accurate. Ours are taken for no more accurate than ten
+    times the floor of the reference."""
+    mine = [r for r in rows if r["code"] == NATIVE]
     # Bare calls of the same RK4 have no error of their own: ours with projection stands in.
-    stand_in = {r["rate"]: r["error"] for r in mine if r["method"] == "rk4, projection"}
+    stand_in = {
+        r["rate"]: r["error"]
+        for r in mine
+        if r["method"] == "rk4, projection" and r["error"] > 10 * r["floor"]
+    }
     theirs = [
         r | {"error": stand_in.get(r["rate"], math.nan)} if "calls" in r["method"] else r
         for r in rows
@@ -234,7 +239,7 @@ def advantage(rows: list[dict], peer: str) -> list[tuple[float, float, float]]:
     for row in theirs:
         if any(o["error"] <= row["error"] and o["ms_per_s"] < row["ms_per_s"] for o in theirs):
             continue
-        as_good = [r["ms_per_s"] for r in mine if r["error"] <= row["error"]]
+        as_good = [r["ms_per_s"] for r in mine if max(r["error"], 10 * r["floor"]) <= row["error"]]
         ratio = row["ms_per_s"] / min(as_good) if as_good else math.nan
         found.append((row["error"], row["ms_per_s"], ratio))
     return found
