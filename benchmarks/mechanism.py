@@ -220,8 +220,8 @@ def _aggregate(rows: Rows, case: Case, exact: np.ndarray, floor: float) -> list[
 
 def advantage(rows: list[dict], peer: str) -> list[tuple[float, float, float]]:
     """(error, ms per simulated s, its ratio to ours at this error or less) of each Pareto-optimal
-    row of the peer; nan if none of ours is as accurate. Ours are taken for no more accurate than ten
-    times the floor of the reference."""
+    row of the peer; nan if none of ours is as accurate. Ours are taken for no more accurate than
+    ten times the floor of the reference."""
     mine = [r for r in rows if r["code"] == NATIVE]
     # Bare calls of the same RK4 have no error of their own: ours with projection stands in.
     stand_in = {

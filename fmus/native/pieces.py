@@ -12,8 +12,8 @@ import re
 from collections.abc import Iterable, Iterator
 
 LONGEST = 100_000
-"""Statements that stay one function, since in pieces it takes up to 30 % longer to run: N-four-bar of
-40 windows, RK4, 86,000 statements, which compile in 15 s, and in 7 s in pieces."""
+"""Statements that stay one function, since in pieces it takes up to 30 % longer to run: N-four-bar
+of 40 windows, RK4, 86,000 statements, which compile in 15 s, and in 7 s in pieces."""
 PIECE = 300
 FILE = 60
 """Pieces in a file."""
