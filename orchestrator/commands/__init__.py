@@ -25,6 +25,7 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
     {
         "run": "Run a scene: results, run.json and figures.",
         "view": "Drag a scene's mechanism on a page, in real time.",
+        "new": "Write a commented scene of your own to change.",
         "build": "Build the FMUs of a scene.",
         "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
         "info": "Describe a scene, or list the shipped scenes.",
@@ -33,6 +34,7 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
         "sweep": "Run many variants of a scene in parallel: one table and figure.",
         "study": "Study which hold suits which rate: tables, figures and a page.",
         "bench": "Measure run time against error, beside other codes.",
+        "doctor": "Tell which optional parts are there, and check that FMUs build and run.",
         "recover": "Make the CSVs of a run that was killed.",
         "reproduce": "Reproduce the report's figures, with a page of the findings.",
     },
@@ -41,6 +43,10 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
 """For each command, the help of a function in the file of that name, which is imported when it is
 called; or a function itself. Its arguments and docstring define the command, and it returns the
 exit status."""
+
+app.register_install_completion_command(
+    help="Write the script that completes commands, options, scenes and keys in your shell."
+)
 
 Plugin = Annotated[
     list[str] | None,

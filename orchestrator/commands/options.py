@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.say import say
+from hapticlink.orchestrator.commands import completion
 from hapticlink.orchestrator.scene import overrides
 
-Scene = Annotated[str, Parameter(help="Name of a shipped scene, or path of a scene file or SSP.")]
+Scene = Annotated[
+    str,
+    Parameter(
+        help="Name of a shipped scene, or path of a scene file or SSP.",
+        completer=completion.scenes,
+    ),
+]
 Set = Annotated[
     list[str] | None,
     Parameter(
@@ -19,6 +30,7 @@ Set = Annotated[
         consume_multiple=False,
         negative="",
         help="key=value, a dotted key of the scene file; repeatable.",
+        completer=completion.keys,
     ),
 ]
 Swap = Annotated[
@@ -31,6 +43,15 @@ Swap = Annotated[
     ),
 ]
 Out = Annotated[Path | None, Parameter(help="Folder to write to.")]
+Quiet = Annotated[
+    bool, Parameter(negative="", help="Print warnings and errors only, on standard error.")
+]
+Json = Annotated[
+    bool,
+    Parameter(
+        name="--json", negative="", help="Print the result as one JSON document and nothing else."
+    ),
+]
 
 
 def options(set: Iterable[str] | None, swap: Iterable[str] | None) -> tuple[str, ...]:
@@ -50,7 +71,30 @@ def _swap(given: str) -> str:
     )
 
 
-def default_folder(root: str, scene: str) -> Path:
-    """The default output folder, `<root>/<scene>`, for a scene's name or path."""
+def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:
+    """The default output folder for a scene's name or path: `<root>/<scene>`, and with options
+    `<root>/<scene>,key=value,...`, so that a run does not replace one of other options.
+
+    Spaces, quotes and brackets are left out; where options hold other characters that are not for
+    file names, or many, the name ends with the start of their sha256.
+    """
     known = scene.endswith((".toml", ".ssp"))
-    return Path(root) / (Path(scene).stem if known else Path(scene).name)
+    name = Path(scene).stem if known else Path(scene).name
+    given = re.sub(r"[\s'\"\[\]]", "", ",".join(options))
+    if given:
+        plain = re.sub(r"[^\w.=,+-]", "_", given)[:LONGEST]
+        mark = "" if plain == given else f"-{hashlib.sha256(given.encode()).hexdigest()[:8]}"
+        name += f",{plain}{mark}"
+    return Path(root) / name
+
+
+LONGEST = 100
+"""Characters of options in the name of a folder."""
+
+
+def tell(lines: Iterable[str], record: Mapping[str, Any], quiet: bool, as_json: bool) -> None:
+    """Print the lines of a result; or with `as_json` its record alone; or with `quiet` nothing."""
+    if as_json:
+        print(json.dumps(record, indent=2))
+    elif not quiet:
+        say(*lines, sep="\n")

@@ -10,24 +10,26 @@ from hapticlink.orchestrator.base.say import printable
 
 
 @contextmanager
-def counted(title: str) -> Iterator[Callable[[int, int], None]]:
+def counted(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None]]:
     """Gives a function to be called with the numbers of finished and of all runs."""
-    with _bar(title) as show:
+    with _bar(title, hidden) as show:
         yield lambda done, of: show(done, of, f"{done} of {of} runs") if show else None
 
 
 @contextmanager
-def progress(title: str, duration: float) -> Iterator[Callable[[float], None] | None]:
+def progress(
+    title: str, duration: float, hidden: bool = False
+) -> Iterator[Callable[[float], None] | None]:
     """Gives a function to be called with the simulated time (s); None if stderr is no terminal."""
-    with _bar(title) as show:
+    with _bar(title, hidden) as show:
         yield (
             (lambda time: show(time, duration, f"{time:.2f} of {duration:g} s")) if show else None
         )
 
 
 @contextmanager
-def _bar(title: str) -> Iterator[Callable[[float, float, str], None] | None]:
-    if not sys.stderr.isatty():
+def _bar(title: str, hidden: bool) -> Iterator[Callable[[float, float, str], None] | None]:
+    if hidden or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console

@@ -3,14 +3,29 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.base.say import say
-from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, default_folder, options
+from hapticlink.orchestrator.commands.options import (
+    Json,
+    Out,
+    Quiet,
+    Scene,
+    Set,
+    Swap,
+    default_folder,
+    options,
+    tell,
+)
 from hapticlink.orchestrator.commands.progress import progress
+
+if TYPE_CHECKING:
+    from hapticlink.orchestrator.api.result import Run
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 Explain = Annotated[
@@ -35,34 +50,58 @@ def run(
     figures: Figures = True,
     explain: Explain = False,
     real_time: RealTime = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> int:
-    """Run a scene; write CSV files, run.json, plan.txt, figures to OUT (default runs/<scene>)."""
-    from hapticlink.orchestrator import api
-    from hapticlink.orchestrator.results import summary
-    from hapticlink.orchestrator.results.tables import TABLES
+    """Run a scene; write CSV files, run.json, plan.txt and figures to OUT (default runs/<scene>,
+    with options runs/<scene>,key=value,...).
 
+    A run replaces the results of an earlier one in its folder. The exit status is 0 for a regular
+    end, 1 for a run that failed (results up to then are kept), 2 for bad input.
+
+    Examples:
+
+    hapticlink run closed-loop
+
+    hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
+
+    hapticlink run my-scene.toml --no-figures --json > result.json
+    """
+    from hapticlink.orchestrator import api
+
+    given = options(set, swap)
     if explain:
-        say(*api.explain(scene, options(set, swap)), sep="\n")
+        say(*api.explain(scene, given), sep="\n")
         return 0
-    folder = out or default_folder("runs", scene)
+    folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ())))
     try:
-        read = api.scene(scene, options(set, swap))
-        with progress(read.title, read.duration) as told:
+        read = api.scene(scene, given)
+        with progress(read.title, read.duration, hidden=quiet) as told:
             made = api.run(read, out=folder, figures=figures, progress=told, real_time=real_time)
     except api.RunInterrupted as ended:
         made = ended.run
     if made.fault:
         say(f"hapticlink: {made.fault}", file=sys.stderr)
-    say(f"{default_folder('runs', scene).name}: {summary.ending(made)}")
+    if quiet or json:
+        for line in made.run["warnings"]:
+            say(f"hapticlink: {line}", file=sys.stderr)
+    tell(_lines(made, default_folder("runs", scene).name, folder), made.run, quiet, json)
+    return Fault.exit_status if made.fault else 0
+
+
+def _lines(made: Run, name: str, folder: Path) -> Iterator[str]:
+    from hapticlink.orchestrator.results import summary
+    from hapticlink.orchestrator.results.tables import TABLES
+
+    yield f"{name}: {summary.ending(made)}"
     for line in (*summary.numbers(made), *summary.lines(made)):
-        say(f"  {line}")
+        yield f"  {line}"
     wall_time = made.run["timings"]["run"]
     if wall_time:  # none where a signal came before the first event
         speed = made.run["end"]["time"] / wall_time
-        say(f"  {wall_time:.2f} s of run time, {speed:.1f} times real time")
+        yield f"  {wall_time:.2f} s of run time, {speed:.1f} times real time"
     if made.folder:
         names = sorted(made.run["files"], key=lambda name: not name.endswith(TABLES))
-        say(f"  {folder}/: {', '.join(names)}")
+        yield f"  {folder}/: {', '.join(names)}"
     else:
-        say(f"  {folder}/ is unchanged: the run has no row")
-    return Fault.exit_status if made.fault else 0
+        yield f"  {folder}/ is unchanged: the run has no row"

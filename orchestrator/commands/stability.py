@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from hapticlink.orchestrator.base.say import say
-from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, default_folder, options
+from hapticlink.orchestrator.commands.options import (
+    Json,
+    Out,
+    Quiet,
+    Scene,
+    Set,
+    Swap,
+    default_folder,
+    options,
+    tell,
+)
 from hapticlink.orchestrator.commands.progress import counted
 from hapticlink.orchestrator.commands.sweep import Jobs, Vary
 
@@ -40,17 +50,30 @@ def stability(
     check: Check = 0,
     seed: Seed = 0,
     jobs: Jobs = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> int:
     """Judge the stability of a scene around its equilibrium, from the linearised map of its
     co-simulation over a period of all its rates: spectral radius, modes and who takes part.
 
-    Prints the result and writes stability.json to OUT (default runs/<scene>). With --vary, a map
+    Prints the result and writes stability.json to OUT (default runs/<scene>, with options
+    runs/<scene>,key=value,...). With --vary, a map
     over one or two numeric keys and others, refined at the boundary: map.csv and map.png in OUT
     (default maps/<scene>); the same command continues an interrupted map.
+
+    Examples:
+
+    hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
+
+    hapticlink stability closed-loop-direct --set hand.type=arm --port
     """
+    chosen = (*(set or ()), *(swap or ()))
+    name = default_folder("runs", scene).name
     if vary:
-        return _map(scene, out or default_folder("maps", scene), options(set, swap), vary, check,
-                    seed, jobs)  # fmt: skip
+        folder = out or default_folder("maps", scene, chosen)
+        lines, record = _map(scene, folder, options(set, swap), vary, check, seed, jobs, quiet)
+        tell((f"{name}: {next(lines)}", *lines), record, quiet, json)
+        return 0
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
@@ -58,18 +81,19 @@ def stability(
     given = options(set, swap)
     if growth is not None:
         rate = api.finite_time_growth(scene, given, at=at, seconds=growth)
-        say(f"{default_folder('runs', scene).name}: over {growth:g} s from {at:g} s on, the worst")
-        say(f"  perturbation grows at {rate:.5g} 1/s: no verdict on stability")
+        said = (
+            f"{name}: over {growth:g} s from {at:g} s on, the worst",
+            f"  perturbation grows at {rate:.5g} 1/s: no verdict on stability",
+        )
+        tell(said, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json)
         return 0
     found = api.stability(scene, given, at=at)
     user = api.passivity(scene, given) if port else None
-    folder = folders.ensure(out or default_folder("runs", scene))
+    folder = folders.ensure(out or default_folder("runs", scene, chosen))
     record = found.record() | ({"port": user.record()} if user else {})
     write_json(folder / "stability.json", record)
-    say(f"{default_folder('runs', scene).name}: {found.verdict}")
-    said = [*found.lines(), *(user.lines() if user else ())]
-    say(*(f"  {line}" for line in said), sep="\n")
-    say(f"  {folder}/stability.json")
+    told = (*found.lines(), *(user.lines() if user else ()), f"{folder}/stability.json")
+    tell((f"{name}: {found.verdict}", *(f"  {line}" for line in told)), record, quiet, json)
     return 0
 
 
@@ -81,19 +105,23 @@ def _map(
     check: int,
     seed: int,
     jobs: int | None,
-) -> int:
+    quiet: bool,
+) -> tuple[Iterator[str], dict[str, Any]]:
+    """The lines and the record of a map."""
     from hapticlink.orchestrator import api
 
-    with counted(scene) as tell:
+    with counted(scene, hidden=quiet) as count:
         made = api.stability_map(
-            scene, vary, options, out=folder, check=check, seed=seed, jobs=jobs, progress=tell
+            scene, vary, options, out=folder, check=check, seed=seed, jobs=jobs, progress=count
         )
     verdicts = [row["verdict"] for row in made.of("grid")]
     said = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
-    say(f"{default_folder('maps', scene).name}: {len(verdicts)} points, {said}")
-    say(f"  {len(made.of('boundary'))} points of the boundary")
+    lines = [
+        f"{len(verdicts)} points, {said}",
+        f"  {len(made.of('boundary'))} points of the boundary",
+    ]
     if check:
         agree = [row.get("agree") for row in made.of("check")]
-        say(f"  {agree.count(True)} of {len(agree)} runs agree with the map")
-    say(f"  {folder}/: map.csv, map.png")
-    return 0
+        lines.append(f"  {agree.count(True)} of {len(agree)} runs agree with the map")
+    lines.append(f"  {folder}/: map.csv, map.png")
+    return iter(lines), {"folder": str(folder), "rows": made.rows}

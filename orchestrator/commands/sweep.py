@@ -9,7 +9,15 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.orchestrator.base.say import say
-from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_folder
+from hapticlink.orchestrator.commands.options import (
+    Json,
+    Out,
+    Quiet,
+    Scene,
+    Set,
+    default_folder,
+    tell,
+)
 from hapticlink.orchestrator.commands.progress import counted
 
 Vary = Annotated[
@@ -47,6 +55,8 @@ def sweep(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     metric: Metric = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> int:
     """Run many variants of a scene in parallel; write table.csv and sweep.png to OUT (default
     sweeps/<scene>).
@@ -54,23 +64,32 @@ def sweep(
     A run that fails is a row of the table. The exit status is 2 if every run is refused, 1 if every
     run fails. An interrupted sweep is continued by the same command; finished runs are not
     repeated.
+
+    Examples:
+
+    hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh
+
+    hapticlink sweep closed-loop --vary graphics.rate=10..60:11 --metric tracking_max_mm
     """
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.base.faults import InputFault
     from hapticlink.orchestrator.sweep.row import REFUSED
 
     folder = out or default_folder("sweeps", scene)
-    with counted(scene) as tell:
+    with counted(scene, hidden=quiet) as count:
         made = api.sweep(
             scene, vary or (), set or (), runs=runs or (), out=folder, jobs=jobs,
-            scheduler=scheduler, metric=metric, progress=tell,
+            scheduler=scheduler, metric=metric, progress=count,
         )  # fmt: skip
     for each in made.failed[:10]:
         what = ", ".join(f"{k}={v}" for k, v in each.items() if k in made.keys)
         say(f"hapticlink: {what}: {each['end']}: {each['message']}", file=sys.stderr)
     runs_made, failed = len(made.rows), len(made.failed)
-    say(f"{default_folder('sweeps', scene).name}: {runs_made} runs, {failed} of them failed")
-    say(f"  {folder}/: {', '.join(made.files)}")
+    lines = (
+        f"{default_folder('sweeps', scene).name}: {runs_made} runs, {failed} of them failed",
+        f"  {folder}/: {', '.join(made.files)}",
+    )
+    tell(lines, {"folder": str(folder), "rows": made.rows}, quiet, json)
     if failed < runs_made:
         return 0
     return InputFault.exit_status if all(r["end"] == REFUSED for r in made.rows) else 1
