@@ -17,7 +17,7 @@ from hapticlink.orchestrator.base.say import say
 app = App(
     name="hapticlink",
     help="Haptic rendering of linkages: FMUs, co-simulated at separate rates.",
-    help_format="plaintext",
+    help_format="markdown",
     version_flags=["--version"],
 )
 COMMANDS: Registry[str | Callable[..., Any]] = Registry(

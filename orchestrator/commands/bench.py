@@ -37,7 +37,7 @@ def bench(
     event loop, with the masters that are installed; deadlines missed in real time; and stress: hard
     scenes at the edge of stability and beyond it, each with the outcome that it has to have.
 
-    Writes a page with tables and figures to OUT (default results/<what>, for stress
+    Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
     """
     from rich.console import Console

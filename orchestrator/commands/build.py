@@ -18,7 +18,12 @@ AllPlatforms = Annotated[
 def build(
     scene: Scene, /, *, out: Out = None, set: Set = None, all_platforms: AllPlatforms = False
 ) -> int:
-    """Build the FMUs of a scene in OUT (default fmus/<scene>), one file per block."""
+    """Build the FMUs of a scene in OUT (default fmus/SCENE), one file per block.
+
+    For example:
+
+        hapticlink build closed-loop --set packaging=native --all-platforms
+    """
     from hapticlink.orchestrator import api
 
     folder = out or default_folder("fmus", scene)

@@ -9,8 +9,13 @@ from hapticlink.orchestrator.commands.options import Out, Scene, Set
 
 
 def export(scene: Scene, /, *, out: Out = None, set: Set = None) -> int:
-    """Write a scene as OUT/<scene>.ssp (default ssp/): its FMUs and connections for other tools;
-    `hapticlink run` reads it back, rates and holds included."""
+    """Write a scene as OUT/SCENE.ssp (default ssp/): its FMUs and connections for other tools;
+    `hapticlink run` reads it back, rates and holds included.
+
+    For example:
+
+        hapticlink export closed-loop --out ssp
+    """
     from hapticlink.orchestrator import api
 
     say(api.export(scene, set or (), out=(out or Path("ssp")) / f"{Path(scene).stem}.ssp"))

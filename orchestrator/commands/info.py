@@ -31,7 +31,7 @@ Draw = Annotated[
     Parameter(
         negative="",
         help="Draw the mechanism where it starts, and the device in its workspace, into OUT "
-        "(default info/<scene>).",
+        "(default info/SCENE).",
     ),
 ]
 
@@ -48,6 +48,10 @@ def info(
     """Describe a scene: rates, FMUs, connections and holds; the device's workspace, and whether the
     scene starts in it; the parts of the equations that it needs and leaves out, with their cost.
     Without SCENE, list the shipped scenes.
+
+    For example:
+
+        hapticlink info closed-loop --draw
     """
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.plan import sample_ages

@@ -18,9 +18,9 @@ def new(name: Name, /) -> int:
     """Write NAME.toml, a commented scene to change: a four-bar in the whole loop, with device,
     controller and hand. An existing file is left alone.
 
-    Example:
+    For example:
 
-    hapticlink new crane && hapticlink run crane.toml
+        hapticlink new crane && hapticlink run crane.toml
     """
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     text = files(__package__).joinpath("new_scene.toml").read_text(encoding="utf-8")

@@ -13,7 +13,12 @@ Folder = Annotated[Path, Parameter(help="Folder of a run that was killed.")]
 
 
 def recover(folder: Folder, /) -> int:
-    """Make the CSVs of a run that was killed, and say up to where its rows are there."""
+    """Make the CSVs of a run that was killed, and say up to where its rows are there.
+
+    For example:
+
+        hapticlink recover runs/closed-loop
+    """
     from hapticlink.orchestrator.results.recover import recover
 
     found = recover(folder)

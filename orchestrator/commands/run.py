@@ -53,19 +53,17 @@ def run(
     quiet: Quiet = False,
     json: Json = False,
 ) -> int:
-    """Run a scene; write CSV files, run.json, plan.txt and figures to OUT (default runs/<scene>,
-    with options runs/<scene>,key=value,...).
+    """Run a scene; write CSV files, run.json, plan.txt and figures to OUT (default
+    `runs/SCENE`, with options `runs/SCENE,key=value,...`).
 
     A run replaces the results of an earlier one in its folder. The exit status is 0 for a regular
     end, 1 for a run that failed (results up to then are kept), 2 for bad input.
 
-    Examples:
+    For example:
 
-    hapticlink run closed-loop
-
-    hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
-
-    hapticlink run my-scene.toml --no-figures --json > result.json
+        hapticlink run closed-loop
+        hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
+        hapticlink run my-scene.toml --no-figures --json > result.json
     """
     from hapticlink.orchestrator import api
 

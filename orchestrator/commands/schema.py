@@ -15,8 +15,9 @@ def schema(*, markdown: Markdown = False) -> int:
     """Print every key of a scene with unit, range and meaning, as a JSON schema (draft 2020-12)
     with which editors complete and check scenes.
 
-    `hapticlink schema > scene.schema.json`, and `#:schema scene.schema.json` as the first line of a
-    scene.
+    For example, with `#:schema scene.schema.json` as the first line of a scene:
+
+        hapticlink schema > scene.schema.json
     """
     import json
 

@@ -56,16 +56,15 @@ def stability(
     """Judge the stability of a scene around its equilibrium, from the linearised map of its
     co-simulation over a period of all its rates: spectral radius, modes and who takes part.
 
-    Prints the result and writes stability.json to OUT (default runs/<scene>, with options
-    runs/<scene>,key=value,...). With --vary, a map
+    Prints the result and writes stability.json to OUT (default `runs/SCENE`, with
+    options `runs/SCENE,key=value,...`). With --vary, a map
     over one or two numeric keys and others, refined at the boundary: map.csv and map.png in OUT
-    (default maps/<scene>); the same command continues an interrupted map.
+    (default maps/SCENE); the same command continues an interrupted map.
 
-    Examples:
+    For example:
 
-    hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
-
-    hapticlink stability closed-loop-direct --set hand.type=arm --port
+        hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
+        hapticlink stability closed-loop-direct --set hand.type=arm --port
     """
     chosen = (*(set or ()), *(swap or ()))
     name = default_folder("runs", scene).name

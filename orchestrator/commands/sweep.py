@@ -59,17 +59,16 @@ def sweep(
     json: Json = False,
 ) -> int:
     """Run many variants of a scene in parallel; write table.csv and sweep.png to OUT (default
-    sweeps/<scene>).
+    sweeps/SCENE).
 
     A run that fails is a row of the table. The exit status is 2 if every run is refused, 1 if every
     run fails. An interrupted sweep is continued by the same command; finished runs are not
     repeated.
 
-    Examples:
+    For example:
 
-    hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh
-
-    hapticlink sweep closed-loop --vary graphics.rate=10..60:11 --metric tracking_max_mm
+        hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh
+        hapticlink sweep closed-loop --vary graphics.rate=10..60:11 --metric tracking_max_mm
     """
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.base.faults import InputFault

@@ -41,7 +41,7 @@ def view(
     browser: Browser = True,
 ) -> int:
     """Show a scene that runs in real time on a page, where the mouse is the hand; Ctrl-C ends it.
-    Recordings are written to OUT-1, OUT-2, ... (default runs/<scene>-view)."""
+    Recordings are written to OUT-1, OUT-2, ... (default runs/SCENE-view)."""
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.view.scene import viewed
     from hapticlink.orchestrator.view.session import Session

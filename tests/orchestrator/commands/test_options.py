@@ -96,3 +96,11 @@ def test_the_doctor_builds_and_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert found["versions"]["casadi"]
     assert "websockets" in found["extras"]["view"]
     assert None not in found["versions"].values()
+
+
+@pytest.mark.parametrize("command", ["run", "sweep", "stability", "new", "build", "info"])
+def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(command, "--help") == 0
+    told = capsys.readouterr().out
+    assert f"hapticlink {command} " in told.partition("For example:")[2]
+    assert "\x1b" not in told  # no colours where it is no terminal
