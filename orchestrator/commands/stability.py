@@ -64,7 +64,7 @@ def stability(
     For example:
 
         hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
-        hapticlink stability closed-loop-direct --set hand.type=arm --port
+        hapticlink stability virtual-wall --port
     """
     chosen = (*(set or ()), *(swap or ()))
     name = default_folder("runs", scene).name

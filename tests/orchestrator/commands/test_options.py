@@ -1,6 +1,8 @@
 """Default folders, --json, --quiet, completion, `new` and `doctor`, from outside."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -98,9 +100,9 @@ def test_the_doctor_builds_and_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert None not in found["versions"].values()
 
 
-@pytest.mark.parametrize("command", ["run", "sweep", "stability", "new", "build", "info"])
-def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert status(command, "--help") == 0
-    told = capsys.readouterr().out
+@pytest.mark.parametrize("command", ["run", "sweep", "stability"])
+def test_help_has_examples(command: str) -> None:
+    called = [sys.executable, "-m", "hapticlink.orchestrator", command, "--help"]
+    told = subprocess.run(called, capture_output=True, text=True, check=True).stdout
     assert f"hapticlink {command} " in told.partition("For example:")[2]
     assert "\x1b" not in told  # no colours where it is no terminal
