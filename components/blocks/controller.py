@@ -3,8 +3,8 @@
     u = M_d [Lambda^-1 (F_h + F_drift + F_env - B_d v - K_d (x - x_ref)) + a_bias]
         + C_d v - F_h + F_T
 
-the report's (4.6) with (4.3) as corrected: F_h counts once, F_T stays outside Lambda^-1. A passivity
-controller (control/passivity.py) may take damping off u.
+the report's (4.6) with (4.3) as corrected: F_h counts once, F_T stays outside Lambda^-1. A
+passivity controller (control/passivity.py) may take damping off u.
 """
 
 from __future__ import annotations

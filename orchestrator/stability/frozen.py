@@ -24,7 +24,7 @@ DISCRETE = ("n_constrained", "deflection", "contact_deflection")
 
 
 def without(system: System) -> tuple[System, list[str]]:
-    """The system without quantisation, friction and passivity controllers; a line of text on each."""
+    """The system without quantisation, friction and passivity controllers, and a line on each."""
     fmus, lines = [], []
     for fmu in system.fmus:
         starts = []
