@@ -105,6 +105,7 @@ def _virtual_wall(
     velocity: Literal["difference", "measured"] = "difference",
     pulse: Annotated[float, Quantity("kg", ge=0)] | None = None,
     pulse_duration: Annotated[float, Quantity("s", ge=0)] = 0.01,
+    passivity: Annotated[float, Quantity("kg", gt=0)] | None = None,
 ) -> Component:
     from hapticlink.components.blocks.virtual_wall import virtual_wall
 
@@ -116,6 +117,7 @@ def _virtual_wall(
         unilateral=unilateral,
         measured_velocity=velocity == "measured",
         pulse=None if pulse is None else (pulse, pulse_duration),
+        passivity=passivity,
     )
 
 

@@ -3,7 +3,8 @@
     u = M_d [Lambda^-1 (F_h + F_drift + F_env - B_d v - K_d (x - x_ref)) + a_bias]
         + C_d v - F_h + F_T
 
-the report's (4.6) with (4.3) as corrected: F_h counts once, F_T stays outside Lambda^-1.
+the report's (4.6) with (4.3) as corrected: F_h counts once, F_T stays outside Lambda^-1. A
+passivity controller (control/passivity.py) may take damping off u.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from hapticlink.components.component import (
     Component,
     Variable,
 )
-from hapticlink.components.control import impedance, teleoperation, topology
+from hapticlink.components.control import impedance, passivity, teleoperation, topology
 from hapticlink.components.ports import Spring
 
 _DRIFT = Spring("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_drift")
@@ -39,7 +40,7 @@ def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variabl
         Variable("x_S", (3,), POSE, description="pose of the operational point"): coupled,
         Variable("v_S", (3,), TWIST, description="velocity of the operational point"): coupled,
         Variable("x_D", (3,), POSE, description="pose of the handle"): (
-            coupled or spec.stiffness is not None
+            coupled or spec.stiffness is not None or bool(spec.passivity)
         ),
         Variable("v_D", (3,), TWIST, description="velocity of the handle"): (
             coupled or spec.damping is not None
@@ -47,7 +48,7 @@ def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variabl
         Variable("F_hand", (3,), WRENCH, description="wrench of the hand"): spec.impedance,
         Variable("F_env", (3,), WRENCH, description="wrench of contacts and others"): spec.contact,
         Variable("M", (3, 3), INERTIA, IDENTITY, "inertia of the device"): bool(
-            spec.impedance or law
+            spec.impedance or law or spec.passivity
         ),
         Variable(
             "c", (3,), WRENCH, description="C_d v, Coriolis and centrifugal terms of the device"
@@ -92,7 +93,8 @@ def _gains(
 def controller(spec: specs.Controller, length_scale: float) -> Component:
     """The parts of `spec` that are on; the others have no term, no input and no parameter.
 
-    Sampled and without memory: F_motor, F_drift, F_constraint of t_k from inputs of t_k.
+    Sampled: F_motor, F_drift, F_constraint of t_k from inputs of t_k; without memory but for that
+    of a passivity controller.
     Without the impedance part the wrenches act on the device as they are,
     u = F_drift + F_env - B_d v - K_d (x - x_ref) + F_T. length_scale is L (m).
 
@@ -120,9 +122,13 @@ def controller(spec: specs.Controller, length_scale: float) -> Component:
                 "F_constraint", (3,), WRENCH, description="F_T, wrench of the topology controller"
             )
         ]
-    block = Block(
-        inputs=_signals(spec, law), parameters=_gains(spec, law, length_scale), outputs=outputs
-    )
+    guard = specs.Passivity() if spec.passivity is True else (spec.passivity or None)
+    parameters, states = _gains(spec, law, length_scale), []
+    if guard:
+        parameters += [*passivity.parameters(guard), passivity.PERIOD]
+        states = passivity.states(guard, POSE, WRENCH)
+        outputs += passivity.OUTPUTS
+    block = Block(inputs=_signals(spec, law), parameters=parameters, states=states, outputs=outputs)
     u, p = block.u, block.p
 
     output: dict[str, ca.SX] = {}
@@ -150,14 +156,20 @@ def controller(spec: specs.Controller, length_scale: float) -> Component:
         wrench = topology.plain_wrench if law.form == "plain" else topology.constraint_wrench
         output["F_constraint"] = wrench(pull, u["M"], u["P_c"], p["length_scale"])
         motor += output["F_constraint"]
+    initial: dict[str, ca.SX] = {}
+    step: dict[str, ca.SX] = {}
+    if guard:
+        guarded = passivity.passive(motor, u["x_D"], u["M"], block.x, p)
+        motor, initial, step = guarded.wrench, guarded.initial, guarded.step
+        output |= guarded.output
     output["F_motor"] = motor
 
     return block.component(
         "controller",
         "Impedance, four-channel teleoperation and topology controller",
         "sampled",
-        initial={},
-        step={},
+        initial=initial,
+        step=step,
         output=output,
         documentation=controller.__doc__ or "",
         springs=[_DRIFT] if spec.teleoperation else [],

@@ -19,6 +19,8 @@ from __future__ import annotations
 import casadi as ca
 
 from hapticlink.components.component import STEP_SIZE, Block, Component, Variable
+from hapticlink.components.control import passivity as observer
+from hapticlink.components.specs.control import Passivity
 
 
 def virtual_wall(
@@ -30,6 +32,7 @@ def virtual_wall(
     unilateral: bool,
     measured_velocity: bool,
     pulse: tuple[float, float] | None = None,
+    passivity: float | None = None,
     step_s: float = 1e-3,
 ) -> Component:
     """The FMU `virtual_wall`, sampled: F of t_k from the inputs at t_k.
@@ -38,7 +41,8 @@ def virtual_wall(
     the encoder (m), whose reading is rounded down to a whole number of them; None reads x exactly,
     and so does the parameter 0. pulse: M (kg) and D (s), None without; D is rounded to whole
     periods, at least one. The backward difference starts with v = 0; its T is the parameter
-    `step_size`, which starts at step_s (s).
+    `step_size`, which starts at step_s (s). passivity: m (kg) of the device, with which a passivity
+    controller of default settings (control/passivity.py) bounds its damping; None without.
     """
     moved = damping is not None or pulse is not None
     differenced = moved and not measured_velocity
@@ -58,17 +62,20 @@ def virtual_wall(
             Variable("pulse", (), "kg", pulse[0], "impulse of a contact by its velocity"),
             Variable("pulse_duration", (), "s", pulse[1], "duration of the impulse"),
         ]
-    if differenced or pulse is not None:
+    if differenced or pulse is not None or passivity is not None:
         parameters += [Variable(STEP_SIZE, (), "s", step_s, "period T", "fixed")]
     states = [Variable("x_last", (), "m")] if differenced else []
     if pulse is not None:
         states += [Variable("inside"), Variable("pulse_force", (), "N"), Variable("samples_left")]
-    block = Block(
-        inputs=inputs,
-        parameters=parameters,
-        states=states,
-        outputs=[Variable("F", (), "N", description="force of the wall on the device")],
-    )
+    outputs = [Variable("F", (), "N", description="force of the wall on the device")]
+    if passivity is not None:
+        parameters += [
+            Variable("mass", (), "kg", passivity, "m of the device, for its passivity controller"),
+            *observer.parameters(Passivity()),
+        ]
+        states += observer.states(Passivity(), ("m",), ("N",))
+        outputs += observer.OUTPUTS
+    block = Block(inputs=inputs, parameters=parameters, states=states, outputs=outputs)
     u, p = block.u, block.p
     x = _reading(u["x"], p["quantum"]) if quantum is not None else u["x"]
     F = -p["stiffness"] * (x - p["position"])
@@ -80,7 +87,8 @@ def virtual_wall(
         F -= p["damping"] * v
     if unilateral:
         F = ca.if_else(x > p["position"], ca.fmin(F, 0.0), 0.0)
-    initial, after = ({"x_last": x}, {"x_last": x}) if differenced else ({}, {})
+    initial: dict[str, ca.SX] = {"x_last": x} if differenced else {}
+    after = dict(initial)
     if pulse is not None:
         inside = x > p["position"]
         samples = ca.fmax(ca.floor(p["pulse_duration"] / p[STEP_SIZE] + 0.5), 1.0)
@@ -95,13 +103,18 @@ def virtual_wall(
             "pulse_force": force,
             "samples_left": ca.fmax(left - 1.0, 0.0),
         }
+    output: dict[str, ca.SX] = {}
+    if passivity is not None:
+        guarded = observer.passive(F, x, p["mass"], block.x, p)
+        F, output = guarded.wrench, guarded.output
+        initial, after = initial | guarded.initial, after | guarded.step
     return block.component(
         "virtual_wall",
         "A virtual wall: a sampled spring and damper",
         "sampled",
         initial=initial,
         step=after,
-        output={"F": F},
+        output={"F": F, **output},
         documentation=__doc__ or "",
     )
 

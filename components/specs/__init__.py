@@ -8,6 +8,7 @@ from hapticlink.components.specs.contacts import (
 )
 from hapticlink.components.specs.control import (
     Controller,
+    Passivity,
     Teleoperation,
     Topology,
 )
@@ -63,6 +64,7 @@ __all__ = [
     "OperationalPoint",
     "PDDrive",
     "Pair",
+    "Passivity",
     "Polygon",
     "ProfileDrive",
     "ProfileHand",

@@ -33,6 +33,25 @@ class Teleoperation:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Passivity:
+    """Time-domain passivity observer and controller (Hannaford and Ryu 2002): what the motors give
+    beyond a budget is taken out by damping ([stability](stability.md#passivity-controller))."""
+
+    energy: Annotated[float, Quantity("J", ge=0)] = 0.0
+    """What the motors may give in all: that of drives and gravity, of a mechanism in motion at the
+    start, and (m_D - m_S) v^2/2 where the handle shall feel lighter than the device."""
+    limit: Annotated[float, Quantity("1", gt=0, lt=2)] = 0.5
+    """Largest damping times the period, by the device's inertia; a sampled damper is stable below
+    2."""
+    noise: Annotated[float, Quantity("J", gt=0)] = 1e-9
+    """Kinetic energy of the handle below which nothing is damped: with encoders, that of one count
+    in a period."""
+    reset_after: Annotated[float, Quantity("s", gt=0)] | None = None
+    """Time without a wrench after which the energy that was absorbed is forgotten; by default it
+    never is."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Controller:
     """The controller of the device. A part that is false or left out adds no term, no input and no
     parameter."""
@@ -53,3 +72,5 @@ class Controller:
     contact: bool = False
     """Whether contacts are felt: F_env enters the impedance law. Needs [contacts]. With further
     hands or efforts on joints it always does, with all that acts beside the hand."""
+    passivity: Passivity | bool = False
+    """Passivity controller at the motors; true for its defaults."""

@@ -1,7 +1,8 @@
 """Nonlinearities that a linearisation cannot follow, and what becomes of each.
 
 Quantisation and Coulomb friction are taken out: their slope is 0, or that of a joint that sticks,
-whatever the loop does. Switches stay as they are at the equilibrium.
+whatever the loop does. So are passivity controllers, which act by what has been. Switches stay as
+they are at the equilibrium.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ DISCRETE = ("n_constrained", "deflection", "contact_deflection")
 
 
 def without(system: System) -> tuple[System, list[str]]:
-    """The system without quantisation and friction, and a line of text on each."""
+    """The system without quantisation, friction and passivity controllers, and a line on each."""
     fmus, lines = [], []
     for fmu in system.fmus:
         starts = []
@@ -46,6 +47,8 @@ def _removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:
             yield scalar, COUNT, "quantisation of the encoders"
         elif (block, scalar.name) == ("virtual_wall", "quantum"):
             yield scalar, 0.0, "quantisation of the encoder"
+        elif block in ("controller", "virtual_wall") and scalar.name == "passivity_limit":
+            yield scalar, 0.0, "the passivity controller"
         elif block == "virtual_mechanism" and scalar.name.endswith((".friction", "mu_contact")):
             yield scalar, NEXT_TO_NOTHING, "Coulomb friction"
 

@@ -15,10 +15,13 @@ from tests.docs.pages import ROOT
 WALL = {
     "name": "wall",
     "block": "virtual_wall",
-    "settings": {"stiffness": 1.0, "damping": 1.0, "velocity": "measured"},
+    "settings": {"stiffness": 1.0, "damping": 1.0, "velocity": "measured", "passivity": 1.0},
 }
 SCENES: list[tuple[str, Mapping[str, Any]]] = [
-    ("closed-loop", {"sensing": "encoders", "controller.bias": "full"}),
+    (
+        "closed-loop",
+        {"sensing": "encoders", "controller.bias": "full", "controller.passivity": True},
+    ),
     ("closed-loop", {"mechanism.directions": True, "mechanism.diagnostics": True}),
     ("closed-loop", {"mechanism.integrator": "passive-midpoint"}),
     ("closed-loop", {"graphics.sync": "operational", "hand.damping": (1.0, 1.0, 0.1)}),

@@ -22,6 +22,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.components import specs
+from hapticlink.components.blocks.controller import controller
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
@@ -62,6 +63,7 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
     made = {b.name: component(b.made_by, b.settings) for b in blocks.blocks(scene)}
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"})
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
+    made["passive"] = controller(specs.Controller(passivity=True), 0.04)
     made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
     # Several are named virtual_mechanism.
     return {
@@ -161,7 +163,8 @@ def driven(path: Path) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "name", [*NAMES, "discrete_equivalent", "arm", "driven", "rubbing", "splined", "swung"]
+    "name",
+    [*NAMES, "discrete_equivalent", "arm", "driven", "rubbing", "splined", "swung", "passive"],
 )
 def test_every_block_gives_the_bits_of_its_python_fmu(both, name):
     by_python, by_c = map(driven, both[name])

@@ -1,0 +1,153 @@
+"""The passivity observer and controller: walls far beyond the closed form, and runs that need
+none."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.components import specs
+from hapticlink.components.blocks.controller import controller
+from hapticlink.orchestrator.stability import wall_limits
+from tests.blocks import Running
+
+MASS, T = 0.3, 1 / 512
+M = np.diag([0.3, 0.3, 3e-4])
+ARM = {
+    "type": "spring",
+    "stiffness": [300.0, 0.0, 0.0],
+    "damping": [5.0, 0.0, 0.0],
+    "target": [[0.0, 0.004, 0.0, 0.0]],
+}
+TWO_SIDED = {"impedance": False, "teleoperation": False, "topology": False}
+
+
+def pressed(options: dict[str, Any], guard: float | None = MASS) -> tuple[hl.Results, np.ndarray]:
+    """A run of a wall, and the work (J) of its force on the handle at each sample."""
+    own = {"duration": 4.0} | ({"fmu.wall.settings.passivity": guard} if guard else {})
+    run = hl.run("virtual-wall", own | options, figures=False)
+    assert run.fault is None
+    x, F = run["virtual_mechanism.x"][:, 0], np.ravel(run["wall.F"])
+    return run, np.concatenate([[0.0], np.cumsum(F[:-1] * np.diff(x))])
+
+
+@pytest.mark.parametrize("hand", ["constant", "arm"])
+@pytest.mark.parametrize("damping", [0.0, 5.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wall_beyond_its_limit_generates_at_most_the_handles_kinetic_energy(
+    hand: str, damping: float, seed: int
+) -> None:
+    draw = np.random.default_rng(seed)
+    K = 5200.0 * 10 ** draw.uniform(0.05, 1.2)
+    assert wall_limits.stable(MASS, 5.0, T) < K
+    options: dict[str, Any] = {
+        "fmu.wall.settings.stiffness": K,
+        "linkage.joint.rail.damping": damping,
+        "linkage.start.rail": -draw.uniform(0.001, 0.02),
+    }
+    wrench = [draw.uniform(0.5, 8.0), 0.0, 0.0]
+    options |= {"hand": ARM} if hand == "arm" else {"hand.wrench": wrench}
+    run, work = pressed(options)
+    speed = np.abs(run["virtual_mechanism.v"][:, 0]).max()
+    assert work.max() <= 0.5 * MASS * speed**2
+    left = np.ravel(run["wall.passivity_energy_left"])
+    assert left == pytest.approx(-work, rel=1e-9, abs=1e-12)  # the observer is the work itself
+    assert np.ravel(run["wall.passivity_damping"]).max() <= 0.5 / T * (1 + 1e-12)
+    _, without = pressed(options, guard=None)
+    assert without.max() > 2 * work.max()
+
+
+def test_the_handle_comes_to_rest_at_ten_times_the_limit() -> None:
+    options = {"fmu.wall.settings.stiffness": 50000.0, "duration": 6.0}
+    for guard, apart in ((MASS, 1e-5), (None, 5e-3)):
+        run, _ = pressed(options, guard)
+        late = np.ptp(run["virtual_mechanism.x"][-512:, 0])
+        assert late < apart if guard else late > apart
+
+
+def test_where_it_never_acts_the_bits_are_those_without() -> None:
+    plain = hl.run("closed-loop", figures=False)
+    guarded = hl.run("closed-loop", {"controller.passivity": True}, figures=False)
+    assert not np.any(guarded["controller.passivity_damping"])
+    for signal in ("haptic_device.x_true", "controller.F_motor", "virtual_mechanism.q"):
+        assert np.array_equal(plain[signal], guarded[signal])
+
+
+def test_a_coupling_beyond_its_limit_gives_the_handle_little() -> None:
+    """60,000 N/m between mechanism and handle chatter; the motors give 7.9 mJ without."""
+    stiff = {
+        "controller.teleoperation.stiffness": [2e4, 2e4, 100.0],
+        "controller.topology": False,
+    }
+    given = {}
+    for guard in (False, True):
+        run = hl.run("closed-loop", stiff | {"controller.passivity": guard}, figures=False)
+        x, F = run["haptic_device.x_true"], run["controller.F_motor"]
+        given[guard] = np.cumsum((F[:-1] * np.diff(x, axis=0)).sum(axis=1)).max()
+    assert given[True] < 0.1 * given[False]
+
+
+def test_the_lifted_map_is_that_of_the_loop_without_it() -> None:
+    found = [
+        hl.stability("virtual-wall", options)
+        for options in ({}, {"fmu.wall.settings.passivity": MASS})
+    ]
+    assert found[1].growth == pytest.approx(found[0].growth, rel=1e-6)
+    assert any("passivity controller, taken out" in line for line in found[1].frozen)
+
+
+def block(**spec: Any) -> Running:
+    """A controller that holds a spring of 1000 N/m, with the passivity controller `spec`."""
+    law = specs.Controller(
+        **TWO_SIDED, stiffness=(1000.0, 1000.0, 5.0), passivity=specs.Passivity(**spec)
+    )
+    return Running(controller(law, 0.04), {"M": M}, {"step_size": T})
+
+
+def sampled(run: Running, x: list[float]) -> tuple[np.ndarray, float, float]:
+    """F_motor, the energy left and the damping at the pose x, after which a period passes."""
+    run.set(x_D=x)
+    y = run.y
+    run.step(T)
+    return y["F_motor"], y["passivity_energy_left"], y["passivity_damping"]
+
+
+def test_the_equations() -> None:
+    run = block(energy=1e-4, limit=1.5, noise=1e-12)
+    x = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.01], [2e-4, 5e-4, 0.0], [1e-4, 4e-4, 0.0]])
+    K, E, before, held = np.array([1000.0, 1000.0, 5.0]), 1e-4, x[0], np.zeros(3)
+    acted = 0
+    for pose in x:
+        moved = pose - before
+        E -= held @ moved
+        twice = moved @ M @ moved / T**2
+        beta = min(-E / twice, 1.5) if E < 0 and twice > 2e-12 else 0.0
+        acted += beta > 0
+        held, before = -K * pose - beta / T * M @ moved / T, pose
+        F, left, damping = sampled(run, [*pose])
+        np.testing.assert_allclose(F, held, rtol=1e-12)
+        assert (left, damping) == pytest.approx((E, beta / T), rel=1e-9, abs=1e-15)
+    assert acted
+
+
+def test_a_free_handle_forgets_what_was_absorbed_and_keeps_a_deficit() -> None:
+    run = block(reset_after=2 * T)
+    sampled(run, [1e-3, 0.0, 0.0])
+    _, absorbed, _ = sampled(run, [2e-3, 0.0, 0.0])
+    assert absorbed > 0
+    for _ in range(3):
+        _, left, _ = sampled(run, [0.0, 0.0, 0.0])
+    assert left <= 0.0
+    forgotten = block(reset_after=2 * T, energy=1.0)
+    for _ in range(4):
+        _, left, _ = sampled(forgotten, [0.0, 0.0, 0.0])
+    assert left == 1.0
+
+
+@pytest.mark.parametrize(("key", "value"), [("limit", 2.0), ("limit", 0.0), ("noise", 0.0)])
+def test_what_cannot_be_damped_is_refused(key: str, value: float) -> None:
+    with pytest.raises(hl.InputFault, match=f"passivity.*{key}"):
+        hl.scene("closed-loop", {f"controller.passivity.{key}": value})
