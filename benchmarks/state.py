@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import ModuleType
 
 import benchmarks
 import hapticlink.components
 import hapticlink.fmus.native
 from hapticlink.fmus.cache import sources
 
-PACKAGES = ("hapticlink", "casadi", "ziglang", "numpy", "scipy", "mujoco", "pin", "exudyn")
+PACKAGES = (
+    "hapticlink", "casadi", "ziglang", "numpy", "scipy", "mujoco", "pin", "exudyn", "fmpy",
+    "pythonfmu", "libcosimpy", "ecospy",
+)  # fmt: skip
 
 
 def versions() -> dict[str, str]:
@@ -25,10 +29,11 @@ def versions() -> dict[str, str]:
     return found
 
 
-def begin(out: Path, rows: tuple[str, ...]) -> None:
-    """Keep the files `rows` in `out` only if they were made by these sources and versions."""
+def begin(out: Path, rows: tuple[str, ...], *further: ModuleType) -> None:
+    """Keep the files `rows` in `out` only if they were made by these sources, those of the packages
+    `further` among them, and versions."""
     path = out / "state.json"
-    made_by = sources(hapticlink.components, hapticlink.fmus.native, benchmarks)
+    made_by = sources(hapticlink.components, hapticlink.fmus.native, benchmarks, *further)
     now = {"sources": made_by, "versions": versions()}
     if not path.exists() or json.loads(path.read_text()) != now:
         for name in rows:

@@ -10,8 +10,7 @@ from time import thread_time
 
 import numpy as np
 
-from benchmarks.peers.masters import BARE
-from hapticlink.fmus.native import compile_library
+from benchmarks.peers.bare_loop import bare_loop
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.in_process import InProcess
@@ -29,12 +28,10 @@ class Bare(ctypes.Structure):
     )
 
 
-def seconds(scene: str, options: list[str], steps: int, library: Path) -> float:
+def seconds(scene: str, options: list[str], steps: int, folder: Path) -> float:
     """Processor time of `steps` steps of the fastest FMUs of a scene, initialised as in a run. All
     variables have to be reals of FMI 2.0 at fixed rates."""
-    if not library.exists():
-        compile_library(Path(__file__).parent / BARE, library)
-    run = ctypes.CDLL(str(library)).loop
+    run = bare_loop(folder).loop
     with (
         built(open_scene.load(scene, options)) as system,
         temporary_folders.room() as room,

@@ -1,77 +1,114 @@
-"""Masters that run a ring of FMUs: seconds that each takes for a number of macro steps.
-
-A ring is a folder with the SSP of a scene, unpacked, of FMUs f0, f1, ... whose outputs y feed the
-inputs u of the next. Start-up is not measured. Only this project's loop records what it computes.
-"""
+"""Masters that run a ring of FMUs. Each is started with a ring and returns a function, the seconds
+that it takes for a number of macro steps. Only this project's loop records what it computes."""
 
 from __future__ import annotations
 
 import ctypes
 import logging
+import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from fmpy import extract, fmi2, read_model_description
-
-from hapticlink.fmus.native import compile_library
 
 STEP = 1 / 512
-BARE = "bare_loop.c"
+SCENE, SSP = "ring.toml", "ring.ssp"
+Steps = Callable[[int], float]
 
 
 class Ring:
-    """ssp: its file. folder: that file unpacked. n: FMUs in it."""
+    """folder: with the SSP of a ring: f0, f1, ..., each of which takes the outputs y of the one
+    before as its inputs u."""
 
-    def __init__(self, ssp: Path, folder: Path, n: int) -> None:
-        self.ssp, self.folder, self.n = ssp, folder, n
-        self.fmus = [folder / "resources" / f"f{i}.fmu" for i in range(n)]
-        model = read_model_description(str(self.fmus[0]), validate=False)
-        self.inputs, self.outputs = (
-            [v.valueReference for v in model.modelVariables if v.causality == causality]
-            for causality in ("input", "output")
-        )
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.ssp, self.unpacked = folder, folder / SSP, folder / "ssp"
+        self.n = len(list((self.unpacked / "resources").glob("f*.fmu")))
+        self.fmus = [self.unpacked / "resources" / f"f{i}.fmu" for i in range(self.n)]
 
 
-def ecos(ring: Ring, steps: int) -> float:
+def timed(run: Callable[[int], object]) -> Steps:
+    """The seconds that `run` takes."""
+
+    def seconds(steps: int) -> float:
+        begin = perf_counter()
+        run(steps)
+        return perf_counter() - begin
+
+    return seconds
+
+
+def compiled(ring: Ring) -> Steps:
+    """Our loop in C, which records: each call is a run of its own."""
+    return _ours(ring, "compiled")
+
+
+def plain(ring: Ring) -> Steps:
+    """Our loop in Python."""
+    return _ours(ring, "python")
+
+
+def _ours(ring: Ring, choice: str) -> Steps:
+    from benchmarks import rings  # only what a master needs is loaded
+    from hapticlink.orchestrator.experiment import simulate
+    from hapticlink.orchestrator.run.compiled.library import CHOICE
+
+    rings.register()
+    os.environ[CHOICE] = choice
+
+    def seconds(steps: int) -> float:
+        duration = f"duration={steps / 512!r}"
+        ended = simulate(str(ring.folder / SCENE), ring.folder / "out", [duration]).outcome
+        assert ended.fault is None
+        return ended.wall_time
+
+    seconds(1)
+    return seconds
+
+
+def ecos(ring: Ring) -> Steps:
     """Its library asks for TBB's, which pip puts where no loader looks."""
     for library in sorted(Path(sys.prefix, "lib").glob("libtbb.so.12")):
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
     import ecospy
 
-    with ecospy.EcosSimulation(step_size=STEP, ssp_path=str(ring.ssp)) as simulation:
-        simulation.init()
-        begin = perf_counter()
-        simulation.step(steps)
-        return perf_counter() - begin
+    simulation = ecospy.EcosSimulation(step_size=STEP, ssp_path=str(ring.ssp))
+    simulation.init()
+    return timed(simulation.step)
 
 
-def libcosim(ring: Ring, steps: int) -> float:
+def libcosim(ring: Ring) -> Steps:
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 
     log_output_level(CosimLogLevel.WARNING)
-    execution = CosimExecution.from_ssp_file(ssp_path=str(ring.folder))
-    begin = perf_counter()
-    assert execution.step(steps)
-    return perf_counter() - begin
+    execution = CosimExecution.from_ssp_file(ssp_path=str(ring.unpacked))
+
+    def run(steps: int) -> None:
+        assert execution.step(steps)
+
+    return timed(run)
 
 
-@contextmanager
-def _slaves(ring: Ring, folder: Path) -> Iterator[list[Any]]:
-    """The FMUs of a ring, initialised, by FMPy."""
+def _slaves(ring: Ring) -> tuple[list[Any], list[int], list[int]]:
+    """The FMUs of a ring, initialised, by FMPy; the references of an FMU's inputs and outputs."""
+    from fmpy import extract, fmi2, read_model_description
+
+    logging.getLogger("fmpy").setLevel(logging.ERROR)
+    model = read_model_description(str(ring.fmus[0]), validate=False)
+    inputs, outputs = (
+        [v.valueReference for v in model.modelVariables if v.causality == causality]
+        for causality in ("input", "output")
+    )
     made = []
     for i, path in enumerate(ring.fmus):
         model = read_model_description(str(path), validate=False)
-        unzipped = extract(str(path), str(folder / f"fmu{i}"))
         slave = fmi2.FMU2Slave(
             guid=model.guid,
             modelIdentifier=model.coSimulation.modelIdentifier,
-            unzipDirectory=unzipped,
+            unzipDirectory=extract(str(path), str(ring.folder / f"fmu{i}")),
             instanceName=f"f{i}",
         )
         slave.instantiate()
@@ -79,47 +116,81 @@ def _slaves(ring: Ring, folder: Path) -> Iterator[list[Any]]:
         slave.enterInitializationMode()
         slave.exitInitializationMode()
         made.append(slave)
-    yield made
-    for slave in made:
-        slave.terminate()
-        slave.freeInstance()
+    return made, inputs, outputs
 
 
-def fmpy(ring: Ring, steps: int, folder: Path) -> float:
+def fmpy(ring: Ring) -> Steps:
     """A loop in Python over FMPy's calls."""
-    with _slaves(ring, folder) as slaves:
-        n = ring.n
-        begin = perf_counter()
-        y = [slave.getReal(ring.outputs) for slave in slaves]
+    slaves, inputs, outputs = _slaves(ring)
+
+    def run(steps: int) -> None:
+        y = [slave.getReal(outputs) for slave in slaves]
         for k in range(steps):
-            for i in range(n):
-                slaves[(i + 1) % n].setReal(ring.inputs, y[i])
+            for i, values in enumerate(y):
+                slaves[(i + 1) % ring.n].setReal(inputs, values)
             for slave in slaves:
                 slave.doStep(k * STEP, STEP)
-            y = [slave.getReal(ring.outputs) for slave in slaves]
-        return perf_counter() - begin
+            y = [slave.getReal(outputs) for slave in slaves]
+
+    return timed(run)
 
 
-def bare(ring: Ring, steps: int, folder: Path) -> float:
+def _functions(slaves: list[Any]) -> list[tuple[Any, ...]]:
+    """fmi2SetReal, fmi2DoStep and fmi2GetReal of each FMU, and its component."""
+    names = ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")
+    return [(*(slave.dll[name] for name in names), slave.component) for slave in slaves]
+
+
+def calls_by_ctypes(ring: Ring) -> Steps:
+    """A loop in Python over the FMUs' functions, without FMPy's lists and checks: all arguments
+    that do not change are made before."""
+    slaves, inputs, outputs = _slaves(ring)
+    n = ctypes.c_size_t(len(inputs))
+    u, y = ((ctypes.c_uint * len(found))(*found) for found in (inputs, outputs))
+    values = [(ctypes.c_double * len(outputs))() for _ in slaves]
+    calls = [
+        (set_real, do_step, get_real, ctypes.c_void_p(fmu), values[i - 1], values[i])
+        for i, (set_real, do_step, get_real, fmu) in enumerate(_functions(slaves))
+    ]
+    size = ctypes.c_double(STEP)
+
+    def run(steps: int) -> None:
+        for k in range(steps):
+            time = ctypes.c_double(k * STEP)
+            for set_real, _, _, fmu, before, _ in calls:
+                set_real(fmu, u, n, before)
+            for _, do_step, _, fmu, _, _ in calls:
+                do_step(fmu, time, size, 1)
+            for _, _, get_real, fmu, _, own in calls:
+                get_real(fmu, y, n, own)
+
+    return timed(run)
+
+
+def bare(ring: Ring) -> Steps:
     """A loop in C over the FMUs' functions alone: what they cost themselves."""
-    library = folder / "bare.so"
-    if not library.exists():
-        compile_library(Path(__file__).parent / BARE, library)
-    with _slaves(ring, folder) as slaves:
-        fmus = (ctypes.c_void_p * ring.n)(*(slave.component for slave in slaves))
-        names = ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")
-        calls = [ctypes.cast(slaves[0].dll[name], ctypes.c_void_p) for name in names]
-        signals = len(ring.inputs)
-        references = ((ctypes.c_uint * signals)(*found) for found in (ring.inputs, ring.outputs))
-        y = np.zeros(ring.n * signals)
-        arguments = (ctypes.c_size_t(signals), ctypes.c_void_p(y.ctypes.data))
-        run = ctypes.CDLL(str(library)).ring
-        begin = perf_counter()
-        run(
-            ring.n, fmus, *calls, *references, *arguments, ctypes.c_long(steps),
-            ctypes.c_double(STEP),
-        )  # fmt: skip
-        return perf_counter() - begin
+    from benchmarks.peers.bare_loop import bare_loop
+
+    slaves, inputs, outputs = _slaves(ring)
+    calls = [
+        [ctypes.cast(function, ctypes.c_void_p).value for function in found]
+        for found in _functions(slaves)
+    ]
+    of = (ctypes.c_void_p * (4 * ring.n))(*(address for found in calls for address in found))
+    references = [(ctypes.c_uint * len(found))(*found) for found in (inputs, outputs)]
+    signals = len(inputs)
+    y = np.zeros(ring.n * signals)
+    run, size = bare_loop(ring.folder.parent).ring, ctypes.c_double(STEP)
+    arguments = (*references, ctypes.c_size_t(signals), np.ctypeslib.as_ctypes(y))
+    return timed(lambda steps: run(ring.n, of, *arguments, ctypes.c_long(steps), size))
 
 
-logging.getLogger("fmpy").setLevel(logging.ERROR)
+MASTERS: dict[str, Callable[[Ring], Steps]] = {
+    "C loop": bare,
+    "hapticlink": compiled,
+    "Ecos": ecos,
+    "libcosim": libcosim,
+    "ctypes": calls_by_ctypes,
+    "FMPy": fmpy,
+    "hapticlink, loop in Python": plain,
+}

@@ -1,0 +1,46 @@
+"""What a haptic tick of the closed loop costs, beside a loop in C over the same FMUs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from time import thread_time
+
+from benchmarks.peers import bare_scene
+from benchmarks.rows import Rows
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.run import event_loop
+
+SCENE, RATE = "closed-loop", 512
+DURATIONS = (3, 15)
+"""Of two runs (s); their difference leaves out what each run costs once."""
+COLUMNS = ("packaging", "loop", "round", "tick_us")
+
+
+def recorded(scene: str, out: Path, options: list[str]) -> float:
+    """Processor time (s) of our loop."""
+    event_loop.perf_counter, before = thread_time, event_loop.perf_counter
+    try:
+        ended = simulate(scene, out, options).outcome
+    finally:
+        event_loop.perf_counter = before
+    assert ended.fault is None
+    return ended.wall_time
+
+
+def measure(rows: Rows, rounds: int, folder: Path) -> None:
+    """Add the microseconds of processor time per tick, of both loops by turns."""
+    for packaging in ("native", "python"):
+        fixed = [f"packaging={packaging}", "stop_when=''"]
+        loops: Mapping[str, Callable[[int], float]] = {
+            "C loop": lambda s, fixed=fixed: bare_scene.seconds(SCENE, fixed, RATE * s, folder),
+            "hapticlink": lambda s, fixed=fixed: recorded(
+                SCENE, folder / "out", [*fixed, f"duration={s}"]
+            ),
+        }
+        for turn in range(rounds):
+            for name, run in loops.items():
+                if (packaging, name, turn) not in rows:
+                    short, long = (min(run(s) for _ in range(3)) for s in DURATIONS)
+                    ticks = RATE * (DURATIONS[1] - DURATIONS[0])
+                    rows.add(packaging, name, turn, 1e6 * (long - short) / ticks)

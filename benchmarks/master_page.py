@@ -1,0 +1,158 @@
+"""The page of the benchmark `master`, its tables and its figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+from benchmarks.peers.masters import MASTERS
+
+OURS, ALONE, PEERS = "hapticlink", "C loop", ("Ecos", "libcosim", "ctypes", "FMPy")
+TITLES = {
+    "native": "FMUs in C",
+    "python": "Python FMUs of hapticlink",
+    "pythonfmu": "Python FMUs of pythonfmu",
+}
+COLOURS = {
+    OURS: "#1b6ca8", "hapticlink, loop in Python": "#8bb8d8", "Ecos": "#d1495b",
+    "libcosim": "#e0a030", "ctypes": "#5a8f3c", "FMPy": "#8a5fa8", ALONE: "0.5",
+}  # fmt: skip
+Row = Mapping[str, str]
+Case = tuple[str, int, int]
+Best = dict[Case, dict[str, float]]
+
+
+def best(rows: Iterable[Row], column: str) -> Best:
+    """By case and master, the least value of a column; masters that failed are left out."""
+    found: Best = {}
+    for row in rows:
+        case = (row["packaging"], int(row["fmus"]), int(row["signals"]))
+        value, known = float(row[column]), found.setdefault(case, {})
+        if math.isfinite(value):
+            known[row["master"]] = min(value, known.get(row["master"], math.inf))
+    return found
+
+
+def share(times: Best, packaging: str, peer: str) -> str:
+    """How many times as long as ours a peer takes, from least to most; "" if nowhere."""
+    of = [row for case, row in times.items() if case[0] == packaging]
+    found = [row[peer] / row[OURS] for row in of if peer in row and OURS in row]
+    if not found:
+        return ""
+    least, most = (f"{x:.2g}" if x < 10 else f"{x:.0f}" for x in (min(found), max(found)))
+    return f"{peer} {least} to {most}"
+
+
+def finding(times: Best, packaging: str) -> str:
+    return ", ".join(filter(None, (share(times, packaging, peer) for peer in PEERS)))
+
+
+def table(values: Best, packaging: str, digits: str = ".3g") -> list[str]:
+    names = [m for m in MASTERS if any(m in row for row in values.values())]
+    lines = [f"| FMUs | reals of each | {' | '.join(names)} |", "|--:|--:|" + "--:|" * len(names)]
+    for (of, n, k), row in sorted(values.items()):
+        if of == packaging:
+            cells = (format(row[m], digits) if m in row else "-" for m in names)
+            lines.append(f"| {n} | {k} | {' | '.join(cells)} |")
+    return lines
+
+
+def write(
+    folder: Path, rows: Sequence[Row], whole: Sequence[Row], command: str, machine: str
+) -> None:
+    """Write README.md and masters.png."""
+    times, starts, memory = (best(rows, c) for c in ("step_us", "start_s", "memory_mb"))
+    kinds = [kind for kind in TITLES if any(case[0] == kind for case in times)]
+    by_kind = "; ".join(f"{TITLES[kind]}: {finding(times, kind)}" for kind in kinds)
+    lines = [
+        "# Masters",
+        "",
+        f"Times as long as the loop of hapticlink takes. {by_kind}.",
+        "",
+        f"![{title(times)}](masters.png)",
+        "",
+        "Rings of FMUs that pass on their inputs, y = u/2 + 1, with Jacobi coupling at one rate.",
+        "hapticlink records every output; the others record nothing. `ctypes` is a loop in Python",
+        "over the FMUs' functions with all arguments made before, `C loop` the same in C: what the",
+        "FMUs cost themselves. Each master runs each ring in processes of its own; the least of",
+        f"its rounds counts, all of which are in [rows.csv](rows.csv). Made by `{command}` on",
+        f"{machine}.",
+    ]
+    for kind in kinds:
+        lines += ["", f"## {TITLES[kind]}", "", "Microseconds per macro step:", ""]
+        lines += table(times, kind)
+        lines += ["", "Start-up in s, imports included, FMUs in the cache:", ""]
+        lines += table(starts, kind, ".2g")
+        lines += ["", "Largest memory of the process in MB:", "", *table(memory, kind, ".0f")]
+    lines += ["", "## The closed loop", "", *closed(whole)]
+    (folder / "README.md").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    figure(folder / "masters.png", times, kinds)
+
+
+def closed(rows: Sequence[Row]) -> list[str]:
+    """What a haptic tick of `closed-loop` costs."""
+    lines = [
+        "Microseconds of processor time per haptic tick of `closed-loop` with holds, energies,",
+        "checks and every output recorded, beside a C loop that only sets, steps and gets its FMUs",
+        "(all rounds in [closed-loop.csv](closed-loop.csv)):",
+        "",
+        "| FMUs | C loop | hapticlink | ratio | times real time |",
+        "|---|--:|--:|--:|--:|",
+    ]
+    for kind in dict.fromkeys(row["packaging"] for row in rows):
+        alone, ours = (
+            min(
+                float(row["tick_us"])
+                for row in rows
+                if (row["packaging"], row["loop"]) == (kind, of)
+            )
+            for of in (ALONE, OURS)
+        )
+        real = 1e6 / 512 / ours
+        lines.append(f"| {kind} | {alone:.3g} | {ours:.3g} | {ours / alone:.2f} | {real:.0f} |")
+    return lines
+
+
+def title(times: Best) -> str:
+    """What the figure shows."""
+    native = [row for case, row in times.items() if case[0] == "native" and OURS in row]
+    least = min(
+        (min(row[p] for p in PEERS if p in row) / row[OURS] for row in native if len(row) > 2),
+        default=math.nan,
+    )
+    return f"With FMUs in C every other master takes at least {least:.1f} times as long"
+
+
+def figure(path: Path, times: Best, kinds: Sequence[str]) -> None:
+    """Time per macro step over the number of FMUs, by master."""
+    panels, axes = plt.subplots(1, len(kinds), figsize=(4.4 * len(kinds), 4.4), squeeze=False)
+    for ax, kind in zip(axes[0], kinds, strict=True):
+        signals = 3 if kind == "native" else 12
+        for name, colour in COLOURS.items():
+            points = sorted(
+                (n, row[name])
+                for (of, n, k), row in times.items()
+                if (of, k) == (kind, signals) and name in row
+            )
+            if points:
+                line, width = "o:" if name == ALONE else "o-", 2.5 if name == OURS else 1.2
+                x, y = zip(*points, strict=True)
+                ax.loglog(x, y, line, ms=3, lw=width, color=colour, label=name)
+        ax.set_title(f"{TITLES[kind]}, {signals} reals each", fontsize=10)
+        ax.set_xlabel("FMUs")
+        ax.set_xticks([2, 4, 16, 64], ["2", "4", "16", "64"])
+        ax.minorticks_off()
+        ax.grid(alpha=0.3)
+    axes[0][0].set_ylabel("time per macro step, us")
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    panels.legend(handles, labels, ncols=len(labels), loc="lower center", frameon=False, fontsize=8)
+    panels.suptitle(title(times))
+    panels.tight_layout(rect=(0, 0.06, 1, 1))
+    panels.savefig(path, dpi=130)
+    plt.close(panels)
