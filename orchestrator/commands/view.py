@@ -5,16 +5,19 @@ from __future__ import annotations
 import os
 import secrets
 import sys
+import time
 import webbrowser
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.say import say
-from hapticlink.orchestrator.commands.options import Out, Scene, Set, Swap, default_folder, options
+from hapticlink.orchestrator.commands.options import Out, Set, Swap, default_folder, options
 from hapticlink.orchestrator.view.link import Link
 
 Host = Annotated[
@@ -23,14 +26,31 @@ Host = Annotated[
 ]
 Port = Annotated[
     int | None,
-    Parameter(help="Port to serve on; by default 8512, or a free one if taken."),
+    Parameter(
+        help="Port to serve on; by default 8512, or a free one if taken.",
+        validator=validators.Number(gte=0, lte=65535),
+    ),
 ]
 Browser = Annotated[bool, Parameter(help="Open the page in the browser.")]
+Second = Annotated[str | None, Parameter(help="Folder of a second run, beside the first.")]
+Export = Annotated[
+    Path | None,
+    Parameter(
+        help="Write the replay to this file: .html, which opens without a network, or an animation "
+        "of the drawing, .gif, .webp or .png."
+    ),
+]
 PORT = 8512
+WAIT = 0.1
+"""Time (s) between two looks for Ctrl-C."""
 
 
 def view(
-    scene: Scene,
+    scene: Annotated[
+        str,
+        Parameter(help="Name of a shipped scene, path of a scene file or SSP, or folder of a run."),
+    ],
+    second: Second = None,
     /,
     *,
     out: Out = None,
@@ -39,9 +59,23 @@ def view(
     host: Host = "127.0.0.1",
     port: Port = None,
     browser: Browser = True,
+    export: Export = None,
 ) -> int:
     """Show a scene that runs in real time on a page, where the mouse is the hand; Ctrl-C ends it.
-    Recordings are written to OUT-1, OUT-2, ... (default runs/SCENE-view)."""
+    Recordings are written to OUT-1, OUT-2, ... (default runs/SCENE-view). With the folder of a
+    run, or of two, replay them instead."""
+    if Path(scene).is_dir() and (second or export or not _is_scene(scene)):
+        if set or swap or out:
+            raise InputFault(
+                f"{scene} is the folder of a run: --set, --swap and --out are of scenes"
+            )
+        return _replayed([scene, *([second] if second else [])], host, port, browser, export)
+    if second or export:
+        what = second or f"--export {export}"
+        raise InputFault(
+            f"{what}: {scene} is no folder of a run; run it first: `hapticlink run {scene}`, then "
+            f"`hapticlink view {default_folder('runs', scene)}`"
+        )
     from hapticlink.orchestrator import api
     from hapticlink.orchestrator.view.scene import viewed
     from hapticlink.orchestrator.view.session import Session
@@ -51,17 +85,70 @@ def view(
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
     with _served(host, port, token) as link:
-        url = f"http://{f'[{host}]' if ':' in host else host}:{link.first['port']}/{token}/"
-        say(f"{read.title}: {url}")
+        _shown(read.title, host, link.first["port"], token, browser)
         say("  the mouse is the hand, in place of the scene's; Ctrl-C ends it")
-        if browser and _has_screen():
-            webbrowser.open(url)
         session = Session(read, link, root)
         with suppress(Interrupted, api.RunInterrupted):
             session.run()
     for folder in session.recordings:
         say(f"  {folder}/")
     return 0
+
+
+def _is_scene(name: str) -> bool:
+    """Whether a folder's name is that of a shipped scene, and the folder has no run."""
+    from hapticlink.orchestrator import api
+
+    return name in api.shipped() and not (Path(name) / "run.json").exists()
+
+
+def _replayed(
+    folders: list[str], host: str, port: int | None, browser: bool, export: Path | None
+) -> int:
+    """Replay recorded runs on a page until Ctrl-C, or write them to a file."""
+    from hapticlink.orchestrator.view import replay, serve
+    from hapticlink.orchestrator.view.recorded import Recorded
+
+    if export:
+        replay.require_written(export)
+    runs = [Recorded(folder) for folder in folders]
+    if export:
+        replay.write(runs, export)
+        say(f"{export}: {export.stat().st_size / 1e3:.0f} kB")
+        return 0
+    html, token = replay.html(runs), secrets.token_urlsafe(16)
+    with ExitStack() as open_pages, suppress(Interrupted):
+        try:
+            at = open_pages.enter_context(
+                serve.served(html, host, PORT if port is None else port, token)
+            )
+        except OSError as error:
+            if port is not None:
+                raise InputFault(_refused(host, port, error)) from None
+            at = open_pages.enter_context(serve.served(html, host, 0, token))
+        _shown(" beside ".join(folders), host, at, token, browser)
+        say("  a replay, with a time slider; Ctrl-C ends it")
+        while True:
+            interrupt.check()
+            time.sleep(WAIT)
+    return 0
+
+
+def _shown(title: str, host: str, port: int, token: str, browser: bool) -> None:
+    """Say the page's address, and open it in a browser where there is a screen."""
+    url = f"http://{f'[{host}]' if ':' in host else host}:{port}/{token}/"
+    say(f"{title}: {url}")
+    sys.stdout.flush()
+    if browser and _has_screen():
+        webbrowser.open(url)
+
+
+def _refused(host: str, port: int | None, why: object) -> str:
+    return (
+        f"--host {host}"
+        + (f" --port {port}" if port is not None else "")
+        + f": {why}: take another"
+    )
 
 
 def _has_screen() -> bool:
@@ -82,6 +169,5 @@ def _served(host: str, port: int | None, token: str) -> Link:
     if made.first is None:
         raise Fault("the page's server does not start")
     if "error" in made.first:
-        at = f"--host {host}" + (f" --port {port}" if port is not None else "")
-        raise InputFault(f"{at}: {made.first['error']}: take another")
+        raise InputFault(_refused(host, port, made.first["error"]))
     return made

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pydantic import TypeAdapter
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.contact.depth import depths, middle, overlaps
@@ -15,6 +14,7 @@ from hapticlink.components.specs.linkage import Linkage, Mechanism
 from hapticlink.orchestrator.results.figure_axes import short
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.results.tracking import of_block
+from hapticlink.orchestrator.results.whole_run import scene_part
 
 GAP, COORDINATES = "virtual_mechanism.contact_gap", "virtual_mechanism.q"
 ROWS = 500
@@ -28,11 +28,11 @@ def lines(results: Results) -> Iterator[str]:
     table = of_block(results, GAP)
     if table is None or not len(table["time"]) or not scene["linkage"] or not scene["contacts"]:
         return
-    linkage = TypeAdapter(Linkage).validate_python(scene["linkage"])
-    contacts = TypeAdapter(Contacts).validate_python(scene["contacts"])
+    linkage = scene_part(results, "linkage", Linkage)
+    contacts = scene_part(results, "contacts", Contacts)
     if COORDINATES in table:  # both are recorded
         yield from _deep(linkage, contacts, table)
-    mechanism = TypeAdapter(Mechanism).validate_python(scene["mechanism"])
+    mechanism = scene_part(results, "mechanism", Mechanism)
     if mechanism.integrator != "passive-midpoint" and len(table["time"]) > 1:
         rate = results.run["fmus"][GAP.partition(".")[0]]["rate"]
         step_s = results.run["clocks"][rate]["longest"] / mechanism.substeps

@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import TypeAdapter
 
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
@@ -19,6 +18,7 @@ from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.results import figure_axes, mechanism_drawing
+from hapticlink.orchestrator.results.episodes import KINDS, episodes
 from hapticlink.orchestrator.results.figure_axes import framed, last_time, short, titled
 from hapticlink.orchestrator.results.force_figure import forces
 from hapticlink.orchestrator.results.real_time_figure import real_time
@@ -31,8 +31,10 @@ from hapticlink.orchestrator.results.tracking import (
     tracking,
 )
 from hapticlink.orchestrator.results.user_port import UserPort, user_port
+from hapticlink.orchestrator.results.whole_run import scene_part
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 CONTACT, COORDINATES = "virtual_mechanism.F_env", "virtual_mechanism.q"
@@ -43,7 +45,9 @@ def figures(results: Results) -> dict[str, Figure]:
     drawn: dict[str, Figure] = {}
     if not last_time(results):
         return drawn
-    linkage = _part(results, "linkage", Linkage)  # an SSP has the block, but not its description
+    linkage = scene_part(
+        results, "linkage", Linkage
+    )  # an SSP has the block, but not its description
     size = len(coordinate_units(linkage)) if linkage else 0
     if linkage and (coordinates := of_block(results, COORDINATES, size)):
         drawn["mechanism"] = _mechanism(results, linkage, coordinates)
@@ -51,7 +55,7 @@ def figures(results: Results) -> dict[str, Figure]:
         drawn["trajectories"] = _trajectories(results)
         if of_block(results, DEVICE, 3):
             drawn["distance"] = _distance(results)
-    if found := forces(results, _part(results, "device", Device)):
+    if found := forces(results, scene_part(results, "device", Device)):
         drawn["forces"] = found
     if contact := of_block(results, CONTACT, 3):
         drawn["contact"] = _contact(results, contact)
@@ -76,22 +80,38 @@ def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
     return [f"{name}.png" for name in figures]
 
 
-def _part(results: Results, name: str, kind: Any) -> Any:
-    """A table of the scene as its record, None where the scene has none."""
-    return TypeAdapter(kind | None).validate_python(results.run["scene"][name])
-
-
 def _mechanism(results: Results, linkage: Linkage, table: Table) -> Figure:
     q = table[COORDINATES]
     title = f"{results.run['scene']['title']} at the start and at {short(last_time(results))} s"
     figure, axes = titled(results, title, "x (mm)", "y (mm)")
-    device, contacts = _part(results, "device", Device), _part(results, "contacts", Contacts)
+    device, contacts = (
+        scene_part(results, "device", Device),
+        scene_part(results, "contacts", Contacts),
+    )
     for label, style, path in _paths(results):
         axes.plot(*path.T, style, color=mechanism_drawing.RED, lw=0.8, label=f"path of {label}")
+    _mark(results, axes)
     mechanism_drawing.draw(axes, linkage, q[0], q[-1], device, contacts)
     figure.set_size_inches(7.4, 6.4)
     figure_axes.legend_below(figure)
     return figure
+
+
+def _mark(results: Results, axes: Axes) -> None:
+    """The episodes of a run, along the path of the operational point."""
+    if (table := of_block(results, MECHANISM, 3)) is None:
+        return
+    time, path = table["time"], table[MECHANISM][:, :2] * 1e3
+    marked = [*episodes(results)]
+    for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
+        color, label = KINDS[kind]
+        spans = [(e.begin - 1e-12, e.end + 1e-12) for e in marked if e.kind == kind]
+        parts = [path[slice(*np.searchsorted(time, span))] for span in spans]
+        broken = np.vstack([rows for part in parts for rows in (part, [[np.nan, np.nan]])])
+        axes.plot(
+            *broken.T, color=color, label=label, lw=2 * width, alpha=0.5,
+            solid_capstyle="butt", zorder=2.5 - 0.01 * width,
+        )  # fmt: skip
 
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
@@ -124,7 +144,7 @@ def _trajectories(results: Results) -> Figure:
     for label, style, path in paths:
         axes.plot(*path.T, style, label=label)
     axes.plot(*np.array([path[0] for _, _, path in paths]).T, "k.", label="start")
-    if contacts := _part(results, "contacts", Contacts):
+    if contacts := scene_part(results, "contacts", Contacts):
         mechanism_drawing.obstacles(axes, contacts)
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(fontsize="small")

@@ -13,9 +13,9 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.files import write_json
 
 
-def ensure(folder: Path | str) -> Path:
+def ensure(folder: Path | str, option: str = "--out") -> Path:
     """The folder, created if it does not exist. Raises InputFault if it cannot be created or
-    written to."""
+    written to; `option` is what has named it."""
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -27,7 +27,7 @@ def ensure(folder: Path | str) -> Path:
         if os.access(folder, os.W_OK | os.X_OK):
             return folder
         why = "may not be written to"
-    raise InputFault(f"--out {folder}: {why}; name a folder that can be written to")
+    raise InputFault(f"{option} {folder}: {why}; name a folder that can be written to")
 
 
 def add(

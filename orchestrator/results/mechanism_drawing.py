@@ -61,6 +61,16 @@ def draw(
     axes.set_aspect("equal", adjustable="box")
 
 
+def pose(axes: Axes, linkage: Linkage, at: dict[str, Pose]) -> None:
+    """Bodies, joints, springs and points that hands hold, in mm, without names, for poses (1, 3)
+    of the bodies by name."""
+    drawing = _Drawing(axes, linkage, at, names=False)
+    drawing.bodies()
+    drawing.joints()
+    drawing.springs()
+    drawing.points()
+
+
 def _limits(axes: Axes) -> Pose:
     """Limits of x and y (mm) that contain what is drawn with a margin for names, (2, 2), in a ratio
     between 3/4 and 4/3; 100 mm about a single point."""
@@ -89,10 +99,12 @@ def figure(scene: Scene, q: Sequence[float]) -> Figure:
 class _Drawing:
     """One pose of a linkage."""
 
-    def __init__(self, axes: Axes, linkage: Linkage, at: dict[str, Pose]) -> None:
+    def __init__(
+        self, axes: Axes, linkage: Linkage, at: dict[str, Pose], names: bool = True
+    ) -> None:
         self.axes, self.linkage = axes, linkage
         self._at = {name: found[0] for name, found in at.items()}
-        self._names = len(linkage.body) <= NAMED
+        self._names = names and len(linkage.body) <= NAMED
 
     def _world(self, body: str, point: Sequence[float] | None) -> Pose:
         """The place (mm) of a point of a body."""

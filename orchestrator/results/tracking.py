@@ -32,7 +32,7 @@ def of_block(results: Results, signal: str, *shape: int) -> Table | None:
     of that shape; None for an FMU of others that only has the same name, of whose ports nothing is
     known."""
     name, table = signal.partition(".")[0], table_of(results, signal)
-    if table is None or results.run["fmus"][name].get("block", name) != name:
+    if table is None or results.run["fmus"].get(name, {}).get("block", name) != name:
         return None
     return table if table[signal].shape[1:] == shape else None
 

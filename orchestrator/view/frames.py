@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hapticlink.orchestrator.api.real_time import RealTime
+from hapticlink.orchestrator.results.episodes import FELT
 from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
 from hapticlink.orchestrator.run.energy.meter import Energy
 
@@ -31,8 +32,6 @@ SHOWN = {
 PORT = "user's port"
 SELDOM = 5
 """Turns between two readings of energies and deadlines, which take longer."""
-FELT = 1e-3
-"""Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
 WINDOW = 1.0
 """Time (s) over which the light judges the energy."""
 

@@ -32,10 +32,17 @@ class Picture:
                 found = np.asarray(self._poses(q)).T.tolist()
                 shown[key] = dict(zip(self._names, found, strict=True))
         if self._arms:
-            shown["arms"] = _finite(np.asarray(self._arms(ca.DM(frame["handle"]))).T.tolist())
+            shown["arms"] = self.arms(frame["handle"])
         if "P_c" in frame:
             shown["directions"] = directions(frame["P_c"])
         return shown
+
+    def arms(self, handle: list[float]) -> list[list[float] | None]:
+        """Base joint, elbow and crank end of each arm of the device at a pose of the handle; none
+        without a device."""
+        if not self._arms or not handle:
+            return []
+        return _finite(np.asarray(self._arms(ca.DM(handle))).T.tolist())
 
 
 def directions(P_c: list[float]) -> list[list[float]]:

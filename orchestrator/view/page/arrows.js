@@ -21,12 +21,14 @@ export class Arrows {
       if (key === "lambda") {
         size = 0;
         shapes.loops.forEach((loop, i) => {
-          if (loop.type !== "revolute") return; // whose multipliers are not along x and y
-          const force = values.slice(shapes.rows[i], shapes.rows[i] + 2);
+          const first = shapes.rows[i], across = loop.type !== "revolute" && frame.poses[loop.second[0]][2] + loop.axis;
+          // That of a slot or a prismatic joint is along its normal; a moment has no arrow.
+          const force = across === false ? values.slice(first, first + 2)
+            : [-values[first] * Math.sin(across), values[first] * Math.cos(across)];
           size = Math.max(size, Math.hypot(...force));
           arrow(context, at(...loop.at), force, color);
         });
-      } else arrow(context, toScreen(key === "F_env" ? frame.x : frame.handle), values, color);
+      } else arrow(context, toScreen(key === "F_env" ? frame.x : frame.handle ?? frame.x), values, color);
       this.values[key].textContent = text(size, "N");
     }
   }

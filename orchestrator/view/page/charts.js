@@ -1,7 +1,7 @@
-// Strip charts of the last 10 s.
+// Strip charts: of the last 10 s of a run that goes on, or of whole runs that are recorded.
 import { fitted, text } from "./canvas.js";
 
-const SPAN = 10, COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee"];
+const SPAN = 10, LEFT = 44, COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee"];
 const size = (v) => v && Math.hypot(v[0], v[1]);
 const CHARTS = [
   { title: "tracking error", unit: "mm", series: { error: (f) => f.arms && 1e3 * Math.hypot(f.x[0] - f.handle[0], f.x[1] - f.handle[1]) } },
@@ -18,13 +18,22 @@ export class Charts {
     this.charts = [];
   }
 
-  begin(energies) {
-    this.charts = CHARTS.map((chart) => new Chart(chart, energies));
+  begin(energies, runs = 1) {
+    this.charts = CHARTS.map((chart) => new Chart(chart, energies, runs));
     this.host.replaceChildren(...this.charts.map((chart) => chart.figure));
   }
 
-  add(frame) { for (const chart of this.charts) chart.add(frame); }
-  draw() { for (const chart of this.charts) chart.draw(); }
+  // Of a run, the frames of the newest `kept` seconds are kept.
+  add(frame, run = 0, kept = SPAN) { for (const chart of this.charts) chart.add(frame, run, kept); }
+
+  // Over `span` (s), with a cursor `at` a time; by default over what is kept.
+  draw(span, at) { for (const chart of this.charts) chart.draw(span, at); }
+
+  // The time (s) at a pointer on a chart that is drawn over `span`, null beside them.
+  time({ target, offsetX }, [from, to]) {
+    if (!(target instanceof HTMLCanvasElement)) return null;
+    return from + ((to - from) * (offsetX - LEFT)) / (target.clientWidth - LEFT - 2);
+  }
 }
 
 // The user's port, or what is held by a connection, and where.
@@ -36,15 +45,14 @@ function named(connection) {
 }
 
 class Chart {
-  constructor({ title, unit, series, energies, colors = COLORS }, connections) {
+  constructor({ title, unit, series, energies, colors = COLORS }, connections, runs) {
     this.unit = unit;
     this.colors = colors;
     this.names = energies ? connections.map(named) : Object.keys(series);
     this.read = energies
       ? connections.map((name) => (f) => f.energy && 1e3 * f.energy[name])
       : Object.values(series);
-    this.times = [];
-    this.rows = [];
+    this.runs = Array.from({ length: runs }, () => ({ times: [], rows: [] }));
     this.figure = document.createElement("figure");
     this.figure.hidden = true;
     this.figure.dataset.chart = title;
@@ -55,63 +63,75 @@ class Chart {
     this.figure.append(caption, this.canvas);
   }
 
-  add(frame) {
-    const row = this.read.map((read) => read(frame) ?? null);
+  add(frame, run, kept) {
+    const row = this.read.map((read) => read(frame) ?? null), { times, rows } = this.runs[run];
     if (row.every((v) => v === null)) return;
     this.figure.hidden = false;
-    if (this.times.at(-1) >= frame.t) return;
-    this.times.push(frame.t);
-    this.rows.push(row);
-    const old = this.times.findIndex((t) => t > frame.t - SPAN);
-    if (old > 50) { this.times.splice(0, old); this.rows.splice(0, old); }
+    if (times.at(-1) >= frame.t) return;
+    times.push(frame.t);
+    rows.push(row);
+    const old = times.findIndex((t) => t > frame.t - kept);
+    if (old > 50) { times.splice(0, old); rows.splice(0, old); }
   }
 
-  draw() {
-    if (this.figure.hidden || !this.times.length) return;
-    const { context, width, height } = fitted(this.canvas), end = this.times.at(-1);
-    const shown = this.names.map((_, i) => this.rows.some((row) => row[i] !== null));
-    const all = this.rows.flat().filter((v) => v !== null);
-    const low = Math.min(0, ...all), high = Math.max(low + (this.unit === "count" ? 1 : 1e-18), ...all);
-    const top = low + nice(high - low), left = 44, base = height - 4;
-    const x = (t) => left + ((width - left - 2) * (t - end + SPAN)) / SPAN;
+  draw(span, at) {
+    if (this.figure.hidden) return;
+    const newest = Math.max(...this.runs.map(({ times }) => times.at(-1) ?? 0));
+    const [from, to] = span ?? [newest - SPAN, newest];
+    const { context, width, height } = fitted(this.canvas);
+    const all = this.runs.flatMap(({ rows }) => rows.flat()).filter((v) => v !== null);
+    const low = all.reduce((a, b) => Math.min(a, b), 0);
+    const high = all.reduce((a, b) => Math.max(a, b), low + (this.unit === "count" ? 1 : 1e-18));
+    const top = low + nice(high - low), base = height - 4;
+    const x = (t) => LEFT + ((width - LEFT - 2) * (t - from)) / (to - from);
     const y = (v) => base - ((base - 12) * (v - low)) / (top - low);
     context.font = "11px system-ui, sans-serif";
     context.textBaseline = "middle";
     context.textAlign = "right";
     context.lineWidth = 1;
     for (const v of [low, (low + top) / 2, top]) {
-      context.strokeStyle = "#e4e6ec";
-      context.beginPath();
-      context.moveTo(left, y(v));
-      context.lineTo(width, y(v));
-      context.stroke();
+      line(context, "#e4e6ec", [[LEFT, y(v)], [width, y(v)]]);
       context.fillStyle = "#667";
-      context.fillText(tick(v), left - 4, y(v));
+      context.fillText(tick(v), LEFT - 4, y(v));
     }
-    context.lineWidth = 1.6;
     context.save();
     context.beginPath();
-    context.rect(left, 0, width, height);
+    context.rect(LEFT, 0, width, height);
     context.clip();
-    this.names.forEach((_, i) => {
-      context.strokeStyle = this.colors[i % this.colors.length];
-      context.beginPath();
-      this.times.forEach((t, k) => { if (this.rows[k][i] !== null) context.lineTo(x(t), y(this.rows[k][i])); });
-      context.stroke();
+    this.runs.forEach(({ times, rows }, run) => {
+      context.lineWidth = run ? 1.2 : 1.6;
+      context.setLineDash(run ? [4, 3] : []);
+      this.names.forEach((_, i) => line(context, this.colors[i % this.colors.length],
+        times.flatMap((t, k) => (rows[k][i] === null ? [] : [[x(t), y(rows[k][i])]]))));
     });
+    context.setLineDash([]);
+    if (at !== undefined) line(context, "#222", [[x(at), 0], [x(at), height]]);
     context.restore();
-    this.label(shown, this.rows.at(-1));
+    this.label(at);
   }
 
-  // The newest values in the caption, with their names where there are several.
-  label(shown, last) {
+  // The values in the caption, at a time or the newest, with their names where there are several.
+  label(at) {
+    const shown = this.names.map((_, i) => this.runs.some(({ rows }) => rows.some((row) => row[i] !== null)));
     const several = shown.filter(Boolean).length > 1;
     this.values.forEach((value, i) => {
       value.hidden = !shown[i];
       value.style.color = several ? this.colors[i % this.colors.length] : "";
-      value.textContent = (several ? `${this.names[i]} ` : "") + text(last[i] ?? 0, this.unit);
+      const found = this.runs.map(({ times, rows }) => {
+        const after = at === undefined ? -1 : times.findIndex((t) => t > at + 1e-9);
+        return (after < 0 ? rows.at(-1) : rows[Math.max(after - 1, 0)])?.[i] ?? null;
+      });
+      const said = found.map((v) => (v === null ? "-" : text(v, this.unit))).join(" | ");
+      value.textContent = (several ? `${this.names[i]} ` : "") + (this.runs.length > 1 ? said : text(found[0] ?? 0, this.unit));
     });
   }
+}
+
+function line(context, color, points) {
+  context.strokeStyle = color;
+  context.beginPath();
+  for (const point of points) context.lineTo(...point);
+  context.stroke();
 }
 
 // A number at an axis, in two digits.

@@ -26,12 +26,12 @@ export function drawBody(context, body, at) {
   }
 }
 
-export function drawGhost(context, body, at) {
+export function drawGhost(context, body, at, color, dashes = [5, 4]) {
   const points = body.outline.length > 1 || !body.shape.length ? body.outline : body.shape;
   context.save();
-  context.strokeStyle = "#333a";
-  context.lineWidth = 1.3;
-  context.setLineDash([5, 4]);
+  context.strokeStyle = color;
+  context.lineWidth = dashes.length ? 1.3 : 2;
+  context.setLineDash(dashes);
   path(context, points.map((p) => at(body.name, p)), points.length > 2);
   context.stroke();
   context.restore();

@@ -1,0 +1,80 @@
+"""What happened when in a run: spans of time that drawings, pages and reports mark.
+
+Each is found in the samples as they are recorded, and lasts until the first sample without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator.results.force_figure import torques
+from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.tracking import BRANCH, constrained, of_block
+from hapticlink.orchestrator.results.user_port import user_port
+from hapticlink.orchestrator.results.whole_run import scene_part
+
+MARGIN, CONTACT = "haptic_device.workspace_margin", "virtual_mechanism.F_env"
+FELT = 1e-3
+"""Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
+KINDS = {
+    "folded": ("#cc3311", "graphics copy folded"),
+    "saturated": ("#ee7733", "motors at their limit"),
+    "energy": ("#ddaa00", "energy generated at the user's port"),
+    "constraints": ("#aa3377", "other number of constrained directions"),
+    "contacts": ("#4477aa", "contacts"),
+    "outside": ("#777777", "outside the device's workspace"),
+}
+"""Colour and meaning of each kind of episode."""
+
+
+class Episode(NamedTuple):
+    """A span of time (s) of a kind, and what is said of it."""
+
+    kind: str
+    begin: float
+    end: float
+    said: str
+
+
+def episodes(results: Results) -> list[Episode]:
+    """The episodes of a run, by kind and then by time. Signals that are not recorded have none."""
+    found = []
+    for kind, times, holds, said in _states(results):
+        meaning = said or KINDS[kind][1]
+        found += [Episode(kind, a, b, meaning) for a, b in spans(times, holds)]
+    return found
+
+
+def spans(times: Vector, holds: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """Begin and end (s) of each stretch of samples at which `holds` is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
+    last = len(times) - 1
+    return [(float(times[a]), float(times[min(b, last)])) for a, b in edges.reshape(-1, 2)]
+
+
+def _states(results: Results) -> Iterator[tuple[str, Vector, NDArray[np.bool_], str]]:
+    """Kind, times (s) of samples, whether each has it, and what is said where it varies."""
+    if branch := of_block(results, BRANCH):
+        yield "folded", branch["time"], branch[BRANCH] == 0, ""
+    device = scene_part(results, "device", Device)
+    if device and (driven := torques(results, device)):
+        most = np.abs(driven[1]).max(axis=1)
+        yield "saturated", driven[0], most >= device.torque_limit * (1 - 1e-6), ""
+    if port := user_port(results):
+        yield "energy", port.time_s, port.generated_J > FELT, ""
+    if counted := constrained(results):
+        table, name = counted
+        values, counts = np.unique(table[name], return_counts=True)
+        usual = values[counts.argmax()] if len(values) else 0
+        for value in values[values != usual]:
+            said = f"{value:.0f} constrained directions, not {usual:.0f}"
+            yield "constraints", table["time"], table[name] == value, said
+    if contact := of_block(results, CONTACT, 3):
+        yield "contacts", contact["time"], (contact[CONTACT] != 0).any(axis=1), ""
+    if margin := of_block(results, MARGIN):
+        yield "outside", margin["time"], margin[MARGIN] < 0, ""

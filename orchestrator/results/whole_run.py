@@ -1,0 +1,55 @@
+"""What run.json says of a run, checked before pages and comparisons are made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.tables import Results, load
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What run.json has of every run, also of one that goes on or was killed."""
+
+    scene: dict[str, Any]
+    rates: list[str]
+    fmus: dict[str, dict[str, Any]]
+    clocks: dict[str, dict[str, float]]
+    versions: dict[str, str]
+    options: list[str]
+    holds: dict[str, str]
+    end: dict[str, Any]
+
+
+def load_whole(folder: Path | str) -> Results:
+    """Reads a run's folder. Raises InputFault if it contains no run, or one whose run.json is of
+    another version, or was changed."""
+    results = load(folder)
+    try:
+        TypeAdapter(_Told).validate_python(results.run)
+    except ValidationError as error:
+        raise InputFault(f"{folder}/run.json: {_first(error)}: run the scene again") from error
+    return results
+
+
+def scene_part(results: Results, name: str, kind: Any) -> Any:
+    """The table `name` of a run's scene as a record of `kind`, None where the scene has none.
+    Raises InputFault where it is not as this version writes it."""
+    try:
+        return TypeAdapter(kind | None).validate_python(results.run["scene"][name])
+    except KeyError:
+        why = "is missing"
+    except ValidationError as error:
+        why = _first(error)
+    raise InputFault(f"{results.folder}/run.json: scene.{name} {why}: run the scene again")
+
+
+def _first(error: ValidationError) -> str:
+    """The first finding, in a line."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    return f"{'.'.join(map(str, first['loc'])) or 'its content'}: {first['msg'].lower()}"

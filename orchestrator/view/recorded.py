@@ -1,0 +1,152 @@
+"""What a page shows of a recorded run: the frames of the live page, from the tables of its folder.
+
+The frames are at the samples of the fastest table that has one of their signals; a slower signal
+has its newest sample there, as the other blocks had it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.components.linkage.parameters import coordinate_units
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import summary
+from hapticlink.orchestrator.results.episodes import episodes
+from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.tracking import of_block, table_of
+from hapticlink.orchestrator.results.user_port import user_port
+from hapticlink.orchestrator.results.whole_run import load_whole, scene_part
+from hapticlink.orchestrator.view.frames import PORT, SHOWN
+from hapticlink.orchestrator.view.picture import Picture
+
+NEEDED = ("virtual_mechanism.q", "virtual_mechanism.x")
+MOST = 4000
+"""Frames of a run; of longer ones every second, third, ... sample is shown."""
+DIGITS = 6
+"""Significant digits of the numbers of a frame."""
+
+
+class Recorded:
+    """A run of a linkage as frames: `times` (s), `frames`, `every` (samples to a frame), and
+    `missing`, the signals that the drawing would show and that are not recorded.
+
+    Raises InputFault for a folder without a run of a linkage, or without its poses."""
+
+    def __init__(self, folder: str) -> None:
+        self.results = results = load_whole(folder)
+        self.folder = folder
+        linkage: Linkage | None = scene_part(results, "linkage", Linkage)
+        if linkage is None:
+            raise InputFault(f"{folder}: the run has no [linkage]: there is nothing to draw")
+        self.linkage = linkage
+        self.device: Device | None = scene_part(results, "device", Device)
+        self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)
+        for signal, size in zip(NEEDED, (len(coordinate_units(linkage)), 3), strict=True):
+            table = of_block(results, signal, size)
+            if table is None:
+                said = "is not recorded: run the scene with record.signals = 'all'"
+                raise InputFault(f"{folder}: {signal} {said}")
+            if not len(table["time"]):
+                raise InputFault(f"{folder}: the run ended before its first row")
+        self.signals, self.missing = _shown(results)
+        tables = [t for s in self.signals.values() if (t := table_of(results, s))]
+        times = max((t["time"] for t in tables), key=len)
+        self.every = -(-len(times) // MOST)
+        self.times: Vector = times[:: self.every]
+        device = self.device if "handle" in self.signals else None
+        self.picture = Picture(linkage, device, self.contacts)
+
+    @property
+    def period(self) -> float:
+        """The time (s) between two frames, the median."""
+        return float(np.median(np.diff(self.times))) if len(self.times) > 1 else 1.0
+
+    def values(self) -> dict[str, NDArray[np.float64]]:
+        """By name in a frame, the newest sample at each frame's time, (k, n)."""
+        found = {}
+        for key, signal in self.signals.items():
+            table = table_of(self.results, signal)
+            assert table
+            if len(table["time"]):
+                rows = newest(table, self.times)
+                found[key] = table[signal][rows].reshape(len(rows), -1)
+        return found
+
+    def frames(self) -> list[dict[str, Any]]:
+        """The frames as the live page gets them, without their time."""
+        values = self.values()
+        port = user_port(self.results)
+        energy = np.interp(self.times, port.time_s, port.generated_J) if port else None
+        made = []
+        for i in range(len(self.times)):
+            frame = self.picture.drawn({key: found[i].tolist() for key, found in values.items()})
+            made.append(frame | ({} if energy is None else {"energy": {PORT: float(energy[i])}}))
+        return made
+
+    def told(self) -> dict[str, Any]:
+        """All that the page needs, as JSON: the frames by name, each value with the frame from
+        which on it stands."""
+        frames = self.frames()
+        keys = dict.fromkeys(key for frame in frames for key in frame)
+        run = self.results.run
+        return {
+            "title": run["scene"]["title"],
+            "ending": summary.ending(self.results),
+            "shapes": self.picture.shapes,
+            "times": [_rounded(float(t)) for t in self.times],
+            "every": self.every,
+            "missing": self.missing,
+            "energies": [PORT],
+            "frames": {key: _changes([frame.get(key) for frame in frames]) for key in keys},
+            "episodes": [e._asdict() for e in episodes(self.results)],
+        }
+
+
+def newest(table: Table, times: Vector) -> NDArray[np.intp]:
+    """The newest row at each of the times (s)."""
+    return np.maximum(np.searchsorted(table["time"], times + 1e-12, "right") - 1, 0)
+
+
+def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
+    """The recorded signal of each name of a frame, and those that are not recorded although the
+    scene has them. A signal that stands in for another one does so only where there is no other."""
+    left_out = results.run.get("not_recorded", ())
+    found, missing = dict[str, str](), list[str]()
+    for key, names in SHOWN.items():
+        for name in names:
+            block = name.partition(".")[0]
+            if name in left_out:
+                missing.append(name)
+                break
+            if (
+                table_of(results, name)
+                and results.run["fmus"].get(block, {}).get("block", block) == block
+            ):
+                found[key] = name
+                break
+    return found, missing
+
+
+def _changes(values: Sequence[Any]) -> dict[str, list[Any]]:
+    """The values that differ from the one before, and at which places they are."""
+    at, kept = [0], [_rounded(values[0])]
+    for i, value in enumerate(values):
+        if value != values[at[-1]]:
+            at.append(i)
+            kept.append(_rounded(value))
+    return {"at": at, "is": kept}
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}")
+    if isinstance(value, dict):
+        return {k: _rounded(v) for k, v in value.items()}
+    return [_rounded(v) for v in value] if isinstance(value, list | tuple) else value
