@@ -39,6 +39,7 @@ def _virtual_mechanism(
     length_scale: float | None = None,
     local_model: bool = False,
     felt: bool = False,
+    users: tuple[str, ...] = (),
 ) -> Component:
     from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 
@@ -50,6 +51,7 @@ def _virtual_mechanism(
         length_scale=length_scale,
         frame_s=FRAME if local_model else None,
         felt=felt,
+        users=users,
     )
 
 
@@ -60,11 +62,18 @@ def _virtual_environment(
     contacts: Contacts | None = None,
     mobility: bool = True,
     local_model: bool = False,
+    users: tuple[str, ...] = (),
 ) -> Component:
     from hapticlink.components.blocks.virtual_environment import virtual_environment
 
     return virtual_environment(
-        linkage, graphics, directions, contacts, mobility=mobility, local_model=local_model
+        linkage,
+        graphics,
+        directions,
+        contacts,
+        mobility=mobility,
+        local_model=local_model,
+        users=users,
     )
 
 

@@ -15,10 +15,9 @@ import numpy as np
 
 from hapticlink.components.component import POSE, TWIST, Block, Component, Variable
 from hapticlink.components.contact import contact_forces
-from hapticlink.components.dynamics import follow_mechanism
+from hapticlink.components.dynamics import follow_mechanism, further_points
 from hapticlink.components.dynamics import local_model as held_matrices
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
-from hapticlink.components.dynamics.constrained_directions import constrained_directions
 from hapticlink.components.dynamics.massless_bodies import require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import (
@@ -45,16 +44,19 @@ def virtual_environment(
     *,
     mobility: bool = True,
     local_model: bool = False,
+    users: further_points.Users = (),
 ) -> Component:
     """The FMU `virtual_environment` with the outputs that are requested: `mobility` Lambda_inv,
     `directions` P_c and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h
-    (B.15).
+    (B.15). Mobility and directions are those of the operational point and of the further points of
+    `users`.
 
     Raises AssemblyError where a loop does not close, MasslessError where a massless body is free.
     """
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     units = coordinate_units(linkage)
+    counts = further_points.counts(users) if directions else []
     block = Block(
         inputs=follow_mechanism.inputs(linkage, copy),
         parameters=[
@@ -64,11 +66,13 @@ def virtual_environment(
             *(_direction_parameters(linkage, directions) if directions else []),
             *(contact_forces.detection_parameters(linkage, contacts) if contacts else []),
         ],
-        states=[*states(linkage), *([Variable("n_constrained")] if directions else [])],
+        states=[*states(linkage), *(Variable(name) for name in counts)],
         outputs=[
             *_outputs(linkage, units),
             *([mobility_output()] if mobility else []),
             *(direction_outputs() if directions else []),
+            *(further_points.mobility_output(name) for name in users if mobility),
+            *(further_points.direction_outputs(users) if directions else []),
             *_branch_outputs(linkage),
             *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
             *(held_matrices.ports(linkage) if local_model else []),
@@ -82,10 +86,11 @@ def virtual_environment(
     space = OperationalSpace(model)
     if mobility:
         output["Lambda_inv"] = space.Lambda_inv
+        output |= further_points.mobilities(space, users)
     if directions:
-        found = constrained_directions(block, space, q0, q1)
-        initial["n_constrained"], step["n_constrained"] = found.first, found.after
-        output |= found.output
+        for name, found in further_points.directions(block, space, users, q0, q1).items():
+            initial[name], step[name] = found.first, found.after
+            output |= found.output
     if linkage.closed:
         output |= _branch(block, model)
     if contacts:
@@ -100,7 +105,7 @@ def virtual_environment(
         step=step,
         output=output,
         substeps=1 if copy.sync == "exact" else copy.substeps,
-        memory=["n_constrained"],
+        memory=counts,
         documentation=__doc__ or "",
     )
     require_assembled(component, model)

@@ -40,7 +40,7 @@ from hapticlink.components.dynamics import (
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
 from hapticlink.components.dynamics.closed_loop_solver import Inertia
-from hapticlink.components.dynamics.constrained_directions import constrained_directions
+from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
 from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.passive_midpoint import (
@@ -85,10 +85,12 @@ def virtual_mechanism(
     length_scale: float | None = None,
     frame_s: float | None = None,
     felt: bool = False,
+    users: further_points.Users = (),
 ) -> Component:
     """The FMU `virtual_mechanism`. With `directions` it has its own Lambda_inv and P_c as outputs;
     `felt`, the efforts of others (further hands, motors on joints) are in F_env, as contacts are;
-    with frame_s (s) it is the local model (B.15), with D, W, w and J_h as inputs, held for a frame.
+    `users` are the further points that a device holds (further_points.py); with frame_s (s) it is
+    the local model (B.15), with D, W, w and J_h as inputs, held for a frame.
 
     The parameter `step_size` starts at step_s (s), and `frame_size` at frame_s: defaults depend on
     them (step_defaults.py). length_scale (m) is L where `directions` does not give it. Raises
@@ -100,8 +102,8 @@ def virtual_mechanism(
     require_fitting(mechanism, linkage, held=frame_s is not None)
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
-    felt = felt and bool(further_points.inputs(linkage) + joint_ports.inputs(linkage))
-    parts = _Parts(linkage, mechanism, directions, contacts, frame_s, felt)
+    felt = felt and bool(linkage.point or joint_ports.inputs(linkage))
+    parts = _Parts(linkage, mechanism, directions, contacts, frame_s, felt, users)
     defaults = StepDefaults(linkage, mechanism, contacts, step_s, frame_s)
     block = _block(parts, defaults, length_scale)
     defaults.define(block.p)
@@ -121,7 +123,7 @@ def virtual_mechanism(
     if touching or felt:
         J_h = space.terms.J_h
         acceleration = J_h @ space.response(pushed + (others if felt else 0))[0]
-        output["F_env"] = contact_forces.equivalent_wrench(
+        output["F_env"] = equivalent_wrench(
             space.Lambda_inv, space.open_mobility(J_h), acceleration, block.p["length_scale"]
         )
     qdd, multipliers = space.motion(applied + pushed)
@@ -137,7 +139,10 @@ def virtual_mechanism(
     if linkage.closed:
         output |= {"lambda": multipliers, "closure_error": model.closure_error}
         output |= closure_diagnostics.values(space.solver) if mechanism.diagnostics else {}
-    output |= further_points.values(space, directions is not None) | joint_ports.values(model)
+    output |= further_points.values(
+        space, block, users, applied + pushed, mobility=directions is not None
+    )
+    output |= joint_ports.values(model)
 
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
@@ -153,10 +158,10 @@ def virtual_mechanism(
         after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
     stepped = ca.vertcat(carried(model, q1, qd1, block.h), after[n:])
     if directions:
-        constrained = constrained_directions(block, space, q0, q1)
-        initial["n_constrained"] = constrained.first
-        stepped = ca.vertcat(stepped, constrained.after)
-        output |= {"Lambda_inv": space.Lambda_inv, **constrained.output}
+        output["Lambda_inv"] = space.Lambda_inv
+        for name, found in further_points.directions(block, space, users, q0, q1).items():
+            initial[name], stepped = found.first, ca.vertcat(stepped, found.after)
+            output |= found.output
     if signals:
         now = ca.densify(time_signals.at(signals, block.t))
         output = {name: ca.substitute(value, tabled, now) for name, value in output.items()}
@@ -168,7 +173,7 @@ def virtual_mechanism(
         step=stepped,
         output=output,
         substeps=mechanism.substeps,
-        memory=["n_constrained"],
+        memory=further_points.counts(users),
         state_notes=notes(model),
         documentation=__doc__ or "",
         shared=not frame_s and not touching,
@@ -189,6 +194,7 @@ class _Parts:
     contacts: Contacts | None
     frame_s: float | None
     felt: bool
+    users: further_points.Users
 
     @property
     def passive(self) -> bool:
@@ -217,19 +223,19 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
     parameters = mechanism_parameters(linkage, parts.mechanism, defaults.baumgarte.beta)
     parameters += defaults.parameters
     outputs = motion_outputs(linkage)
-    inputs += further_points.inputs(linkage) + joint_ports.inputs(linkage)
-    outputs += further_points.outputs(linkage, directions is not None)
+    inputs += [*further_points.inputs(linkage, parts.users), *joint_ports.inputs(linkage)]
+    outputs += further_points.outputs(linkage, parts.users, mobility=directions is not None)
     outputs += joint_ports.outputs(linkage)
     if parts.frame_s:
         inputs += local_model.ports(linkage)
     if linkage.closed and parts.mechanism.diagnostics:
         outputs += closure_diagnostics.outputs()
     memory = [*states(linkage), *friction.states(linkage)]
-    if parts.touches or parts.felt or directions:
+    if parts.touches or parts.felt or parts.users or directions:
         length = directions.length_scale if directions else length_scale
         parameters.append(length_parameter(linkage, length))
     if parts.touches or parts.felt:
-        outputs.append(contact_forces.wrench_output())
+        outputs.append(wrench_output())
     if parts.touches:
         parameters += joint_limits.parameters(linkage)
     if contacts:
@@ -242,9 +248,10 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
         memory.append(Variable("stops"))
         outputs.append(stops_output())
     if directions:
-        memory.append(Variable("n_constrained"))
+        memory += [Variable(name) for name in further_points.counts(parts.users)]
         parameters += direction_parameters(directions)
         outputs += [mobility_output(), *direction_outputs()]
+        outputs += further_points.direction_outputs(parts.users)
     return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
 
 
@@ -367,12 +374,10 @@ def _passive_step(
     """As `_step`, by the passive midpoint method."""
     further = [block.x[name] for name in DEFLECTIONS if name in block.x]
     x, u, p, t = ca.vertcat(model.q, model.qd, *further), block.u.vector, block.p.vector, block.t
-    points = [
-        (model.pose(at.body, f"{at.name}.at"), f"{at.name}.F_hand") for at in model.linkage.point
-    ]
-    places = ca.vertcat(model.x_h, *(place for place, _ in points), model.q)
+    points = further_points.pushed(model, block.u)
+    places = ca.vertcat(model.x_h, *(point.x for point in points), model.q)
     drawn = block.u["F_hand"] - block.u["F_drift"]
-    pushes = [drawn, *(block.u[name] for _, name in points), joint_ports.efforts(model, block.u)]
+    pushes = [drawn, *(point.wrench for point in points), joint_ports.efforts(model, block.u)]
     rates = friction.deflection_rates(model)
     weight = gravity.efforts(model)
     soft = forces.efforts(model, weight=False) + (touching.efforts() if touching else 0)

@@ -11,18 +11,13 @@ momentum are conserved.
 With a coefficient of friction mu, F also has the tangential part -k e of dry_friction.py, with the
 rate of the body's surface along the plane, the spring of stiffness k with its deflection z as a
 state, and a limit k d = mu n . F.
-
-F_env (2.18) is the wrench at the operational point that has the same effect there as all contacts,
-and the least norm in the scaled metric S = diag(1, 1, L):
-
-    Lambda^-1 F_env = J D^-1 (I - W' (W D^-1 W')^-1 W D^-1) sum_i J_i' F_i
 """
 
 from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.component import WRENCH, Signals, Variable
+from hapticlink.components.component import Signals, Variable
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.contact.detection import (
     COLUMNS,
@@ -32,16 +27,12 @@ from hapticlink.components.contact.detection import (
     touches,
 )
 from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
-from hapticlink.components.dynamics import constrained_directions
 from hapticlink.components.forces import dry_friction
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
 
 FAR = 1e9  # m
-# Directions with an eigenvalue below this share of the largest one are left out of F_env, and so
-# are those that the loops lock.
-RANK = 1e-6
 
 
 def places(linkage: Linkage, contacts: Contacts) -> int:
@@ -92,11 +83,6 @@ def detection_parameters(
     radii = {b.name: b.radius or 0.0 for b in linkage.body}
     found = shape_parameters(near(linkage, contacts), radii)
     return found + (obstacle_parameters(contacts) if obstacles else [])
-
-
-def wrench_output() -> Variable:
-    text = "wrench of contacts, joint limits and others at the operational point"
-    return Variable("F_env", (3,), WRENCH, description=text)
 
 
 def gap_output() -> Variable:
@@ -216,16 +202,3 @@ class ContactForces(OneSidedForces):
 def _along(touch: Touch) -> ca.SX:
     """The tangent of a contact's plane."""
     return ca.vertcat(-touch.normal[1], touch.normal[0])
-
-
-def equivalent_wrench(
-    Lambda_inv: ca.SX, open_mobility: ca.SX, acceleration: ca.SX, length_scale: ca.SX
-) -> ca.SX:
-    """The wrench F of least scaled norm with Lambda^-1 F = a, F = S (S Lambda^-1 S)^+ S a (3 x 1).
-    open_mobility is J D^-1 J' of the linkage with open loops."""
-    S = constrained_directions.scaling(length_scale)
-    values, vectors = constrained_directions.eigen(S @ Lambda_inv @ S)
-    least = constrained_directions.locked(open_mobility, length_scale)
-    kept = values > ca.fmax(RANK * constrained_directions.largest(values), least)
-    inverse = ca.if_else(kept, 1 / ca.if_else(kept, values, 1), 0)
-    return S @ (vectors @ (inverse * (vectors.T @ (S @ acceleration))))

@@ -105,15 +105,22 @@ class ConstrainedDirections:
 
 
 def constrained_directions(
-    block: Block, space: OperationalSpace, q0: ca.SX, q1: ca.SX
+    block: Block,
+    space: OperationalSpace,
+    q0: ca.SX,
+    q1: ca.SX,
+    J: ca.SX | None = None,
+    prefix: str = "",
 ) -> ConstrainedDirections:
     """The constrained directions of a block with the state n_constrained that starts at q0 and
-    steps from q to q1."""
-    p, before, q = block.p, block.x["n_constrained"], space.model.q
+    steps from q to q1: at the operational point, or at a point with Jacobian J, whose names have
+    the prefix."""
+    p, before, q = block.p, block.x[f"{prefix}n_constrained"], space.model.q
     S = scaling(p["length_scale"])
-    least = locked(space.open_mobility(space.terms.J_h), p["length_scale"])
+    mobility = space.Lambda_inv if J is None else space.mobility(J)
+    least = locked(space.open_mobility(space.terms.J_h if J is None else J), p["length_scale"])
     scaled = ca.Function(
-        "scaled", [q, block.u.vector, p.vector], [S @ space.Lambda_inv @ S, least], {"cse": True}
+        "scaled", [q, block.u.vector, p.vector], [S @ mobility @ S, least], {"cse": True}
     )
     tolerance, hysteresis = p["rank_tolerance"], p["hysteresis"]
 
@@ -126,7 +133,7 @@ def constrained_directions(
         first=number(q0, ca.SX(0)),
         after=number(q1, before),
         output={
-            "P_c": projector(now, vectors, before),
-            "n_constraints": before,
+            f"{prefix}P_c": projector(now, vectors, before),
+            f"{prefix}n_constraints": before,
         },
     )

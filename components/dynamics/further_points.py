@@ -4,60 +4,153 @@ mobility as outputs.
     x = x_k(q),   v = J_k qd,   Lambda_k^-1 = J_k D^-1 (J_k' - W' (W D^-1 W')^-1 W D^-1 J_k')
 
 Their wrenches act on the linkage in addition to that at the operational point: Q += J_k' F_k.
+
+A point that a device holds, that of another user, has all that the operational point has: F_drift
+(-), a_bias, F_env and P_c. What a user's F_env adds up is what all others do to the linkage, the
+other users among them, by the mobility between their points:
+
+    Lambda_k^-1 F_env_k = sum_j Lambda_kj^-1 (F_hand_j - F_drift_j) + contacts
+    Lambda_kj^-1 = J_k D^-1 (J_j' - W' (W D^-1 W')^-1 W D^-1 J_j')
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import casadi as ca
 
-from hapticlink.components.component import MOBILITY, POSE, TWIST, WRENCH, Signals, Variable
+from hapticlink.components.component import (
+    ACCELERATION,
+    MOBILITY,
+    POSE,
+    TWIST,
+    WRENCH,
+    Block,
+    Signals,
+    Variable,
+)
+from hapticlink.components.dynamics.constrained_directions import (
+    ConstrainedDirections,
+    constrained_directions,
+)
+from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.linkage import Linkage
 
-
-def inputs(linkage: Linkage) -> list[Variable]:
-    return [
-        Variable(
-            f"{point.name}.F_hand",
-            (3,),
-            WRENCH,
-            description=f"wrench at {point.name}",
-            power=Power(f"{point.name}.x"),
-        )
-        for point in linkage.point
-    ]
+Users = tuple[str, ...]
+"""The names of the points that a device holds."""
 
 
-def outputs(linkage: Linkage, mobility: bool) -> list[Variable]:
-    found = []
-    for point in linkage.point:
-        x, v, mobile = (f"{point.name}.{port}" for port in ("x", "v", "Lambda_inv"))
-        found.append(Variable(x, (3,), POSE, description=f"pose of {point.name}"))
-        text = f"velocity of {point.name}"
-        found.append(Variable(v, (3,), TWIST, description=text, derivative_of=x))
+def inputs(linkage: Linkage, users: Users) -> Iterator[Variable]:
+    for name in (point.name for point in linkage.point):
+        at = f"{name}.x"
+        text = f"wrench at {name}"
+        yield Variable(f"{name}.F_hand", (3,), WRENCH, description=text, power=Power(at))
+        if name in users:
+            text = f"virtual coupling at {name}, acts with - on the mechanism"
+            drift = Power(at, sign=-1.0)
+            yield Variable(f"{name}.F_drift", (3,), WRENCH, description=text, power=drift)
+
+
+def outputs(linkage: Linkage, users: Users, *, mobility: bool) -> Iterator[Variable]:
+    for name in (point.name for point in linkage.point):
+        x = f"{name}.x"
+        yield Variable(x, (3,), POSE, description=f"pose of {name}")
+        text = f"velocity of {name}"
+        yield Variable(f"{name}.v", (3,), TWIST, description=text, derivative_of=x)
         if mobility:
-            text = f"mobility at {point.name}"
-            found.append(Variable(mobile, (3, 3), MOBILITY, description=text, kind="semidefinite"))
+            yield mobility_output(name)
+        if name in users:
+            text = f"acceleration of {name} at zero wrench"
+            yield Variable(f"{name}.a_bias", (3,), ACCELERATION, description=text)
+            yield wrench_output(f"{name}.", name)
+
+
+def mobility_output(name: str) -> Variable:
+    text = f"mobility at {name}"
+    return Variable(f"{name}.Lambda_inv", (3, 3), MOBILITY, description=text, kind="semidefinite")
+
+
+def direction_outputs(users: Users) -> Iterator[Variable]:
+    """P_c and the number of constrained directions at the points of users."""
+    for name in users:
+        text = f"projector on the constrained directions at {name}, scaled by L"
+        yield Variable(f"{name}.P_c", (3, 3), "1", description=text, kind="projector")
+        text = f"number of constrained directions at {name}"
+        yield Variable(f"{name}.n_constraints", (), "1", description=text)
+
+
+def counts(users: Users) -> list[str]:
+    """The states that hold the number of constrained directions, of the operational point first."""
+    return ["n_constrained", *(f"{name}.n_constrained" for name in users)]
+
+
+@dataclass(frozen=True)
+class Pushed:
+    """A further point with its pose (3 x 1) and the wrench on it (3 x 1)."""
+
+    name: str
+    x: ca.SX
+    wrench: ca.SX
+
+
+def pushed(model: LinkageModel, u: Signals) -> list[Pushed]:
+    """The further points, with the wrenches of hands and of virtual couplings."""
+    found = []
+    for point in model.linkage.point:
+        wrench = u[f"{point.name}.F_hand"]
+        if (drift := f"{point.name}.F_drift") in u:
+            wrench = wrench - u[drift]
+        found.append(Pushed(point.name, model.pose(point.body, f"{point.name}.at"), wrench))
     return found
 
 
 def efforts(model: LinkageModel, u: Signals) -> ca.SX:
     """Sum of J_k' F_k, n x 1."""
     Q = ca.SX(model.q.numel(), 1)
-    for point in model.linkage.point:
-        x = model.pose(point.body, f"{point.name}.at")
-        Q += ca.jtimes(x, model.q, u[f"{point.name}.F_hand"], True)
+    for point in pushed(model, u):
+        Q += ca.jtimes(point.x, model.q, point.wrench, True)
     return Q
 
 
-def values(space: OperationalSpace, mobility: bool) -> dict[str, ca.SX]:
-    found, model = {}, space.model
-    for point in model.linkage.point:
-        x = model.pose(point.body, f"{point.name}.at")
-        found[f"{point.name}.x"] = x
-        found[f"{point.name}.v"] = model.rate(x)
+def _jacobians(model: LinkageModel, names: Users) -> dict[str, ca.SX]:
+    points = (p for name in names for p in model.linkage.point if p.name == name)
+    return {p.name: ca.jacobian(model.pose(p.body, f"{p.name}.at"), model.q) for p in points}
+
+
+def mobilities(space: OperationalSpace, names: Users) -> dict[str, ca.SX]:
+    """Lambda_k^-1 of the points, by output."""
+    found = _jacobians(space.model, names)
+    return {f"{name}.Lambda_inv": space.mobility(J) for name, J in found.items()}
+
+
+def values(
+    space: OperationalSpace, block: Block, users: Users, applied: ca.SX, *, mobility: bool
+) -> dict[str, ca.SX]:
+    """The outputs; `applied` are the generalised forces (n x 1) of all wrenches and contacts."""
+    model, found = space.model, dict[str, ca.SX]()
+    for point in pushed(model, block.u):
+        found[f"{point.name}.x"], found[f"{point.name}.v"] = point.x, model.rate(point.x)
         if mobility:
-            found[f"{point.name}.Lambda_inv"] = space.mobility(ca.jacobian(x, model.q))
+            found |= mobilities(space, (point.name,))
+        if point.name in users:
+            J = ca.jacobian(point.x, model.q)
+            acceleration = J @ space.response(applied - J.T @ point.wrench)[0]
+            found[f"{point.name}.a_bias"] = space.bias(point.x)
+            found[f"{point.name}.F_env"] = equivalent_wrench(
+                space.mobility(J), space.open_mobility(J), acceleration, block.p["length_scale"]
+            )
     return found
+
+
+def directions(
+    block: Block, space: OperationalSpace, users: Users, q0: ca.SX, q1: ca.SX
+) -> dict[str, ConstrainedDirections]:
+    """The constrained directions at the operational point and at those of users, by state."""
+    found = [constrained_directions(block, space, q0, q1)]
+    for name, J in _jacobians(space.model, users).items():
+        found.append(constrained_directions(block, space, q0, q1, J, f"{name}."))
+    return dict(zip(counts(users), found, strict=True))

@@ -75,6 +75,10 @@ class OperationalSpace:
         """The bias acceleration a_bias, 3 x 1 (m/s2, m/s2, rad/s2)."""
         return self.terms.J_h @ self._bias[0] + self.terms.Jdot_qd
 
+    def bias(self, r: ca.SX) -> ca.SX:
+        """The bias acceleration of a point with pose r(q)."""
+        return ca.jacobian(r, self.model.q) @ self._bias[0] + self.model.rate(self.model.rate(r))
+
     def response(self, Q: ca.SX) -> tuple[ca.SX, ca.SX]:
         """The change of qdd and lambda by generalised forces Q (n x 1)."""
         return self.solver.solve(Q, ca.SX(self.solver.m, 1))

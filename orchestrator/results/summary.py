@@ -19,6 +19,7 @@ from hapticlink.orchestrator.results.tracking import (
     COUNTS,
     DEVICE,
     folded,
+    further_users,
     has_tracking,
     of_block,
     pose_error,
@@ -54,6 +55,18 @@ def numbers(results: Results) -> Iterator[str]:
             f"handle at most {short(distance.max())} mm from the operational point, "
             f"{short(rms)} mm RMS; at most {short(error.angle_rad.max())} rad"
         )
+    for user in further_users(results):
+        further = pose_error(results, user)
+        if not len(further.time_s):
+            continue
+        yield (
+            f"handle of {user} at most {short(further.distance_mm.max())} mm from its point; "
+            f"at most {short(further.angle_rad.max())} rad"
+        )
+        margin = f"haptic_device_{user}.workspace_margin"
+        table = of_block(results, margin)
+        if table and table[margin].min() < 0:
+            yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
     if found := wrenches(results):
         peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())
         yield f"largest forces: {'; '.join(peaks)}"

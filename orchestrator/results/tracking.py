@@ -10,6 +10,7 @@ import numpy as np
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 MECHANISM, DEVICE = "virtual_mechanism.x", "haptic_device.x_true"
+BOTH = (MECHANISM, DEVICE)
 BRANCH = "virtual_environment.branch_ok"
 COUNTS = ("virtual_environment.n_constraints", "virtual_mechanism.n_constraints")
 
@@ -22,6 +23,17 @@ class Tracking(NamedTuple):
     angle_rad: Vector
 
 
+def further_users(results: Results) -> list[str]:
+    """The points at which users beside the first one hold a device."""
+    named = (n.partition("haptic_device_")[2] for n in results.run["fmus"])
+    return [n for n in named if n and all(of_block(results, signal, 3) for signal in poses(n))]
+
+
+def poses(user: str = "") -> tuple[str, str]:
+    """The poses of a user's point and handle; the first user's name is empty."""
+    return (f"virtual_mechanism.{user}.x", f"haptic_device_{user}.x_true") if user else BOTH
+
+
 def table_of(results: Results, signal: str) -> Table | None:
     """The table that contains `signal`, whose rate depends on the scene; None if there is none."""
     return next((t for t in results.tables.values() if signal in t), None)
@@ -32,7 +44,10 @@ def of_block(results: Results, signal: str, *shape: int) -> Table | None:
     of that shape; None for an FMU of others that only has the same name, of whose ports nothing is
     known."""
     name, table = signal.partition(".")[0], table_of(results, signal)
-    if table is None or results.run["fmus"].get(name, {}).get("block", name) != name:
+    if table is None:
+        return None
+    block = results.run["fmus"].get(name, {}).get("block", name)
+    if name != block and not name.startswith(f"{block}_"):
         return None
     return table if table[signal].shape[1:] == shape else None
 
@@ -42,18 +57,19 @@ def has_tracking(results: Results) -> bool:
     return all(of_block(results, signal, 3) for signal in (MECHANISM, DEVICE))
 
 
-def pose_error(results: Results) -> Tracking:
-    """Tracking error at the mechanism's samples up to the device's last one; the handle's pose is
-    interpolated linearly where its clock differs. Raises KeyError without these signals."""
-    mechanism, device = of_block(results, MECHANISM, 3), of_block(results, DEVICE, 3)
+def pose_error(results: Results, user: str = "") -> Tracking:
+    """Tracking error of a user at the mechanism's samples up to the device's last one; the handle's
+    pose is interpolated linearly where its clock differs. Raises KeyError without these signals."""
+    point, handle = poses(user)
+    mechanism, device = of_block(results, point, 3), of_block(results, handle, 3)
     if mechanism is None or device is None:
-        raise KeyError(f"tracking needs the signals {MECHANISM} and {DEVICE}")
+        raise KeyError(f"tracking needs the signals {point} and {handle}")
     if not len(device["time"]):  # a fault before the first row
         return Tracking(*np.zeros((3, 0)))
     time = mechanism["time"]
     time = time[time <= device["time"][-1]]
     x, y, theta = (
-        mechanism[MECHANISM][: len(time), i] - np.interp(time, device["time"], device[DEVICE][:, i])
+        mechanism[point][: len(time), i] - np.interp(time, device["time"], device[handle][:, i])
         for i in range(3)
     )
     return Tracking(time, np.hypot(x, y) * 1e3, np.abs(theta))

@@ -5,11 +5,12 @@ of further hands on the mechanism, should be what the mechanism has gained:
 
     generated(t) = E(t) - E(0) - sum F_hand . dx_D - sum F_k . dx_k
 
-with E the mechanism's energy (kinetic, of gravity, springs and contacts) and each force paired with
-the displacement of the step that it acts over. It is the sum of three parts, of works at the end:
+summed over the users with a device each, and over hands k at further points, with E the
+mechanism's energy (kinetic, of gravity, springs and contacts) and each force paired with the
+displacement of the step that it acts over. It is the sum of three parts, of works at the end:
 
-    hand         of the hand's wrench on the mechanism, less the same on the handle
-    coupling     of -F_drift on the mechanism
+    hand         of the users' wrenches on the mechanism, less the same on their handles
+    coupling     of -F_drift of all users on the mechanism
     mechanism    what is left: friction, damping and contacts, drives, and the error of integration
 
 A positive value is energy that the hand could get back without having put it in; friction makes it
@@ -28,7 +29,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-from hapticlink.orchestrator.results.tracking import DEVICE, MECHANISM, of_block, table_of
+from hapticlink.orchestrator.results.tracking import (
+    DEVICE,
+    MECHANISM,
+    further_users,
+    of_block,
+    poses,
+    table_of,
+)
 
 BLOCK, MOBILITY, HAND = "virtual_mechanism", "Lambda_inv", "hand.F"
 ENERGY, POINT, CONTACT = f"{BLOCK}.energy", f"{BLOCK}.F_hand", f"{BLOCK}.F_env"
@@ -69,14 +77,19 @@ def user_port(results: Results) -> UserPort | None:
     hand = into.get(f"{_wrench(into)} -> {POINT}", 0.0)
     coupling = sum(w for n, w in into.items() if n.endswith(".F_drift"))
     further = sum(into.values()) - hand - coupling
-    others = np.zeros(len(time))
-    for name in (n for n in into if n.startswith("hand_")):
-        source, _, target = name.partition(" -> ")
-        point = target.removesuffix(".F_hand") + ".x"
-        table, hand_s = of_block(results, point, 3), table_of(results, source)
+    others, on_handle = np.zeros(len(time)), float(put_in[-1])
+    users = further_users(results)
+    for name in (n for n in into if n.endswith(".F_hand") and not n.endswith(f"-> {POINT}")):
+        point = name.rpartition(" -> ")[2].removesuffix(".F_hand").removeprefix(f"{BLOCK}.")
+        source = f"hand_{point}.F"
+        moved = poses(point)[1] if point in users else f"{BLOCK}.{point}.x"
+        table, hand_s = of_block(results, moved, 3), table_of(results, source)
         if table and hand_s:
-            others += _work(hand_s[source], hand_s["time"], table, point, time)
-    on_handle = float(put_in[-1])
+            work = _work(hand_s[source], hand_s["time"], table, moved, time)
+            others += work
+            if point in users:
+                hand, on_handle = hand + into[name], on_handle + float(work[-1])
+                further -= into[name]
     parts = {
         "hand": hand - on_handle,
         "coupling": coupling,

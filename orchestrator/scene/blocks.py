@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.linkage import GraphicsCopy
 from hapticlink.orchestrator.scene.rates import AnyRate
 from hapticlink.orchestrator.scene.scene import Scene
@@ -66,13 +67,19 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
     for name, hand in scene.hands.items():
         found.append(BlockPlan(f"hand_{name}", "haptics", {"hand": hand}, "hand"))
     if scene.controller:
-        parts = ("controller", "directions", "linkage")
-        settings = {part: getattr(scene, part) for part in parts}
+        settings = settings_of(scene, "controller", "directions", "linkage")
         if others(scene):
             settings["controller"] = replace(scene.controller, contact=True)
         found.append(BlockPlan("controller", "haptics", settings))
+    for name, controller in scene.users.items():
+        felt = replace(controller, contact=True)
+        settings = {**settings_of(scene, "directions", "linkage"), "controller": felt}
+        found.append(BlockPlan(f"controller_{name}", "haptics", settings, "controller"))
     if scene.device:
         found.append(BlockPlan("haptic_device", "haptics", {"device": scene.device}))
+    for name, device in scene.devices.items():
+        plan = BlockPlan(f"haptic_device_{name}", "haptics", {"device": device}, "haptic_device")
+        found.append(plan)
     if scene.linkage:
         settings = {"linkage": scene.linkage, "mechanism": scene.mechanism}
         if scene.directions_from == "mechanism" or scene.mechanism.directions:
@@ -81,7 +88,9 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
             settings["contacts"] = scene.contacts
         if scene.controller and others(scene):
             settings["felt"] = True
-        if scene.contacts or scene.linkage.limited or settings.get("felt"):
+        if scene.devices:
+            settings["users"] = tuple(scene.devices)
+        if scene.contacts or scene.linkage.limited or (others(scene) and controllers(scene)):
             settings["length_scale"] = scene.directions.length_scale
         if scene.local_model:
             settings["local_model"] = True
@@ -99,8 +108,19 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
             "mobility": mobility_from_graphics(scene) or not skip,
             "local_model": scene.local_model,
         }
+        if scene.devices:
+            settings["users"] = tuple(scene.devices)
         found.append(BlockPlan("virtual_environment", "graphics", settings))
     return tuple(found)
+
+
+def settings_of(scene: Scene, *parts: str) -> dict[str, Any]:
+    return {part: getattr(scene, part) for part in parts}
+
+
+def controllers(scene: Scene) -> list[Controller]:
+    """The controllers of all devices."""
+    return [*([scene.controller] if scene.controller else []), *scene.users.values()]
 
 
 def fmu_rates(scene: Scene) -> dict[str, AnyRate]:
@@ -111,13 +131,13 @@ def fmu_rates(scene: Scene) -> dict[str, AnyRate]:
 
 
 def impedance(scene: Scene) -> bool:
-    """Whether the controller shapes the device's impedance."""
-    return scene.controller is not None and scene.controller.impedance
+    """Whether a controller shapes its device's impedance."""
+    return any(controller.impedance for controller in controllers(scene))
 
 
 def topology(scene: Scene) -> bool:
-    """Whether the controller has a topology force F_T."""
-    return scene.controller is not None and scene.controller.topology is not False
+    """Whether a controller has a topology force F_T."""
+    return any(controller.topology is not False for controller in controllers(scene))
 
 
 def mobility_from_graphics(scene: Scene) -> bool:

@@ -5,7 +5,8 @@ this file adds rates, holds and the coupling scheme.
 
 A block is simulated if its table is present: [linkage] the virtual mechanism, [graphics] the
 virtual environment (only if another block uses an output of it), [device], [controller] and [hand]
-the blocks of these names.
+the blocks of these names. [hands.NAME], [devices.NAME] and [controllers.NAME] are those at the
+further point NAME, blocks `hand_NAME`, `haptic_device_NAME` and `controller_NAME`.
 """
 
 from __future__ import annotations
@@ -162,6 +163,11 @@ class Scene:
     """The user, the block `hand`."""
     hands: Mapping[str, Hand] = field(default_factory=dict)
     """Hands at the further points of the linkage, by the point's name."""
+    devices: Mapping[str, Device] = field(default_factory=dict)
+    """Devices that further users hold, by the name of the point that each renders:
+    [two users](coupling.md#two-users-on-one-linkage)."""
+    controllers: Mapping[str, Controller] = field(default_factory=dict)
+    """Controllers of these devices, by the same name; by default as [controller]."""
     fmu: tuple[ForeignFmu, ...] = ()
     """Further FMUs: [foreign FMUs](foreign-fmus.md)."""
     connection: tuple[Wire, ...] = ()
@@ -183,6 +189,12 @@ class Scene:
     def source(self) -> Source | None:
         """What the scene was read from; None where it was created or changed in Python."""
         return None
+
+    @property
+    def users(self) -> dict[str, Controller]:
+        """The controllers of the devices at further points, by point."""
+        own = self.controller or Controller()
+        return {name: self.controllers.get(name, own) for name in self.devices}
 
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""

@@ -28,6 +28,7 @@ SCENES: list[tuple[str, Mapping[str, Any]]] = [
     ("enclosure", {"controller.contact": True}),
     ("local-model", {}),
     ("two-hands", {"mechanism.directions": True}),
+    ("two-users", {"mechanism.directions": True}),
     ("two-hands", {"fmu": [WALL]}),
     ("two-hands", {"linkage.joint.0.ports": ("effort", "position", "velocity")}),
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
@@ -17,9 +18,13 @@ def check(scene: Scene) -> Iterator[Problem]:
             f"{scene.directions.rank_tolerance} is {factor:.6g}, a share that no direction "
             "exceeds: give less than 1 in all",
         )
-    device, here = scene.device, ("device",)
-    if device is None:
-        return
+    if scene.device:
+        yield from _device(scene.device, ("device",))
+    for name, device in scene.devices.items():
+        yield from _device(device, ("devices", name))
+
+
+def _device(device: Device, here: Path) -> Iterator[Problem]:
     if device.base_y_a >= device.base_y_b:
         message = (
             f"{device.base_y_a} m is not below base_y_b = {device.base_y_b} m: plane A reaches "
@@ -27,14 +32,14 @@ def check(scene: Scene) -> Iterator[Problem]:
         )
         yield (*here, "base_y_a"), message
     if device.sensing != "ideal":
-        yield (*here, "sensing"), f"write sensing = {device.sensing!r} outside of [device]"
+        table = ".".join(map(str, here))
+        yield (*here, "sensing"), f"write sensing = {device.sensing!r} outside of [{table}]"
     reach = device.proximal_length + device.distal_length
     folded = abs(device.proximal_length - device.distal_length)
     if (2 * device.reach_limit - 1) * reach <= folded:
-        path: Path = (*here, "reach_limit")
         least = (1 + folded / reach) / 2
         yield (
-            path,
+            (*here, "reach_limit"),
             f"{device.reach_limit} leaves an arm nothing between its two stops, as its links "
             f"differ by {folded:.6g} m: give more than {least:.6g}, or links of more equal lengths",
         )

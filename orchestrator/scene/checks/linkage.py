@@ -139,7 +139,7 @@ def _limits(linkage: Linkage) -> Iterator[Problem]:
 
 
 def points(scene: Scene) -> Iterator[Problem]:
-    """Problems of [[linkage.point]] and of the hands at these points."""
+    """Problems of [[linkage.point]] and of the hands, devices and controllers at these points."""
     points = scene.linkage.point if scene.linkage else ()
     bodies = {b.name for b in scene.linkage.body} if scene.linkage else set()
     names: set[str] = {"operational_point"}
@@ -153,6 +153,9 @@ def points(scene: Scene) -> Iterator[Problem]:
         if point.body not in bodies:
             yield (*path, "body"), unknown("body", point.body, sorted(bodies))
     named = dict.fromkeys(sorted(names - {"operational_point"}))
-    for name in scene.hands:
-        if name not in named:
-            yield ("hands", name), f"{unknown('point', name, named)}: add it as [[linkage.point]]"
+    for table in ("hands", "devices", "controllers"):
+        for name in getattr(scene, table):
+            if name not in named:
+                yield (table, name), f"{unknown('point', name, named)}: add it as [[linkage.point]]"
+            elif table == "controllers" and name not in scene.devices:
+                yield (table, name), f"moves a device: add [devices.{name}], or take it out"

@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from hapticlink.components.blocks.virtual_environment import virtual_environment
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.contact.broad_phase import near, out_of_reach, reach
-from hapticlink.components.contact.contact_forces import equivalent_wrench
+from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
 from hapticlink.components.specs.linkage import (
     Body,

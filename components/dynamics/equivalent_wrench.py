@@ -1,0 +1,35 @@
+"""F_env (2.18): the wrench at a point that has the same effect there as all contacts and others.
+
+    Lambda^-1 F_env = J D^-1 (I - W' (W D^-1 W')^-1 W D^-1) sum_i J_i' F_i
+
+of least norm in the scaled metric S = diag(1, 1, L).
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from hapticlink.components.component import WRENCH, Variable
+from hapticlink.components.dynamics.constrained_directions import eigen, largest, locked, scaling
+
+# Directions with an eigenvalue below this share of the largest one are left out of F_env, and so
+# are those that the loops lock.
+RANK = 1e-6
+
+
+def wrench_output(prefix: str = "", place: str = "the operational point") -> Variable:
+    text = f"wrench of contacts, joint limits and others at {place}"
+    return Variable(f"{prefix}F_env", (3,), WRENCH, description=text)
+
+
+def equivalent_wrench(
+    Lambda_inv: ca.SX, open_mobility: ca.SX, acceleration: ca.SX, length_scale: ca.SX
+) -> ca.SX:
+    """The wrench F of least scaled norm with Lambda^-1 F = a, F = S (S Lambda^-1 S)^+ S a (3 x 1).
+    open_mobility is J D^-1 J' of the linkage with open loops."""
+    S = scaling(length_scale)
+    values, vectors = eigen(S @ Lambda_inv @ S)
+    least = locked(open_mobility, length_scale)
+    kept = values > ca.fmax(RANK * largest(values), least)
+    inverse = ca.if_else(kept, 1 / ca.if_else(kept, values, 1), 0)
+    return S @ (vectors @ (inverse * (vectors.T @ (S @ acceleration))))
