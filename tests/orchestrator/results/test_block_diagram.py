@@ -21,7 +21,7 @@ def test_every_connection_is_in_the_cell_of_its_source_and_target(scene: str) ->
         (rows[y], line.split(",")[0].split(" ")[0], columns[x])
         for text in axes.texts
         for x, y in [text.get_position()]
-        if x in columns and y in rows and (x, y) not in places
+        if text.get_text() and x in columns and y in rows and (x, y) not in places
         for line in text.get_text().split("\n")
     ]
     wanted = [(c.source, c.source_port, c.target) for c in system.connections]
