@@ -30,8 +30,8 @@ Draw = Annotated[
     bool,
     Parameter(
         negative="",
-        help="Draw the mechanism where it starts, and the device in its workspace, into OUT "
-        "(default info/SCENE).",
+        help="Draw the blocks and their connections, the mechanism where it starts, and the device "
+        "in its workspace, into OUT (default info/SCENE).",
     ),
 ]
 
@@ -98,7 +98,7 @@ def info(
             say(f"  {line}")
     _needs(read, time)
     if draw or out:
-        _draw(read, start, out or default_folder("info", scene))
+        _draw(read, made, start, out or default_folder("info", scene))
     return 0
 
 
@@ -107,10 +107,15 @@ def _pose(start: dict[str, float]) -> list[float]:
     return [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)]
 
 
-def _draw(scene: Any, start: dict[str, float], out: Path) -> None:
-    from hapticlink.orchestrator.results import folders, mechanism_drawing, workspace
+def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:
+    from hapticlink.orchestrator.results import (
+        block_diagram,
+        folders,
+        mechanism_drawing,
+        workspace,
+    )
 
-    figures = {}
+    figures = {"blocks": block_diagram.figure(system, f"Blocks of: {scene.title}")}
     if q := coordinates(start):
         figures["start"] = mechanism_drawing.figure(scene, q)
     if scene.device:

@@ -8,7 +8,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
-from hapticlink.orchestrator.scene import families
+from hapticlink.orchestrator.scene import drop as dropping
+from hapticlink.orchestrator.scene import families, toml_keys
 from hapticlink.orchestrator.scene.find import find, folder_of
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml import loads
@@ -27,6 +28,9 @@ class SceneFile(Scene):
     """The base scene, over which this one's tables are merged: the name of a shipped scene, or a
     path relative to this file. Tables merge key by key; arrays, and tables of another `type`,
     replace those of the base."""
+    drop: tuple[str, ...] = ()
+    """Dotted keys of the base scene that are not inherited, such as `linkage` or `hand.wrench`, for
+    a linkage of one's own in the loop of the base. This file can write them anew."""
 
 
 def document(
@@ -50,16 +54,16 @@ def document(
             fmu["path"] = str(folder / fmu["path"])
     for _, table in traced(data) if folder else ():
         table["rate"] = {"trace": str(folder / table["rate"]["trace"])}
-    base = data.pop("extends", None)
+    base, dropped = data.pop("extends", None), data.pop("drop", [])
+
+    def refuse(message: str, key: str = "extends") -> SceneFault:
+        _, line = place_of((key,), places)
+        return SceneFault(above[0] if above else name, [Finding(key, message, line, None, file)])
+
     if base is None:
+        if dropped != []:
+            raise refuse("there is no base scene: write `extends` as well", "drop")
         return data, places
-
-    def refuse(message: str) -> SceneFault:
-        _, line = place_of(("extends",), places)
-        return SceneFault(
-            above[0] if above else name, [Finding("extends", message, line, None, file)]
-        )
-
     if not isinstance(base, str):
         raise refuse(f"{base!r}: write a scene's name or path")
     try:
@@ -74,6 +78,10 @@ def document(
     if so_far[-1] in above:
         raise refuse(f"runs in a circle: {' -> '.join(so_far)}")
     below, below_places = document(found, base, where, so_far, base)
+    below = dropping.taken(below, dropped, lambda message: refuse(message, "drop"))
+    below_places = {
+        p: at for p, at in below_places.items() if toml_keys.value(below, p) is not None
+    }
     return _merged(below, data), _merged_places(below_places, below, places, data)
 
 

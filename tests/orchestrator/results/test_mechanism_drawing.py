@@ -46,7 +46,10 @@ def test_a_body_of_three_joints_is_a_triangle_of_them() -> None:
 
 @pytest.mark.parametrize(
     ("scene", "files"),
-    [("closed-loop", {"start.png", "workspace.png"}), ("trammel", {"start.png"})],
+    [
+        ("closed-loop", {"blocks.png", "start.png", "workspace.png"}),
+        ("trammel", {"blocks.png", "start.png"}),
+    ],
 )
 def test_info_draws_and_names_what_it_drew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: str, files: set[str]

@@ -1,0 +1,201 @@
+"""Draws the waveform of every hold to docs/figures/, by running the hold classes on one signal:
+
+python docs/draw_holds.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.holds import HOLDS, Hold, HoldContext
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
+from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
+
+Vector = NDArray[np.float64]
+FOLDER = Path(__file__).with_name("figures")
+TICK, PERIOD, END = 1e-3, 40, 400
+"""s; ticks between two samples; ticks that are drawn."""
+STIFFNESS = 100.0
+"""Of the spring of which the signal is the force, or the set position (N/m)."""
+NOTES = {
+    "zoh": ", latest",
+    "slope": " (a velocity, from its pose)",
+    "passive": " (force of a spring)",
+    "nepce": " (force of a spring)",
+    "pspm": " (dotted: near end)",
+    "mean": " (fast source, slow target)",
+}
+BLUE, RED = "#0077bb", "#cc3311"
+
+
+def signal(tick: float) -> float:
+    t = tick * TICK
+    return float(np.sin(14 * t) + 0.4 * np.sin(35 * t + 1))
+
+
+def rate(tick: float) -> float:
+    t = tick * TICK
+    return float(14 * np.cos(14 * t) + 14 * np.cos(35 * t + 1))
+
+
+def near_end(tick: float) -> float:
+    """Of the spring that the signal sets: a hand leads it, then lets it follow."""
+    return signal(tick + 30 * np.cos(2 * np.pi * tick / END))
+
+
+def _seconds(ticks: float) -> float:
+    return ticks * TICK
+
+
+def waveform(name: str) -> tuple[Vector, Vector]:
+    """The values of a hold at every tick, and the stamps of its samples."""
+    now = [0]
+    kind = HOLDS[name]
+    context = HoldContext(1, _seconds)
+    if kind.needs == "power":  # the force of a spring at the target: x = -y/K
+        context = HoldContext(1, _seconds, lambda: np.array([-signal(now[0]) / STIFFNESS]))
+    elif kind.needs == "spring":
+        end = lambda: np.array([near_end(now[0])])  # noqa: E731
+        near = NearEnd(end, np.zeros(1), TICK, _seconds, sampled=True)
+        context = HoldContext(
+            1, _seconds, tank=(EnergyTank(np.full(1, STIFFNESS), np.zeros(1), near), 0)
+        )
+    hold, values = kind(context), []
+    fast = kind.downsamples and name == "mean"
+    every = 1 if fast else PERIOD
+    for tick in range(END):
+        now[0] = tick
+        if tick % every == 0:
+            hold.push(tick, sample(kind, tick), tick)
+        read = not fast or tick % PERIOD == 0
+        values.append(hold.value(tick).copy()[0] if read else values[-1])
+    return np.array(values), np.arange(0, END, PERIOD)
+
+
+def sample(kind: type[Hold], tick: int) -> Vector:
+    """The signal at `tick`, and beside it what the hold needs."""
+    if kind.needs == "derivative":
+        return np.array([signal(tick), rate(tick)])
+    if kind.needs == "integral":  # the signal is a velocity, held as the slope of its pose
+        return np.array([rate(tick), signal(tick)])
+    return np.array([signal(tick)])
+
+
+def scalars() -> Figure:
+    """A panel for each hold."""
+    names = [name for name in HOLDS if name != "latest"]
+    rows = -(-len(names) // 3)
+    figure = Figure(figsize=(9, 1.75 * rows), layout="constrained")
+    panels = figure.subplots(rows, 3, sharex=True)
+    ticks = np.arange(END)
+    for axes, name in zip(panels.flat, names, strict=False):
+        values, stamps = waveform(name)
+        true = rate if HOLDS[name].needs == "integral" else signal
+        source = np.array([true(t) for t in ticks])
+        axes.plot(ticks, source, color="0.6", lw=1)
+        if HOLDS[name].needs == "spring":
+            axes.plot(ticks, [near_end(t) for t in ticks], color="0.6", lw=1, ls=":")
+        axes.plot(ticks, values, color=BLUE, lw=1.4, drawstyle="steps-post")
+        if name != "mean":
+            axes.plot(stamps, source[stamps], "o", color=RED, ms=3.5)
+        axes.set_title(name + NOTES.get(name, ""), fontsize="medium")
+        axes.tick_params(labelsize="x-small")
+        if axes in panels[:, 0]:
+            axes.set_ylabel("signal", fontsize="small")
+    for axes in panels.flat[len(names) :]:
+        axes.axis("off")
+    for axes in panels[-1]:
+        axes.set_xlabel("time (ms)", fontsize="small")
+    for axes in panels[-2][len(names) - 3 * (rows - 1) :]:
+        axes.tick_params(labelbottom=True)
+        axes.set_xlabel("time (ms)", fontsize="small")
+    figure.suptitle(
+        "Every hold on one signal (grey), sampled every 40 ms (red), read every ms (blue)",
+        fontsize="large",
+    )
+    return figure
+
+
+def held(hold: Hold, source: Callable[[int], Vector]) -> Vector:
+    """The values of a hold whose source is sampled each period, (END, n)."""
+    found = []
+    for tick in range(END):
+        if tick % PERIOD == 0:
+            hold.push(tick, source(tick), tick)
+        found.append(hold.value(tick).copy())
+    return np.array(found)
+
+
+def _wrapped(tick: float) -> Vector:
+    angle = 3.0 * np.sin(9 * tick * TICK) + 2.0
+    return np.array([(angle + np.pi) % (2 * np.pi) - np.pi])
+
+
+def _direction(tick: float) -> Vector:
+    angle = 2.5 * np.sin(9 * tick * TICK)
+    along = np.array([np.cos(angle), np.sin(angle)])
+    return np.outer(along, along).ravel()
+
+
+def _mobility(tick: float) -> Vector:
+    angle = 2.5 * np.sin(9 * tick * TICK)
+    c, s = np.cos(angle), np.sin(angle)
+    turned = np.array([[c, -s], [s, c]])
+    return (turned @ np.diag([1.0, 0.05]) @ turned.T).ravel()
+
+
+def manifolds() -> Figure:
+    """Signals that have no extrapolation by entry: `foh` with and without their kind."""
+    figure = Figure(figsize=(9, 2.9), layout="constrained")
+    panels = figure.subplots(1, 3)
+    ticks = np.arange(END)
+
+    def foh(size: int) -> Hold:
+        return HOLDS["foh"](HoldContext(size, _seconds))
+
+    angle: Any = (foh(1), Unwrapped(lambda: foh(1), [0], [2 * np.pi]), _wrapped)
+    projector: Any = (foh(4), Projector(lambda: foh(4), 4), _direction)
+    mobility: Any = (foh(4), Semidefinite(lambda: foh(4), 4), _mobility)
+
+    def beyond(values: Vector) -> Vector:
+        """The largest entry of P P - P."""
+        matrices = values.reshape(-1, 2, 2)
+        return np.abs(matrices @ matrices - matrices).max((1, 2))
+
+    def least(values: Vector) -> Vector:
+        return np.linalg.eigvalsh(values.reshape(-1, 2, 2))[:, 0]
+
+    shown: list[tuple[Any, Callable[[Vector], Vector], str, str]] = [
+        (angle, lambda v: v[:, 0], "a wrapped angle (rad)", "angle: whole turns are taken out"),
+        (projector, beyond, "largest entry of |P P - P|", "projector: the nearest one"),
+        (mobility, least, "least eigenvalue", "semidefinite: none below 0"),
+    ]
+    for axes, ((plain, kind, source), measure, what, title) in zip(panels, shown, strict=True):
+        true = measure(np.array([source(t) for t in ticks]))
+        axes.plot(ticks, true, color="0.6", lw=1, label="source")
+        axes.plot(ticks, measure(held(plain, source)), color=RED, lw=1, label="by entry")
+        axes.plot(ticks, measure(held(kind, source)), color=BLUE, lw=1.4, label="by kind")
+        axes.set(xlabel="time (ms)", ylabel=what)
+        axes.set_title(title, fontsize="medium")
+        axes.tick_params(labelsize="small")
+    figure.legend(
+        *panels[0].get_legend_handles_labels(),
+        ncols=3,
+        loc="outside lower center",
+        fontsize="small",
+    )
+    return figure
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    for name, figure in (("holds", scalars()), ("holds-by-kind", manifolds())):
+        path = FOLDER / f"{name}.png"
+        figure.savefig(path, dpi=90, metadata={"Software": None})  # the same bytes every time
+        print(path)
