@@ -51,10 +51,10 @@ hapticlink view {name}
 {tried[2]}
 ```
 
-The scene is [`scenes/{name}.toml`](../../scenes/{name}.toml).{over} `hapticlink info {name} --draw` draws
-its blocks and connections; a scene of your own starts with `extends = "{name}"`
-([your own linkage](../own-linkage.md)). Sections, tables and figures are those of [the
-report](../glossary.md).
+The scene is [`scenes/{name}.toml`](../../scenes/{name}.toml).{over}
+`hapticlink info {name} --draw` draws its blocks and connections; a scene of your own starts
+with `extends = "{name}"` ([your own linkage](../own-linkage.md)). Sections, tables and
+figures are those of [the report](../glossary.md).
 """
 
 
