@@ -132,6 +132,18 @@ class LiftedMap:
         whole, errors = (np.vstack([X[owner] for owner in state.owners]) for X in (M, D))
         return self._numbers(), whole, errors
 
+    def count(self, kind: type[Operation], fmu: str) -> int:
+        """The number of operations of a kind on an FMU within a period."""
+        return sum(
+            isinstance(operation, kind) and getattr(operation, "fmu", None) == fmu
+            for _, event in self._moments
+            for operation, _ in self._instructions(event)
+        )
+
+    def outputs(self, fmu: str) -> slice:
+        """The indices of an FMU's outputs in the signal vector."""
+        return self._simulation.signals.fmu(fmu)
+
     def set_parameters(self, values: Sequence[tuple[str, Scalar, float]]) -> None:
         """Sets tunable parameters, by FMU, from here on."""
         self._state.restore(self._template)

@@ -17,7 +17,10 @@ Robotic Systems 14 (1997), 37:
     b > T/2 1/(1 - cos wT) Re{(1 - exp(-i w T)) H(exp(i w T))}
 
 Between samples the velocity is taken for its mean: for a rendering of positions that is the worst
-hand, as there; for one that reads velocities it is the worst of the hands that hold their force.
+hand, as there; for one that reads velocities or forces it is the worst of the hands that hold their
+force. With several haptic periods in a hyperperiod the port mixes the frequencies w + 2 pi h/P: a
+hand that does not change with time answers to each alone, so that b is bounded from below by each
+harmonic with the others let go, and from above by scales for them (absolute.py).
 """
 
 from __future__ import annotations
@@ -33,43 +36,45 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.plan.operations import Set
-from hapticlink.orchestrator.run.energy.bonds import bond
-from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.stability import frozen
+from hapticlink.orchestrator.stability import frozen, two_port
+from hapticlink.orchestrator.stability.absolute import lacking, least
 from hapticlink.orchestrator.stability.closures import Closures
+from hapticlink.orchestrator.stability.cut import (
+    HandPort,
+    MechanismPort,
+    hand_port,
+    mechanism_port,
+    response,
+)
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
+from hapticlink.orchestrator.stability.harmonics import Scale, hertz
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
-from hapticlink.orchestrator.stability.state_vector import SIGNALS
-from hapticlink.orchestrator.stability.tangent import Columns, Instruction
+from hapticlink.orchestrator.stability.two_port import ROUNDING, TwoPort, mixes
 from hapticlink.orchestrator.system.built import built
-from hapticlink.orchestrator.system.system import Connection, System
 
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-FREQUENCIES = 64
-LARGEST = 600
-"""Entries of the stacked force, of which each frequency takes an eigenvalue problem."""
-STILL = 1e-9
-"""Mobility, relative to the largest, of a direction in which the handle does not move."""
+FREQUENCIES = 32
 
 
 @dataclass(frozen=True)
 class Passivity:
-    """The user's port. needed: damping b of the device (N.s/m) above which the rendering is
-    passive for any hand. turning: that for rotations (N.m.s/rad), 0 without any. own: the damping
-    that the device has, in the same scale. frequency: where b is needed (Hz), up to whole turns
-    in a hyperperiod. curve: frequencies (Hz) and the damping needed there."""
+    """The user's port. needed: damping b of the device (N.s/m) that suffices for the rendering to
+    be stable with any passive hand, at_least: that which is necessary; they are the same where the
+    rendering mixes no frequencies. turning: `needed` for rotations (N.m.s/rad), 0 without any. own:
+    the damping that the device has, in the same scale. frequency: where `at_least` is needed (Hz).
+    curve: frequencies (Hz) and what is necessary there. two_port: the rendering between the hand
+    and a virtual mechanism, None without one behind the device."""
 
     title: str
     needed: float
+    at_least: float
     turning: float
     own: float
     frequency: float
     curve: tuple[tuple[float, float], ...]
+    two_port: TwoPort | None
 
     @property
     def passive(self) -> bool:
@@ -81,24 +86,30 @@ class Passivity:
         return {
             "passive": self.passive,
             "damping_needed": self.needed,
+            "damping_necessary": self.at_least,
             "damping_needed_in_rotation": self.turning,
             "damping_of_device": self.own,
             "least_passive_frequency": self.frequency,
-            "damping_needed_by_frequency": [list(pair) for pair in self.curve],
+            "damping_necessary_by_frequency": [list(pair) for pair in self.curve],
+            "two_port": self.two_port.record() if self.two_port else None,
         }
 
     def lines(self) -> Iterator[str]:
         """The result as text."""
+        necessary = "" if self.needed == self.at_least else f"{max(0.0, self.at_least):.4g} to "
         yield (
             f"user's port: {'passive' if self.passive else 'not passive'} for any hand; the device "
-            f"needs a damping of {max(0.0, self.needed):.5g} N.s/m"
+            f"needs a damping of {necessary}{max(0.0, self.needed):.5g} N.s/m"
             + (f" and {max(0.0, self.turning):.4g} N.m.s/rad" if self.turning else "")
             + f", it has {self.own:.4g}; least passive at {self.frequency:.4g} Hz"
         )
+        if self.two_port:
+            yield from self.two_port.lines()
 
 
 def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
-    """The passivity of the user's port of a scene, around its equilibrium.
+    """The passivity of the user's port of a scene, around its equilibrium, and the absolute
+    stability of the rendering between the hand and the virtual mechanism behind a device.
 
     Raises InputFault as `stability` does, and for a scene whose hand pushes no device, or with a
     hyperperiod of more than 600 forces.
@@ -107,130 +118,74 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
         read = open_scene.load(scene, options)
         with built(read) as whole:
             system, _ = frozen.without(whole)
-            port = _port(system)
+            hand = hand_port(system)
             with opened(long_enough(read, system), 0.0, Closures(read)) as map_:
                 at = equilibrium(map_, read.duration)
+                mechanism = mechanism_port(system, hand)
                 T = 1 / float(read.haptics.rate)
-                both = [_response(map_, at, port, T, alone) for alone in (False, True)]
-    return _judged(read.title, both[0], both[1], map_.period, T, len(port.moved))
+                return of(read.title, map_, at, hand, mechanism, T)
 
 
-@dataclass(frozen=True)
-class Port:
-    """The connection of a hand's force, and the indices of the displacements that it moves."""
-
-    connection: Connection
-    entries: tuple[int, ...]
-    moved: tuple[int, ...]
-
-
-def _port(system: System) -> Port:
-    signals = SignalVector(system)
-    for c in system.connections:
-        found = bond(c, system, signals) if system.block(c.source) == "hand" else None
-        if found:
-            return Port(c, found.entries, found.moved)
-    raise InputFault("no hand pushes on an FMU by a force with a displacement: no port of a user")
-
-
-@dataclass(frozen=True)
-class Response:
-    """z' = A z + B u, x = C z + D u over a hyperperiod."""
-
-    A: Matrix
-    B: Matrix
-    C: Matrix
-    D: Matrix
-
-    def mobility(self, angle: float, T: float, m: int) -> Complex:
-        """v of u at z' = exp(i angle) z, m entries each."""
-        turn = complex(np.exp(1j * angle))
-        free = np.linalg.solve(turn * np.eye(len(self.A)) - self.A, self.B.astype(complex))
-        x: Complex = self.C.astype(complex) @ free + self.D.astype(complex)
-        after = np.concatenate([x[m:], turn * x[:m]])
-        mobility: Complex = (after - x) / T
-        return mobility
-
-    def impedance(self, angle: float, T: float, m: int, kept: NDArray[np.intp]) -> Complex:
-        """Z at z' = exp(i angle) z, of the entries `kept` of each force of m."""
-        every = self.mobility(angle, T, m)
-        at = np.concatenate([k * m + kept for k in range(len(every) // m)])
-        impedance: Complex = np.linalg.inv(every[np.ix_(at, at)])
-        return impedance
-
-
-def _response(map_: LiftedMap, at: Linear, port: Port, T: float, alone: bool) -> Response:
-    """The response to the force of the port; `alone`: with the other inputs of its target held."""
-    m, N = len(port.moved), round(map_.period / T)
-    if m * N > LARGEST:
-        raise InputFault(
-            f"user's port: {m * N} forces in a hyperperiod, at most {LARGEST}: take a graphics "
-            "rate that divides the haptic one"
-        )
-    target, k = port.connection.target, at.V.shape[1]
-    pushed = [port.connection.inputs[i].name for i in port.entries]
-    rows = {
-        c.variable: i
-        for i, c in enumerate(c for c in map_.coordinates if (c.kind, c.owner) == ("fmu", target))
-    }
-    others = {s.name for c in map_.system.into(target) for s in c.inputs} - set(pushed)
-    seen: list[Matrix] = []
-
-    def inject(operation: Instruction, M: Columns) -> None:
-        if not (isinstance(operation, Set) and operation.fmu == target):
-            return
-        seen.append(M[SIGNALS][list(port.moved)].copy())
-        inputs = M[target].copy()
-        inputs[[rows[name] for name in pushed]] = 0.0
-        if alone:
-            inputs[[rows[name] for name in others]] = 0.0
-        for i, name in enumerate(pushed):
-            inputs[rows[name], k + (len(seen) - 1) * m + i] = 1.0
-        M[target] = inputs
-
-    start = np.hstack([at.V, np.zeros((len(at.V), m * N))])
-    _, M, _ = map_.slopes(at.point, start, after=inject)
-    if len(seen) != N:
-        raise InputFault(f"user's port: {target} takes {len(seen)} forces in {N} haptic periods")
-    x, end = np.vstack(seen), at.V.T @ M
-    return Response(end[:, :k], end[:, k:], x[:, :k], x[:, k:])
-
-
-def _judged(
-    title: str, whole: Response, device: Response, period: float, T: float, m: int
+def of(
+    title: str,
+    map_: LiftedMap,
+    at: Linear,
+    hand: HandPort,
+    mechanism: MechanismPort | None,
+    T: float,
 ) -> Passivity:
-    moves = np.abs(device.mobility(np.pi / 2, T, m)).max(axis=0).reshape(-1, m).max(axis=0)
-    kept = np.flatnonzero(moves > STILL * moves.max())
-    angles = np.concatenate([np.geomspace(1e-2, np.pi, FREQUENCIES // 2)])
-    angles = np.unique(np.concatenate([angles, np.linspace(0.0, np.pi, FREQUENCIES // 2)[1:]]))
-    scale = _lengths(device, T, m, kept)
-    needed: list[float] = []
-    own: list[float] = []
+    """The passivity of a map linearised at its equilibrium; T (s) is the haptic period."""
+    whole, device = (response(map_, at, hand, alone=alone) for alone in (False, True))
+    if whole.forces != whole.m * round(map_.period / T):
+        raise InputFault(
+            f"user's port: {hand.handle} takes {whole.forces // whole.m} forces in "
+            f"{map_.period / T:.4g} haptic periods"
+        )
+    scale, P = Scale(device, whole, T), map_.period
+    free = scale.free.T @ scale.moving
+    curve: list[tuple[float, float]] = []
+    needed, own = -np.inf, np.inf
+    N = whole.forces // whole.m
+    angles = _angles(N)
     for angle in angles:
-        Z = whole.impedance(angle, T, m, kept)
-        alone = device.impedance(angle, T, m, kept)
-        wide = np.tile(scale, len(Z) // len(kept))
-        for found, of, sign in ((needed, Z - alone, -1.0), (own, alone, 1.0)):
-            of = of / np.outer(wide, wide)
-            found.append(sign * float(np.linalg.eigvalsh((of + of.conj().T) / 2)[0]))
-    worst = int(np.argmax(needed))
-    hertz = angles / period / (2 * np.pi)
-    turns = scale[-1] ** 2 if len(kept) > 2 or kept[-1] == 2 else 0.0
+        port = scale.at(whole, angle, 0.0, scale.moving)
+        device_Z = scale.at(device, angle, 0.0, scale.free).impedance
+        along = np.kron(np.eye(N), free)
+        alone = along.T @ device_Z @ along
+        own = min(own, -least(alone))
+        for h in range(N):
+            i = slice(h * port.r, (h + 1) * port.r)
+            Z = port.harmonic(h).impedance
+            found = least(Z - alone[i, i])
+            none = ROUNDING * float(np.abs(Z).max())
+            curve.append((hertz(angle, h, N, P), found if abs(found) > none else 0.0))
+        if mixes(port):
+            lacks = lacking(port.impedance - alone, [port.r] * (len(port.Y) // port.r))
+            needed = max(needed, lacks)
+    frequency, at_least = max(curve, key=lambda pair: pair[1])
+    needed = max(needed, at_least)
+    both = None
+    if mechanism:
+        cut = response(map_, at, hand, mechanism)
+        H = P * len(mechanism.moved) / (len(cut.D) - cut.forces)
+        ports = [(angle, scale.at(cut, angle, H, scale.moving)) for angle in angles]
+        both = two_port.judged(ports, P, scale.turns, cut.radius)
     return Passivity(
         title,
-        needed[worst],
-        needed[worst] * turns,
-        min(own),
-        float(hertz[worst]),
-        tuple(zip(hertz.tolist(), needed, strict=True)),
+        needed,
+        at_least,
+        needed * scale.turns,
+        own,
+        frequency,
+        tuple(sorted(curve)),
+        both,
     )
 
 
-def _lengths(device: Response, T: float, m: int, kept: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Scales of the entries, 1 for translations; of a rotation the length (m) by which its
-    impedance is as large as that of the translations."""
-    size = np.abs(np.diag(device.impedance(np.pi / 2, T, m, kept)))[: len(kept)]
-    linear = size[kept < 2]
-    mean = linear.mean() if len(linear) else 1.0
-    found: NDArray[np.float64] = np.where(kept < 2, 1.0, np.sqrt(size / mean))
+def _angles(N: int) -> NDArray[np.float64]:
+    """Frequencies w P up to pi, as many as N harmonics of each leave to be taken."""
+    count = max(6, FREQUENCIES // N)
+    found: NDArray[np.float64] = np.unique(
+        np.concatenate([np.geomspace(1e-2, np.pi, count), np.linspace(0.0, np.pi, count)[1:]])
+    )
     return found
