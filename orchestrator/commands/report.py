@@ -15,7 +15,13 @@ Out = Annotated[Path | None, Parameter(help="File to write; by default reports/<
 
 def report(runs: Runs, /, *, out: Out = None) -> int:
     """Write a page of a run, or of several beside each other: what ran, how it ended, how well it
-    did, energies, timing, what was set differently, and how to make it again."""
+    did, energies, timing, what was set differently, and how to make it again.
+
+    For example:
+
+        hapticlink report runs/closed-loop
+        hapticlink report runs/on runs/off --out report.html
+    """
     from hapticlink.fmus.atomic_file import atomic_file
     from hapticlink.orchestrator.compare import page
     from hapticlink.orchestrator.results import folders

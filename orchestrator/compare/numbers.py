@@ -50,7 +50,9 @@ def sections(runs: Sequence[Results]) -> dict[str, list[Row]]:
         "Stability and steps": _stable,
         "Timing": _timing,
     }
-    return {title: _rows([dict(told(run)) for run in runs]) for title, told in asked.items()}
+    found = {title: _rows([dict(told(run)) for run in runs]) for title, told in asked.items()}
+    found[how] += _apart(runs)
+    return found
 
 
 def _rows(told: Sequence[dict[str, str]]) -> list[Row]:
@@ -150,7 +152,7 @@ def _timing(run: Results) -> Iterator[tuple[str, str]]:
             yield f"largest {key.replace('_', ' ')} (ms)", short(1e3 * paced[key]["max"])
 
 
-def apart(runs: Sequence[Results]) -> list[Row]:
+def _apart(runs: Sequence[Results]) -> list[Row]:
     """The largest distance (mm) of the operational point from that of the first run at the same
     times, until the first end; none where a run has no such point, or another mechanism."""
     tables = [of_block(run, MECHANISM, 3) for run in runs]

@@ -32,8 +32,6 @@ def page(runs: Mapping[str, Results]) -> str:
     if other := settings.other_scenes(every):
         parts.append(f'<p class="note">{escape(other)}</p>')
     for title, rows in numbers.sections(every).items():
-        if title.startswith("How well"):
-            rows = rows + numbers.apart(every)
         if rows:
             parts += [f"<h2>{escape(title)}</h2>", _table(names, rows)]
         if title.startswith("How well"):
