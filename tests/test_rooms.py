@@ -47,6 +47,7 @@ ROOMS = {
         "report",
         "study",
         "api",
+        "compare",
         "view",
         "commands",
     ),

@@ -24,8 +24,10 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
     "command",
     {
         "run": "Run a scene: results, run.json and figures.",
-        "view": "Drag a scene's mechanism on a page, in real time.",
+        "view": "Drag a scene's mechanism on a page, in real time, or replay a run.",
         "new": "Write a commented scene of your own to change.",
+        "compare": "Tabulate what differs between runs, and draw them over each other.",
+        "report": "Write a page of a run, or of several beside each other.",
         "build": "Build the FMUs of a scene.",
         "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
         "info": "Describe a scene, or list the shipped scenes.",

@@ -62,8 +62,16 @@ def view(
     export: Export = None,
 ) -> int:
     """Show a scene that runs in real time on a page, where the mouse is the hand; Ctrl-C ends it.
-    Recordings are written to OUT-1, OUT-2, ... (default runs/SCENE-view). With the folder of a
-    run, or of two, replay them instead."""
+    Recordings are written to OUT-1, OUT-2, ... (default runs/SCENE-view).
+
+    With the folder of a run, or of two, replay them instead.
+
+    For example:
+
+        hapticlink view closed-loop
+        hapticlink view runs/closed-loop
+        hapticlink view runs/on runs/off --export on-and-off.gif
+    """
     if Path(scene).is_dir() and (second or export or not _is_scene(scene)):
         if set or swap or out:
             raise InputFault(

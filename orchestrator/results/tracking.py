@@ -40,16 +40,20 @@ def table_of(results: Results, signal: str) -> Table | None:
 
 
 def of_block(results: Results, signal: str, *shape: int) -> Table | None:
-    """The table that contains a signal of a block of the haptic loop, or of the FMU in its place,
-    of that shape; None for an FMU of others that only has the same name, of whose ports nothing is
-    known."""
-    name, table = signal.partition(".")[0], table_of(results, signal)
-    if table is None:
+    """As `of_any_shape`, where the signal has that shape."""
+    table = of_any_shape(results, signal)
+    return table if table and table[signal].shape[1:] == shape else None
+
+
+def of_any_shape(results: Results, signal: str) -> Table | None:
+    """The table that contains a signal of a block of the haptic loop, or of the FMU in its place;
+    None for an FMU of others that only has the same name, of whose ports nothing is known."""
+    name = signal.partition(".")[0]
+    fmu = results.run["fmus"].get(name)
+    if fmu is None:
         return None
-    block = results.run["fmus"].get(name, {}).get("block", name)
-    if name != block and not name.startswith(f"{block}_"):
-        return None
-    return table if table[signal].shape[1:] == shape else None
+    block = fmu.get("block", name)
+    return table_of(results, signal) if name == block or name.startswith(f"{block}_") else None
 
 
 def has_tracking(results: Results) -> bool:

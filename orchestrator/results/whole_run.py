@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,3 +55,21 @@ def _first(error: ValidationError) -> str:
     """The first finding, in a line."""
     first = error.errors(include_url=False, include_input=False)[0]
     return f"{'.'.join(map(str, first['loc'])) or 'its content'}: {first['msg'].lower()}"
+
+
+def named(folders: Sequence[Path | str]) -> dict[str, Results]:
+    """The runs of folders by the names that tell those apart. Raises InputFault as `load_whole`,
+    and for a folder that is named twice."""
+    return dict(zip(names(folders), map(load_whole, folders), strict=True))
+
+
+def names(folders: Sequence[Path | str]) -> list[str]:
+    """What tells folders apart: their last part, or all parts behind what they have in common.
+    Raises InputFault for one that is named twice."""
+    paths = [Path(folder).resolve() for folder in folders]
+    if twice := next((f for i, f in enumerate(folders) if paths[i] in paths[:i]), None):
+        raise InputFault(f"{twice}: is named twice")
+    if len({path.name for path in paths}) == len(paths):
+        return [path.name for path in paths]
+    common = os.path.commonpath(paths)
+    return [path.relative_to(common).as_posix() for path in paths]

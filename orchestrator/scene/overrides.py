@@ -39,10 +39,11 @@ def text(value: Any, key: str) -> str:
         except ValueError:
             if value == value.strip():
                 return value
-    return _toml(value, key)
+    return toml(value, key)
 
 
-def _toml(value: Any, key: str) -> str:
+def toml(value: Any, key: str) -> str:
+    """A Python value of `key` as TOML. Raises InputFault for one that TOML cannot write."""
     if hasattr(value, "tolist"):  # of NumPy
         value = value.tolist()
     if isinstance(value, bool):
@@ -52,10 +53,10 @@ def _toml(value: Any, key: str) -> str:
     if isinstance(value, str | PurePath):
         return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
-        entries = (f"{_toml(str(k), key)} = {_toml(v, key)}" for k, v in value.items())
+        entries = (f"{toml(str(k), key)} = {toml(v, key)}" for k, v in value.items())
         return f"{{ {', '.join(entries)} }}"
     if isinstance(value, list | tuple | range):
-        return f"[{', '.join(_toml(v, key) for v in value)}]"
+        return f"[{', '.join(toml(v, key) for v in value)}]"
     raise InputFault(f"{key}: {value!r} is no value of a scene; give a number, text, list or table")
 
 

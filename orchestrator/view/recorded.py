@@ -20,7 +20,7 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.episodes import episodes
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-from hapticlink.orchestrator.results.tracking import of_block, table_of
+from hapticlink.orchestrator.results.tracking import of_any_shape, of_block, table_of
 from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.results.whole_run import load_whole, scene_part
 from hapticlink.orchestrator.view.frames import PORT, SHOWN
@@ -29,7 +29,7 @@ from hapticlink.orchestrator.view.picture import Picture
 NEEDED = ("virtual_mechanism.q", "virtual_mechanism.x")
 MOST = 4000
 """Frames of a run; of longer ones every second, third, ... sample is shown."""
-DIGITS = 6
+DIGITS = 7
 """Significant digits of the numbers of a frame."""
 
 
@@ -121,14 +121,10 @@ def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
     found, missing = dict[str, str](), list[str]()
     for key, names in SHOWN.items():
         for name in names:
-            block = name.partition(".")[0]
             if name in left_out:
                 missing.append(name)
                 break
-            if (
-                table_of(results, name)
-                and results.run["fmus"].get(block, {}).get("block", block) == block
-            ):
+            if of_any_shape(results, name):
                 found[key] = name
                 break
     return found, missing

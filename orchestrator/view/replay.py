@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.episodes import KINDS
+from hapticlink.orchestrator.results.whole_run import names
 from hapticlink.orchestrator.view import one_file
 from hapticlink.orchestrator.view.recorded import Recorded
 
@@ -19,17 +19,11 @@ WRITTEN = (".html", ".gif", ".webp", ".png")
 
 def html(runs: Sequence[Recorded]) -> str:
     """The page. The same runs give the same bytes."""
-    told = [run.told() | {"short": name} for run, name in zip(runs, names(runs), strict=True)]
+    told = [
+        run.told() | {"short": name}
+        for run, name in zip(runs, names([run.folder for run in runs]), strict=True)
+    ]
     return one_file.page("replay.html", {"runs": told, "kinds": KINDS})
-
-
-def names(runs: Sequence[Recorded]) -> list[str]:
-    """What tells the runs apart: their folders, without what those have in common."""
-    paths = [Path(run.folder).resolve() for run in runs]
-    if len({path.name for path in paths}) == len(paths):
-        return [path.name for path in paths]
-    common = os.path.commonpath(paths)
-    return [str(path.relative_to(common)) for path in paths]
 
 
 def require_written(path: Path) -> None:
@@ -48,4 +42,4 @@ def write(runs: Sequence[Recorded], path: Path) -> None:
     from hapticlink.orchestrator.view import animation  # with Matplotlib, slow to load
 
     with atomic_file(path) as unfinished:
-        animation.write(runs, names(runs), unfinished)
+        animation.write(runs, names([run.folder for run in runs]), unfinished)

@@ -1,0 +1,57 @@
+"""Draws the replays of results/view/: the animation of the README, and screenshots of a replay and of
+a report in a headless Chromium.
+
+`python docs/draw_replay.py`, with playwright and Debian's chromium installed.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+import hapticlink as hl
+from hapticlink.orchestrator.compare import page as report
+from hapticlink.orchestrator.results.whole_run import named
+from hapticlink.orchestrator.view import replay
+from hapticlink.orchestrator.view.recorded import Recorded
+
+OUT = Path(__file__).parents[1] / "results" / "view"
+RUNS = {"joint constraints rendered": True, "without them": False}
+"""By the name of its folder, whether a run has the topology controller."""
+SHOTS = {
+    "replay": ((1360, 820), "view.seek(1.9)"),
+    "overlay": ((1360, 820), "(view.seek(1.9), document.getElementById('layout').click())"),
+    "replay_narrow": ((400, 860), "view.seek(1.9)"),
+}
+"""By file, the window (px) and what is done in it."""
+
+
+def main() -> None:
+    with sync_playwright() as started, tempfile.TemporaryDirectory() as room:
+        folders = [Path(room) / name for name in RUNS]
+        for folder, topology in zip(folders, RUNS.values(), strict=True):
+            options = {"graphics.rate": 10, "controller.topology": topology}
+            hl.run("closed-loop", options, out=folder, figures=False)
+        runs = [Recorded(str(folder)) for folder in folders]
+        replay.write(runs, OUT / "topology.gif")
+        page = started.chromium.launch(
+            executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
+        ).new_page()
+        file = Path(room) / "page.html"
+        replay.write(runs, file)
+        for name, ((width, height), act) in SHOTS.items():
+            page.set_viewport_size({"width": width, "height": height})
+            page.goto(file.as_uri())
+            page.evaluate(act)
+            page.wait_for_timeout(300)
+            page.screenshot(path=OUT / f"{name}.png")
+        file.write_text(report.page(named(folders)), encoding="utf-8")
+        page.set_viewport_size({"width": 1100, "height": 1500})
+        page.goto(file.as_uri())
+        page.screenshot(path=OUT / "report.png")
+
+
+if __name__ == "__main__":
+    main()

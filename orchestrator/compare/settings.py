@@ -1,0 +1,45 @@
+"""What was set differently in the scenes of runs, by dotted keys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from hapticlink.orchestrator.results.tables import Results
+
+UNSET = "-"
+ABOUT = ("title", "description")
+"""Keys that change nothing in a run."""
+
+
+def differing(runs: Sequence[Results]) -> dict[str, tuple[str, ...]]:
+    """The keys of which the scenes have different values, with the value of each; entries of lists
+    of tables are named by their `name` or counted from 1."""
+    every = [dict(_leaves(run.run["scene"])) for run in runs]
+    keys = dict.fromkeys(key for leaves in every for key in leaves)
+    found = {key: tuple(leaves.get(key, UNSET) for leaves in every) for key in keys}
+    return {k: v for k, v in found.items() if len(set(v)) > 1 and k not in ABOUT}
+
+
+def other_scenes(runs: Sequence[Results]) -> str:
+    """A sentence where the runs are of scenes with other titles or mechanisms; "" where not."""
+    titles = dict.fromkeys(run.run["scene"]["title"] for run in runs)
+    if not one_mechanism(runs):
+        return f"different mechanisms: {'; '.join(titles)}"
+    return f"different scenes: {'; '.join(titles)}" if len(titles) > 1 else ""
+
+
+def one_mechanism(runs: Sequence[Results]) -> bool:
+    """Whether all runs are of the same linkage, so that their poses can be compared."""
+    return all(run.run["scene"]["linkage"] == runs[0].run["scene"]["linkage"] for run in runs)
+
+
+def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, str]]:
+    if isinstance(value, Mapping) and value:
+        for name, entry in value.items():
+            yield from _leaves(entry, f"{key}.{name}" if key else name)
+    elif isinstance(value, list) and value and all(isinstance(each, Mapping) for each in value):
+        for i, each in enumerate(value, 1):
+            yield from _leaves(each, f"{key}[{each.get('name') or i}]")
+    elif value not in (None, {}, []):
+        yield key, str(value).lower() if isinstance(value, bool) else str(value)
