@@ -1,5 +1,5 @@
 """Draws the start of each shipped scene and of the examples in own-linkage.md to
-docs/pictures/<scene>.png, and the blocks of closed-loop to docs/figures/blocks.png:
+docs/pictures/<scene>.png, and block diagrams to docs/figures/:
 
 python docs/draw_scenes.py
 """
@@ -40,16 +40,17 @@ def draw(scene: str | Path) -> Path:
     return path
 
 
-def blocks(scene: str) -> Path:
-    """Draws the block diagram of a scene, and returns the picture's path."""
+def blocks(scene: str, file: str) -> Path:
+    """Draws the block diagram of a scene to a file of FIGURES, and returns its path."""
     with built(hl.scene(scene)) as system:
         figure = block_diagram.figure(system, f"The blocks of {scene} and their signals")
-    figure.savefig(FIGURES / "blocks.png", dpi=90, **SAME)
-    return FIGURES / "blocks.png"
+    figure.savefig(FIGURES / file, dpi=90, **SAME)
+    return FIGURES / file
 
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         for scene in (*hl.shipped(), *examples(Path(folder))):
             print(draw(scene))
-    print(blocks("closed-loop"))
+    print(blocks("closed-loop", "blocks.png"))
+    print(blocks("virtual-wall", "blocks-of-a-wall.png"))
