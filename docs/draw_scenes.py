@@ -1,5 +1,5 @@
-"""Draws the mechanism of each shipped scene, and of the example in mechanisms.md, at its start, to
-docs/pictures/<scene>.png:
+"""Draws the start of each shipped scene and of the examples in own-linkage.md to
+docs/pictures/<scene>.png, and block diagrams to docs/figures/:
 
 python docs/draw_scenes.py
 """
@@ -8,25 +8,26 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import hapticlink as hl
 from hapticlink.orchestrator.commands.info import at_start, coordinates
-from hapticlink.orchestrator.results import mechanism_drawing
+from hapticlink.orchestrator.results import block_diagram, mechanism_drawing
 from hapticlink.orchestrator.system.built import built
 
-PAGE = Path(__file__).with_name("mechanisms.md")
-PICTURES = Path(__file__).with_name("pictures")
+PAGE = Path(__file__).with_name("own-linkage.md")
+PICTURES, FIGURES = (Path(__file__).with_name(name) for name in ("pictures", "figures"))
 DPI = 80
+SAME = {"metadata": {"Software": None}}  # the same bytes every time
 
 
-def example(folder: Path) -> Path:
-    """The scene file of the example, written to `folder`."""
-    found = re.search(r'```toml title="(.+?)"\n(.*?)```', PAGE.read_text("utf-8"), re.DOTALL)
-    assert found, f"{PAGE} has no example"
-    path = folder / found[1]
-    path.write_text(found[2], encoding="utf-8")
-    return path
+def examples(folder: Path) -> Iterator[Path]:
+    """The scene files of the page, written to `folder`."""
+    for name, text in re.findall(r'```toml title="(.+?)"\n(.*?)```', PAGE.read_text(), re.DOTALL):
+        path = folder / name
+        path.write_text(text, encoding="utf-8")
+        yield path
 
 
 def draw(scene: str | Path) -> Path:
@@ -34,14 +35,22 @@ def draw(scene: str | Path) -> Path:
     read = hl.scene(scene)
     with built(read) as system:
         q = coordinates(at_start(system))
-    PICTURES.mkdir(exist_ok=True)
     path = PICTURES / f"{Path(scene).stem}.png"
-    figure = mechanism_drawing.figure(read, q)
-    figure.savefig(path, dpi=DPI, metadata={"Software": None})  # the same bytes every time
+    mechanism_drawing.figure(read, q).savefig(path, dpi=DPI, **SAME)
     return path
+
+
+def blocks(scene: str, file: str) -> Path:
+    """Draws the block diagram of a scene to a file of FIGURES, and returns its path."""
+    with built(hl.scene(scene)) as system:
+        figure = block_diagram.figure(system, f"The blocks of {scene} and their signals")
+    figure.savefig(FIGURES / file, dpi=90, **SAME)
+    return FIGURES / file
 
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        for scene in (*hl.shipped(), example(Path(folder))):
+        for scene in (*hl.shipped(), *examples(Path(folder))):
             print(draw(scene))
+    print(blocks("closed-loop", "blocks.png"))
+    print(blocks("virtual-wall", "blocks-of-a-wall.png"))

@@ -73,6 +73,8 @@ def gallery() -> str:
                 picture = f"[![{name}](pictures/{name}.png)](scenes/{name}.md)"
                 rows.append(f"| [`{name}`](scenes/{name}.md) | {picture} | {shown} |")
         lines.append("\n".join(rows))
+    entries = "\n".join(f"scenes/{name}" for name in hl.shipped())
+    lines.append(f"```{{toctree}}\n:hidden:\n\n{entries}\n```")
     return "\n\n".join(lines) + "\n"
 
 

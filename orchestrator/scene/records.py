@@ -41,7 +41,7 @@ class ForeignFmu:
     replaces."""
     replaces: str | None = None
     """The block of the haptic loop whose place it takes, with the connections of the ports that
-    both have: [foreign FMUs](foreign-fmus.md#in-the-place-of-a-block)."""
+    both have: [foreign FMUs](swap-an-fmu.md)."""
     path: str | None = None
     """Its file, relative to the scene's file."""
     block: Annotated[str, BLOCKS.names()] | None = None

@@ -69,7 +69,7 @@ def at_haptic_rate(folder: Path, rows: Sequence[Row]) -> Iterator[str]:
     most = max(v for g in tracks for by in g.values() for c in by.values() if (v := c.value))
     yield fill(
         "No force crosses rates here; a held mobility modulates the power of the motors, by a few "
-        "mJ (docs/holds.md, The user's port). With the mechanism's own "
+        "mJ (docs/passivity.md, The user's port). With the mechanism's own "
         "matrices and Coriolis and centrifugal compensation on, the tracking error is at most "
         f"{short(most)} mm for every hold and rate; what the user feels is the coupling error, the "
         "distance of the handle from the continuous run. Holds with the smallest one by rate, "

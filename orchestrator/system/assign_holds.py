@@ -140,7 +140,7 @@ def misfit(
     if needs == "power" and not carries_power(c, power):
         return (
             f"it carries no power that is known: write a [[power]] that pairs the effort "
-            f"{c.target}.{c.target_port} with a displacement (docs/holds.md, Energy), or take "
+            f"{c.target}.{c.target_port} with a displacement (docs/passivity.md, Energy), or take "
             "another hold"
         )
     return None

@@ -62,9 +62,9 @@ def unfit(
 NOWHERE = {
     "spring": "no held connection sets a spring whose energy is known. One does in "
     "closed-loop-direct: its held poses are the set position of F_drift; [[spring]] declares "
-    "those of other FMUs (docs/holds.md, pspm)",
+    "those of other FMUs (docs/passivity.md, pspm)",
     "power": "no connection across rates carries power that is known. One does in "
-    "closed-loop-direct; [[power]] declares those of other FMUs (docs/holds.md, Energy)",
+    "closed-loop-direct; [[power]] declares those of other FMUs (docs/passivity.md, Energy)",
 }
 """Why a default hold fits no connection, by what it needs."""
 

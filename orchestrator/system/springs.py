@@ -37,7 +37,7 @@ def misfit(
     if found is None:
         return (
             f"it sets no spring whose energy is known: write a [[spring]] with {_end(c)} as its "
-            "set_position or set_velocity (docs/holds.md, pspm), or take another hold"
+            "set_position or set_velocity (docs/passivity.md, pspm), or take another hold"
         )
     fmu, _, name = found.position.partition(".")
     near = next((k for k in connections if _end(k) == found.position and not k.initial), None)

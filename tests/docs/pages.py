@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted(p for folder in (".", "docs", "results/*") for p in ROOT.glob(f"{folder}/*.md"))
-"""README, CHANGELOG, docs/ and the pages of results/."""
+PAGES = sorted(
+    p for folder in (".", "docs", "docs/scenes", "results/*") for p in ROOT.glob(f"{folder}/*.md")
+)
+"""README, CHANGELOG, docs/ with the pages of scenes, and the pages of results/."""
 _BLOCK = re.compile(r'^```(\w*)(?: title="(.+?)")?\n(.*?)^```', re.DOTALL | re.MULTILINE)
 
 

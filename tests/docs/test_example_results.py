@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 
@@ -24,7 +28,7 @@ def written(page: str, title: str, folder: Path) -> Path:
 def test_watt_s_linkage_draws_watt_s_curve(tmp_path: Path) -> None:
     """With levers b = 60 mm, pivots 2a apart and a coupler of 2c = 30 mm, in the frame of the
     pivots: (x^2 + y^2) (x^2 + y^2 - a^2 - b^2 + c^2)^2 + 4 a^2 y^2 (x^2 + y^2 - b^2) = 0."""
-    run = hl.run(written("docs/mechanisms.md", "watt.toml", tmp_path))
+    run = hl.run(written("docs/own-linkage.md", "watt.toml", tmp_path))
     assert run.fault is None
     x, y, theta = run["virtual_mechanism.x"].T
     a, b, c = np.hypot(0.06, 0.015), 0.06, 0.015
@@ -58,7 +62,7 @@ def test_the_handle_stays_within_5_mm() -> None:
 
 def test_an_own_controller_acts_as_the_scene_s_own_block(tmp_path: Path) -> None:
     """The FMU of pythonfmu and the block with the same law: the same to rounding."""
-    script = written("docs/foreign-fmus.md", "spring_coupling.py", tmp_path)
+    script = written("docs/swap-an-fmu.md", "spring_coupling.py", tmp_path)
     build = str(Path(sys.executable).with_name("pythonfmu"))
     command = [build, "build", "-f", script.name]
     subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
@@ -68,3 +72,34 @@ def test_an_own_controller_acts_as_the_scene_s_own_block(tmp_path: Path) -> None
     for signal in ("virtual_mechanism.x", "haptic_device.x_true", "controller.F_drift"):
         assert np.ptp(built_in[signal], axis=0).min() > 0
         np.testing.assert_allclose(own[signal], built_in[signal], rtol=1e-9, atol=1e-12)
+
+
+def test_a_program_in_c_plus_plus_gets_the_pose_of_our_own_run(tmp_path: Path) -> None:
+    """docs/drive.cpp, with the machine's compiler."""
+    compiler = shutil.which("c++")
+    if not compiler or sys.platform != "linux":
+        pytest.skip("needs Linux and a compiler of C++")
+    files = hl.build("five-bar", {"packaging": "native"}, out=tmp_path)
+    with zipfile.ZipFile(files["virtual_mechanism"]) as archive:
+        archive.extractall(tmp_path / "mechanism")
+    headers = Path(fmpy.__file__).with_name("c-code")
+    source, program = ROOT / "docs" / "drive.cpp", tmp_path / "drive"
+    command = [compiler, "-std=c++17", f"-I{headers}", str(source), "-o", str(program), "-ldl"]
+    subprocess.run(command, check=True)
+    said = subprocess.run([program], cwd=tmp_path, check=True, capture_output=True, text=True)
+    ours = hl.run("five-bar", {"hand.wrench": [0.5, 0.0, 0.0], "packaging": "native"})
+    assert [float(word) for word in said.stdout.split()] == ours["virtual_mechanism.x"][-1].tolist()
+
+
+def test_libcosim_reaches_the_pose_of_our_jacobi(tmp_path: Path) -> None:
+    """The script of docs/fmus-elsewhere.md; libcosim prints the last line."""
+    pytest.importorskip("libcosimpy")
+    page = ROOT / "docs" / "fmus-elsewhere.md"
+    (script,) = (b.text for b in blocks(page, "python") if "libcosimpy" in b.text)
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    printed = next(line for line in done.stdout.splitlines() if line.startswith("["))
+    options = {"coupling": "jacobi", "graphics.rate": 32, "duration": 1.0}
+    ours = hl.run("closed-loop", options)["virtual_mechanism.x"][-1].tolist()
+    assert json.loads(printed) == ours

@@ -1,28 +1,52 @@
-"""Every shipped scene is shown in docs/mechanisms.md."""
+"""Every shipped scene has a page with its picture; every page has pictures that are shown."""
 
 from __future__ import annotations
 
 import re
 
 import numpy as np
+import pytest
 from matplotlib.image import imread
 
 import hapticlink as hl
-from tests.docs.pages import ROOT, blocks
+from docs import make_scenes
+from tests.docs.pages import PAGES, ROOT, blocks, name, prose
 
-FOLDER = ROOT / "docs" / "pictures"
-PAGE = ROOT / "docs" / "mechanisms.md"
+DOCS = ROOT / "docs"
+FOLDERS = [DOCS / "pictures", DOCS / "figures"]
+IMAGE = re.compile(r"!\[.*?\]\((.+?)\)", re.DOTALL)
+TEXT_ALONE = {"index.md", "api.md", "ports.md", "scene-reference.md", "glossary.md", "errata.md"}
+"""Tables to look things up in."""
+
+
+def test_the_pages_of_scenes_are_those_of_their_files() -> None:
+    for path, text in make_scenes.pages().items():
+        assert path.read_text(encoding="utf-8") == text, "run `python docs/make_scenes.py`"
+    assert {p.stem for p in (DOCS / "scenes").iterdir()} == set(hl.shipped())
 
 
 def test_every_scene_has_its_picture() -> None:
-    """Those of the shipped scenes and of the page's example, and no others."""
-    (example,) = (b.title.removesuffix(".toml") for b in blocks(PAGE, "toml") if b.title)
-    shown = re.findall(r"\(pictures/([\w-]+)\.png\)", PAGE.read_text(encoding="utf-8"))
-    assert sorted(shown) == sorted([*hl.shipped(), example])
-    assert {p.name for p in FOLDER.iterdir()} == {f"{name}.png" for name in shown}
+    """Those of the shipped scenes and of the examples of own-linkage.md, and no others."""
+    examples = [b.title.removesuffix(".toml") for b in blocks(DOCS / "own-linkage.md", "toml")]
+    wanted = sorted([*hl.shipped(), *filter(None, examples)])
+    assert sorted(p.stem for p in FOLDERS[0].iterdir()) == wanted
+
+
+def test_every_picture_is_shown_on_a_page() -> None:
+    shown = {
+        (page.parent / link).resolve() for page in PAGES for link in IMAGE.findall(prose(page))
+    }
+    assert [p.name for folder in FOLDERS for p in folder.iterdir() if p not in shown] == []
+
+
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if p.is_relative_to(DOCS) and p.name not in TEXT_ALONE], ids=name
+)
+def test_every_page_has_a_picture(page) -> None:
+    assert IMAGE.search(prose(page))
 
 
 def test_pictures_are_small_and_not_empty() -> None:
-    for path in FOLDER.iterdir():
-        assert path.stat().st_size < 60_000, path
+    for path in (p for folder in FOLDERS for p in folder.iterdir()):
+        assert path.stat().st_size < 120_000, path
         assert np.ptp(imread(path)[..., :3]) > 0.9, path
