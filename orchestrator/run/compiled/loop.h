@@ -268,6 +268,7 @@ typedef struct {
     int64_t n_kinds, kind;
     int64_t tick, events;                 /* events that are complete */
     int64_t patience, since;              /* ns after which, and from when, Python gets a turn */
+    int64_t read, unread, stride;         /* the clock: when last, events since, and until next */
     Pace *pace;                           /* NULL: as fast as possible */
     At at;
 } Events;

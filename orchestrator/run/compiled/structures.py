@@ -173,7 +173,7 @@ class Events(ctypes.Structure):
         ("clocks", _POINTER),
         *_all(_INT, "n_clocks end"),
         *_all(_POINTER, "keys key kinds"),
-        *_all(_INT, "n_kinds kind tick events patience since"),
+        *_all(_INT, "n_kinds kind tick events patience since read unread stride"),
         ("pace", _POINTER),
         ("at", At),
     )
