@@ -159,7 +159,11 @@ typedef struct {
     Account *account;
     const Account *far;                   /* on the far side of the spring that it sets, or NULL */
     double *credit;                       /* where what that has put in belongs */
+    int64_t manifold, rows, rank;         /* of a matrix: its kind, its rows, a projector's rank */
+    double *scale;                        /* (2, rows) */
 } Hold;
+
+enum { NO_MATRIX, PROJECTOR, SEMIDEFINITE };
 
 enum {
     ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
@@ -325,6 +329,8 @@ int exception_left(void);
 double *hold_scratch(const Hold *h); /* (2, n) */
 int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
 int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+int manifold_push(Hold *h, const double *y);
+void manifold_value(const Hold *h, double *value);
 void tank_credit(Tank *t, double total);
 void tank_modulate(Tank *t, const Loop *l, int64_t tick);
 double tank_share(

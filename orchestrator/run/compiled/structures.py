@@ -114,6 +114,8 @@ class Hold(ctypes.Structure):
         *_all(_POINTER, "link tank"),
         ("row", _INT),
         *_all(_POINTER, "account far credit"),
+        *_all(_INT, "manifold rows rank"),
+        ("scale", _POINTER),
     )
 
 
