@@ -17,12 +17,13 @@ Matrices behind a hold that only returns samples (`gives_samples`) need none of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.symmetric import eigen
 
 Vector = NDArray[np.float64]
 
@@ -31,40 +32,66 @@ class Projector(Hold):
     """Wraps a hold: its values are orthogonal projectors with the rank of the newest sample."""
 
     def __init__(self, make: Callable[[], Hold], size: int) -> None:
-        self._make, self._n = make, math.isqrt(size)
-        self._hold, self._rank = make(), -1
+        self._make, self.n = make, math.isqrt(size)
+        self.hold, self._rank = make(), -1
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        rank = round(float(sample.reshape(self._n, self._n).trace()))
+        rank = round(_sum_in_order(sample[:: self.n + 1].tolist()))
         if rank != self._rank:
-            self._hold, self._rank = self._make(), rank
-        self._hold.push(stamp, sample, arrival)
+            self.hold, self._rank = self._make(), rank
+        self.hold.push(stamp, sample, arrival)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        extrapolated = self._hold.value(tick, ahead).reshape(self._n, self._n)
-        vectors = np.linalg.eigh((extrapolated + extrapolated.T) / 2)[1]
-        basis = vectors[:, self._n - self._rank :]
-        return (basis @ basis.T).ravel()
+        x = self.hold.value(tick, ahead).reshape(self.n, self.n)
+        values, vectors = eigen(((x + x.T) / 2).tolist())
+        # By how many it is preceded: larger ones, and as large ones with a lower index.
+        places = [sum(_before(values, other, k) for other in range(self.n)) for k in range(self.n)]
+        return _squared(
+            [[r for r, at in zip(row, places, strict=True) if at < self._rank] for row in vectors]
+        )
 
 
 class Semidefinite(Hold):
     """Wraps a hold: its values are symmetric positive semidefinite matrices."""
 
     def __init__(self, make: Callable[[], Hold], size: int) -> None:
-        self._n, self._hold = math.isqrt(size), make()
-        self._scale = np.ones(self._n)
+        self.n, self.hold = math.isqrt(size), make()
+        self._scale = np.ones(self.n)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        diagonal = np.sqrt(np.abs(sample.reshape(self._n, self._n).diagonal()))
+        diagonal = np.sqrt(np.abs(sample[:: self.n + 1]))
         self._scale = np.where(diagonal > 0.0, diagonal, 1.0)
-        self._hold.push(stamp, sample, arrival)
+        self.hold.push(stamp, sample, arrival)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        extrapolated = self._hold.value(tick, ahead).reshape(self._n, self._n)
+        x = self.hold.value(tick, ahead).reshape(self.n, self.n)
         outer = np.outer(self._scale, self._scale)
-        values, vectors = np.linalg.eigh((extrapolated + extrapolated.T) / (2 * outer))
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        return (root @ root.T * outer).ravel()
+        values, vectors = eigen(((x + x.T) / (2 * outer)).tolist())
+        roots = [math.sqrt(value if value > 0.0 else 0.0) for value in values]
+        return _squared(np.multiply(vectors, roots).tolist()) * outer.ravel()
+
+
+def _sum_in_order(values: Iterable[float]) -> float:
+    """The sum of values, one after the other; Python's `sum` compensates rounding errors since
+    3.12, and NumPy's takes another order."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total
+
+
+def _before(values: Sequence[float], i: int, k: int) -> bool:
+    return values[i] > values[k] or (values[i] == values[k] and i < k)
+
+
+def _squared(root: Sequence[Sequence[float]]) -> Vector:
+    """root root^T, in one row."""
+    products = (
+        _sum_in_order(x * y for x, y in zip(one, other, strict=True))
+        for one in root
+        for other in root
+    )
+    return np.fromiter(products, np.float64, len(root) ** 2)
 
 
 class Unwrapped(Hold):

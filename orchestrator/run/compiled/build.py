@@ -17,7 +17,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 SOURCES = (
     "loop.h", "loop.c", "events.c", "pace.c", "fmu_calls.c", "step_check.c", "meters.c", "holds.c",
-    "energy_account.c", "energy_tank.c", "platform.c", "python_errors.c",
+    "manifolds.c", "energy_account.c", "energy_tank.c", "platform.c", "python_errors.c",
 )  # fmt: skip
 # No contraction: a fused multiply-add rounds once where Python rounds twice.
 FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", "-g0", "-fvisibility=hidden", "-ffp-contract=off")

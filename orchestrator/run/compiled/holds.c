@@ -145,6 +145,12 @@ static void unwrap(Hold *h, double *y) {
     h->unwrapped = 1;
 }
 
+/* As if there had been no sample yet. */
+static void restart(Hold *h) {
+    h->count = h->arrival = h->span = h->interval = h->begun = 0;
+    memset(h->vectors, 0, 4 * h->n * sizeof *h->vectors);
+}
+
 static void push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     if (h->n_angles) {
         double *own = vector(h, 4);
@@ -152,6 +158,7 @@ static void push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
         unwrap(h, own);
         y = own;
     }
+    if (h->manifold && manifold_push(h, y)) restart(h);
     take(h, y, stamp, arrival);
 }
 
@@ -269,5 +276,6 @@ int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value
     case OBSERVED: account_value(h->account, l, tick, ahead, value); break;
     default: extrapolate(h, l, tick, ahead, value);
     }
+    if (h->manifold) manifold_value(h, value);
     return 0;
 }

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDeriv
 from hapticlink.orchestrator.holds.hermite import Hermite
 from hapticlink.orchestrator.holds.hold import Hold, Vector
 from hapticlink.orchestrator.holds.lead import Lead
-from hapticlink.orchestrator.holds.manifolds import Unwrapped
+from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.holds.mean import Mean
 from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
 from hapticlink.orchestrator.holds.passive import Passive
@@ -51,6 +51,7 @@ class Parts(NamedTuple):
 
     own: Hold
     angles: Unwrapped | None
+    matrix: Projector | Semidefinite | None
     link: Link | None
     further: Reader | None
     far: tuple[Account, Vector] | None
@@ -60,7 +61,7 @@ class Parts(NamedTuple):
 def parts(hold: Hold) -> Parts:
     """The parts of a hold that `make_hold` has made; `own` is a wrapper that has no C where one is
     left."""
-    further, link, angles, far = None, None, None, None
+    further, link, angles, matrix, far = None, None, None, None, None
     if isinstance(hold, WithFurther):
         further, far, hold = hold.further, hold.account, hold.hold
     if isinstance(hold, Late):
@@ -68,13 +69,19 @@ def parts(hold: Hold) -> Parts:
     if isinstance(hold, Unwrapped):
         angles = hold
         hold = hold.hold
-    return Parts(hold, angles, link, further, far)
+    elif isinstance(hold, Projector | Semidefinite):
+        matrix = hold
+        hold = hold.hold
+    return Parts(hold, angles, matrix, link, further, far)
 
 
 def can(hold: Hold, rolls_back: bool) -> bool:
-    """Whether there is C for a hold: not for classes of plugins, and not for samples in transit or
-    an energy account that a rollback takes back."""
+    """Whether there is C for a hold: not for classes of plugins, not for matrices whose hold needs
+    more than their samples, and not for samples in transit or an energy account that a rollback
+    takes back."""
     found = parts(hold)
+    if found.matrix and found.own.needs:
+        return False
     grows = found.link or isinstance(found.own, Account)
     return type(found.own) in KINDS and not (grows and rolls_back)
 
@@ -187,12 +194,14 @@ class CompiledHold(Hold, State):
         held: Vector,
         tank: CompiledTank | None = None,
     ) -> None:
-        self.own, angles, link, further, self.far = parts(hold)
+        self.own, angles, matrix, link, further, self.far = parts(hold)
         own = self.own
         n, (code, depth) = len(held), KINDS[type(own)]
         places = [*sources, *(further.where if further else ())]
         width, turned = len(places), len(angles.angles) if angles else 0
-        State.__init__(self, depth * width + 8 * n + turned + _words(structures.Hold))
+        rows = matrix.n if matrix else 0
+        words = depth * width + 8 * n + turned + 2 * rows
+        State.__init__(self, words + _words(structures.Hold))
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
         self._sources, self._further = np.array(places, np.intp), further
         self._held, self._tank = held, tank
@@ -204,6 +213,9 @@ class CompiledHold(Hold, State):
             self._angles = np.array(angles.angles, np.int64), np.array(angles.turn, np.float64)
             c.n_angles, c.last = turned, self.place(turned)
             c.angles, c.turns = (a.ctypes.data for a in self._angles)
+        if matrix:
+            c.manifold = 1 if isinstance(matrix, Projector) else 2
+            c.rows, c.rank, c.scale = rows, -1, self.place(2 * rows)
         self.link = None
         if link:
             self._link, self._late = link, np.zeros(DRAWN, np.int64)

@@ -46,18 +46,20 @@ static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
 /* CALL before the first row, and where the block is full. */
 static int record(const Loop *l, Table *t, int64_t tick) {
     if (!*t->room) return CALL;
+    const double time = tick_time(l, tick);
     if (*t->due && t->block) {
         if (*t->rows >= *t->room) return CALL;
         double *row = t->block + *t->rows * (1 + t->n);
-        row[0] = tick_time(l, tick);
+        row[0] = time;
         if (t->where)
             for (int64_t i = 0; i < t->n; i++) row[1 + i] = l->values[t->where[i]];
         else
             memcpy(row + 1, t->view, t->n * sizeof *row);
         ++*t->rows;
     }
-    *t->reached = tick_time(l, tick);
-    *t->due = ++*t->count % t->every == 0;
+    *t->reached = time;
+    ++*t->count;
+    *t->due = t->every == 1 || *t->count % t->every == 0;
     return 0;
 }
 

@@ -159,7 +159,11 @@ typedef struct {
     Account *account;
     const Account *far;                   /* on the far side of the spring that it sets, or NULL */
     double *credit;                       /* where what that has put in belongs */
+    int64_t manifold, rows, rank;         /* of a matrix: its kind, its rows, a projector's rank */
+    double *scale;                        /* (2, rows) */
 } Hold;
+
+enum { NO_MATRIX, PROJECTOR, SEMIDEFINITE };
 
 enum {
     ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
@@ -268,6 +272,7 @@ typedef struct {
     int64_t n_kinds, kind;
     int64_t tick, events;                 /* events that are complete */
     int64_t patience, since;              /* ns after which, and from when, Python gets a turn */
+    int64_t read, unread, stride;         /* the clock: when last, events since, and until next */
     Pace *pace;                           /* NULL: as fast as possible */
     At at;
 } Events;
@@ -324,6 +329,8 @@ int exception_left(void);
 double *hold_scratch(const Hold *h); /* (2, n) */
 int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
 int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+int manifold_push(Hold *h, const double *y);
+void manifold_value(const Hold *h, double *value);
 void tank_credit(Tank *t, double total);
 void tank_modulate(Tank *t, const Loop *l, int64_t tick);
 double tank_share(

@@ -114,6 +114,8 @@ class Hold(ctypes.Structure):
         *_all(_POINTER, "link tank"),
         ("row", _INT),
         *_all(_POINTER, "account far credit"),
+        *_all(_INT, "manifold rows rank"),
+        ("scale", _POINTER),
     )
 
 
@@ -173,7 +175,7 @@ class Events(ctypes.Structure):
         ("clocks", _POINTER),
         *_all(_INT, "n_clocks end"),
         *_all(_POINTER, "keys key kinds"),
-        *_all(_INT, "n_kinds kind tick events patience since"),
+        *_all(_INT, "n_kinds kind tick events patience since read unread stride"),
         ("pace", _POINTER),
         ("at", At),
     )

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.holds.manifolds import Unwrapped
+from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.holds import KINDS, CompiledHold, CompiledTank, parts
 from hapticlink.orchestrator.run.compiled.library import load
@@ -113,6 +113,52 @@ def test_holds_in_c_are_those_in_python(name: str, wrapped: str, seed: int) -> N
         later = tick + 7
         expected = np.array(pair.python.value(later, 1.5), copy=True)
         assert pair.compiled.value(later, 1.5).tobytes() == expected.tobytes()
+
+
+MATRICES = [*HOLDS.names(lambda kind: kind in KINDS and not kind.needs and not kind.gives_samples)]
+
+
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("wrap", [Projector, Semidefinite])
+@pytest.mark.parametrize("name", MATRICES)
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 5))
+def test_holds_of_matrices_in_c_are_those_in_python(
+    name: str, wrap: type[Projector | Semidefinite], late: bool, seed: int, rows: int
+) -> None:
+    generator = np.random.default_rng(seed)
+    size, latency = rows * rows, Latency(min=0.001, max=0.02, loss=0.2, seed=5)
+
+    def made() -> Hold:
+        hold = wrap(lambda: HOLDS[name](HoldContext(size, seconds)), size)
+        return Late(hold, Link(latency, Fraction(NUMERATOR, DENOMINATOR))) if late else hold
+
+    values, held = np.zeros(size), np.zeros(size)
+    loop = structures.Loop(values=values.ctypes.data, numerator=NUMERATOR, denominator=DENOMINATOR)
+    python, own = made(), made()
+    compiled = CompiledHold(load(), ctypes.addressof(loop), own, range(size), held)
+    tick, rank, saved = 0, rows, [hold.saved() for hold in (python, compiled)]
+    for step in range(60):
+        if generator.random() < 0.2:
+            rank = int(generator.integers(0, rows + 1))
+        root = generator.normal(size=(rows, rank)) * 10.0 ** generator.integers(-3, 4)
+        sample = root @ root.T
+        if wrap is Projector:
+            basis = np.linalg.qr(root)[0]
+            sample = basis @ basis.T
+        for hold in (python, compiled):
+            hold.push(tick, sample.ravel(), tick)
+        if step == 30 and not late:
+            saved = [hold.saved() for hold in (python, compiled)]
+        for ahead in (0.0, float(generator.integers(1, 40)) / 2):
+            expected = np.array(python.value(tick, ahead), copy=True)
+            assert compiled.value(tick, ahead).tobytes() == expected.tobytes()
+        tick += int(generator.integers(0, 30))
+    if not late:
+        for hold, state in zip((python, compiled), saved, strict=True):
+            hold.restore(state)
+        expected = np.array(python.value(tick + 7, 1.5), copy=True)
+        assert compiled.value(tick + 7, 1.5).tobytes() == expected.tobytes()
 
 
 LARGE = """
