@@ -1,5 +1,5 @@
-"""Draws the replays of results/view/: the animation of the README, and screenshots of a replay and of
-a report in a headless Chromium.
+"""Draws the replays of results/view/: the animation of the README, and screenshots of a replay and
+of a report in a headless Chromium.
 
 `python docs/draw_replay.py`, with playwright and Debian's chromium installed.
 """
