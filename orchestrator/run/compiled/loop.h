@@ -172,12 +172,12 @@ enum {
 
 /* --- meters, tables --------------------------------------------------------------------------- */
 
-/* The rows that meter.py adds up; counts: of stamps, ticks, efforts. */
+/* The rows of meter.py; counts: of stamps, ticks, efforts. */
 typedef struct {
     Reader source, held, x;
     int64_t *counts, *stamps, *ticks;
-    double *samples, *moves, *efforts;
-    int64_t room, full;                   /* of stamps and samples; of the others */
+    double *samples, *moves, *efforts, *totals;
+    int64_t room, full, least;            /* of stamps and samples; of the others; these at least */
 } Meter;
 
 /* Of `n` signals, at `where`, or side by side from `view` on where that is NULL, each `every`-th of

@@ -36,7 +36,7 @@ from hapticlink.orchestrator.run.compiled.holds import (
 )
 from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.structures import Op
-from hapticlink.orchestrator.run.energy.meter import Meter
+from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
 from hapticlink.orchestrator.run.parallel_steps import Finish
 from hapticlink.orchestrator.run.simulation import Call, Simulation
@@ -357,7 +357,8 @@ class Machine:
 def _fill_meter(c: structures.Meter, meter: Meter) -> None:
     c.stamps, c.samples = meter.stamps.ctypes.data, meter.samples.ctypes.data
     c.ticks, c.moves = meter.ticks.ctypes.data, meter.moves.ctypes.data
-    c.efforts, c.room, c.full = meter.efforts.ctypes.data, len(meter.stamps), meter.full
+    c.efforts, c.totals = meter.efforts.ctypes.data, meter.totals.ctypes.data
+    c.room, c.full, c.least = len(meter.stamps), meter.full, ROWS
 
 
 def _named(instruction: Instruction) -> str:

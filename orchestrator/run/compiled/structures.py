@@ -122,8 +122,8 @@ class Hold(ctypes.Structure):
 class Meter(ctypes.Structure):
     _fields_ = (
         *_all(Reader, "source held x"),
-        *_all(_POINTER, "counts stamps ticks samples moves efforts"),
-        *_all(_INT, "room full"),
+        *_all(_POINTER, "counts stamps ticks samples moves efforts totals"),
+        *_all(_INT, "room full least"),
     )
 
 

@@ -75,7 +75,7 @@ class Meter:
         self.ticks: NDArray[np.int64] = np.zeros(ROWS, np.int64)
         self.samples, self.moves = np.zeros((ROWS, n)), np.zeros((ROWS, n))
         self.efforts = np.zeros((ROWS, n))
-        self._work = self._ideal = self._peak = 0.0
+        self.totals = np.zeros(3)
         self.full = ROWS
 
     def sample(self, stamp: int) -> None:
@@ -147,20 +147,21 @@ class Meter:
         done = (efforts[:-1] + efforts[1:]) / 2 * np.diff(x_stamps, axis=0)
         ideal[1:] = _over_entries(done).cumsum()
         held = at(work)
+        total, total_ideal, peak = self.totals.tolist()
         return _Sums(
-            self._work + float(held[-1]),
-            self._work + float(work[row]),
-            self._ideal + float(ideal[-1]),
+            total + float(held[-1]),
+            total + float(work[row]),
+            total_ideal + float(ideal[-1]),
             sample,
             row,
-            max(self._peak, float((held - ideal).max()) + self._work - self._ideal),
+            max(peak, float((held - ideal).max()) + total - total_ideal),
         )
 
     def _fold(self) -> None:
         """Add rows to the sums and drop them; grow the arrays if a slow source still needs them."""
         if self.counts[0]:
             sums = self._sums()
-            self._work, self._ideal, self._peak = sums.work_at_row, sums.ideal, sums.peak
+            self.totals[:] = sums.work_at_row, sums.ideal, sums.peak
             for array in (self.stamps, self.samples):
                 array[: -sums.sample or None] = array[sums.sample :]
             for array in (self.ticks, self.moves, self.efforts):
