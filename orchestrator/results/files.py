@@ -95,7 +95,7 @@ class Recorder:
             return
         kept = self.block.rows[:filled]
         try:
-            self._write(kept.tobytes())
+            self._write(memoryview(kept).cast("B"))
         except OSError:
             for row in kept:
                 self._write(row.tobytes())
@@ -124,7 +124,7 @@ class Recorder:
         unfinished.unlink(missing_ok=True)
         return unfinished
 
-    def _write(self, content: bytes) -> None:
+    def _write(self, content: bytes | memoryview) -> None:
         """Write all of `content`; or nothing, raising OSError, where the disk is full."""
         assert self._file
         whole = os.fstat(self._file.fileno()).st_size
