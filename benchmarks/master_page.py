@@ -73,21 +73,21 @@ def write(
     lines = [
         "# Masters",
         "",
-        f"Times as long as the loop of hapticlink takes. {by_kind}.",
+        f"A step of a ring takes other masters this many times as long as hapticlink. {by_kind}.",
         "",
         f"![{title(times)}](masters.png)",
         "",
         "Rings of FMUs that pass on their inputs, y = u/2 + 1, with Jacobi coupling at one rate.",
         "hapticlink records every output; the others record nothing. `ctypes` is a loop in Python",
         "over the FMUs' functions with all arguments made before, `C loop` the same in C: what the",
-        "FMUs cost themselves. Each master runs each ring in processes of its own; the least of",
-        f"its rounds counts, all of which are in [rows.csv](rows.csv). Made by `{command}` on",
-        f"{machine}.",
+        "FMUs cost themselves. Each master runs each ring in processes of its own, whose processor",
+        "time is measured; the least of its rounds counts, which are all in [rows.csv](rows.csv).",
+        f"Made by `{command}` on {machine}.",
     ]
     for kind in kinds:
         lines += ["", f"## {TITLES[kind]}", "", "Microseconds per macro step:", ""]
         lines += table(times, kind)
-        lines += ["", "Start-up in s, imports included, FMUs in the cache:", ""]
+        lines += ["", "Start-up in s, interpreter and imports included, FMUs in the cache:", ""]
         lines += table(starts, kind, ".2g")
         lines += ["", "Largest memory of the process in MB:", "", *table(memory, kind, ".0f")]
     lines += ["", "## The closed loop", "", *closed(whole)]
@@ -149,7 +149,7 @@ def figure(path: Path, times: Best, kinds: Sequence[str]) -> None:
         ax.set_xticks([2, 4, 16, 64], ["2", "4", "16", "64"])
         ax.minorticks_off()
         ax.grid(alpha=0.3)
-    axes[0][0].set_ylabel("time per macro step, us")
+    axes[0][0].set_ylabel("processor time per macro step, us")
     handles, labels = axes[0][0].get_legend_handles_labels()
     panels.legend(handles, labels, ncols=len(labels), loc="lower center", frameon=False, fontsize=8)
     panels.suptitle(title(times))
