@@ -48,7 +48,7 @@ NOT_RUN = {
     "hapticlink bench master": "is long, and measures the machine",
     "hapticlink bench real-time": "takes a minute, and measures the machine",
     "hapticlink bench stress": "is long; its short form: tests/reference/test_stress.py",
-    "hapticlink report runs/closed-loop": "its run is shorter here, in a folder named so; replay.md",
+    "hapticlink report runs/closed-loop": "of a run that is shorter here, elsewhere; replay.md",
     "hapticlink compare runs/closed-loop "
     "runs/closed-loop,graphics.rate=10,controller.topology=false": "as its runs; replay.md",
     "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
