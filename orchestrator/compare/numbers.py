@@ -72,8 +72,7 @@ def _ran(run: Results) -> Iterator[tuple[str, str]]:
     yield "coupling", told.get("coupling", NONE)
     for name, hold in told["holds"].items():
         yield f"hold of {name}", hold
-    for name, version in told["versions"].items():
-        yield f"version of {name}", version
+    yield "versions", ", ".join(f"{name} {v}" for name, v in told["versions"].items())
 
 
 def _ended(run: Results) -> Iterator[tuple[str, str]]:
@@ -105,7 +104,7 @@ def _did(run: Results, until: float) -> Iterator[tuple[str, str]]:
         count = counted[0][counted[1]][counted[0]["time"] <= until + 1e-12]
         for number in np.unique(count):
             share = 100 * float((count == number).mean())
-            yield f"{number:.0f} constrained directions, share of samples (%)", short(share)
+            yield f"samples with {number:.0f} constrained directions (%)", short(share)
     off, frames = folded(run)
     if frames:
         yield "graphics copy folded, frames", f"{off} of {frames}"

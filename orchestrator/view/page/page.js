@@ -74,6 +74,7 @@ for (const what of ["step", "reset", "record"]) $(what).onclick = () => act(what
 document.addEventListener("keydown", (event) => {
   if (event.target.closest("input, select, button")) return;
   const button = { " ": "pause", ".": "step", r: "reset" }[event.key];
+  if (event.key === "f") stage.refit();
   if (button && !event.ctrlKey && !event.metaKey) { event.preventDefault(); $(button).click(); }
 });
 
