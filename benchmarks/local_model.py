@@ -106,7 +106,7 @@ def figure(path: Path, found: dict[tuple[str, int], tuple[np.ndarray, float]]) -
             axes.semilogy(np.arange(1, len(gap)) / 512, gap[1:], label=f"frames at {rate} Hz")
     axes.set(xlabel="time (s)", ylabel="distance from the own matrices (mm)", ylim=(1e-4, None))
     axes.set_title(
-        "The error hardly depends on the age of the matrices: it is the Coriolis terms left out",
+        "From 30 Hz on the error is that of the Coriolis terms, which are left out",
         fontsize="medium", wrap=True,
     )  # fmt: skip
     axes.grid(alpha=0.3)
