@@ -13,7 +13,7 @@ from pathlib import Path
 
 import hapticlink as hl
 from hapticlink.orchestrator.commands.info import at_start, coordinates
-from hapticlink.orchestrator.results import block_diagram, mechanism_drawing
+from hapticlink.orchestrator.results import block_diagram, mechanism_drawing, workspace
 from hapticlink.orchestrator.system.built import built
 
 PAGE = Path(__file__).with_name("own-linkage.md")
@@ -48,9 +48,21 @@ def blocks(scene: str, file: str) -> Path:
     return FIGURES / file
 
 
+def device(scene: str) -> Path:
+    """Draws the device of a scene in its workspace, and returns the picture's path."""
+    read = hl.scene(scene)
+    with built(read) as system:
+        start = at_start(system)
+    pose = [start[f"x[{i}]"] for i in (1, 2, 3)]
+    figure = workspace.draw(read.device, pose, f"Device and its workspace: {read.title}")
+    figure.savefig(FIGURES / "device.png", dpi=90, **SAME)
+    return FIGURES / "device.png"
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         for scene in (*hl.shipped(), *examples(Path(folder))):
             print(draw(scene))
+    print(device("closed-loop"))
     print(blocks("closed-loop", "blocks.png"))
     print(blocks("virtual-wall", "blocks-of-a-wall.png"))
