@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -159,10 +160,13 @@ class RealTime:
                         found[c.name] += [hold] if hold != present.hold else []
         return found
 
-    def rate(self, clock: str, rate: float) -> None:
+    def rate(self, clock: str, rate: float, jitter: float = 0.0, seed: int = 0) -> None:
         """Change the rate (Hz) of a clock other than the haptic one, such as `graphics`, from the
-        end of its current step on; steps then end on haptic ticks. Raises InputFault where an FMU
-        cannot vary its step, and for a rate that is not between 0 and the haptic one."""
+        end of its current step on; steps then end on haptic ticks. jitter: each ends up to half
+        this share of a period early or late, uniformly, drawn by numpy's PCG64 with the seed and
+        the step's number. Raises InputFault where an FMU cannot vary its step, for a rate that is
+        not between 0 and the haptic one, and for a jitter that leaves no haptic tick between two
+        ends."""
         timeline = self._simulation.system.timeline
         haptics, *others = timeline.clocks
         if clock not in [c.name for c in others]:
@@ -175,15 +179,21 @@ class RealTime:
         if period < haptics.longest:
             raise InputFault(f"rate of {clock} = {rate} Hz: give a rate up to that of the haptics")
         first, begun, tick = self._loop.previous(clock), self._loop.current(clock), haptics.longest
+        most = float(1 - tick / period)
+        if not 0 <= jitter <= most:
+            raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")
 
+        @lru_cache(maxsize=8)  # several events ask for the same point
         def at(i: int) -> int:
-            return (
-                (first, begun)[i] if i < 2 else math.ceil((begun + (i - 1) * period) / tick) * tick
-            )
+            if i < 2:
+                return (first, begun)[i]
+            drawn = np.random.default_rng((seed, i)).uniform(-0.5, 0.5) if jitter else 0.0
+            return math.ceil((begun + (i - 1 + Fraction(jitter * drawn)) * period) / tick) * tick
 
         count = max(math.ceil((timeline.end - begun) / period), 0) + 4
         self._loop.change_rate(clock, Frames(at, count, 1))
-        self._note(f"rate of {clock}: {rate:g} Hz")
+        drawn = f", jitter {jitter:g}, seed {seed}" if jitter else ""
+        self._note(f"rate of {clock}: {rate:g} Hz{drawn}")
 
     # --- time ---------------------------------------------------------------------------------
 

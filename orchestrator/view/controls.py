@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.api.real_time import RealTime
 from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.view import messages
 from hapticlink.orchestrator.view.scene import STIFFNESS
 
-GAINS = ("hand", "controller", "virtual_mechanism")
-"""FMUs whose tunable parameters are gains."""
+GAINS = ("hand", "controller")
+"""Blocks of a user whose tunable parameters are gains; those of the mechanism are, too."""
 OTHERS = ("length_scale", "target", "rank_tolerance")
 """Tunable parameters of theirs that are none."""
-TOPOLOGY = ("controller.k_j", "controller.b_j")
+TOPOLOGY = ("k_j", "b_j")
+"""The gains of the topology controller."""
 CLOCK = "graphics"
 
 
@@ -26,6 +28,7 @@ class Settings:
     """What was changed on the page, which a run that begins anew gets again."""
 
     rate: float | None = None
+    jitter: float = 0.0
     holds: dict[str, str] = field(default_factory=dict)
     delays: dict[str, float] = field(default_factory=dict)
     gains: dict[str, float] = field(default_factory=dict)
@@ -41,13 +44,13 @@ class Controls:
         self._holds = _holds(live)
         fmus = [f for f in live.system.fmus if f.clock == CLOCK]
         self._rate = live.scene.graphics.rate if live.scene.graphics and fmus else None
-        self._pulling = False
+        self._pulling = {user: False for user in users(live.scene)}
 
     def restore(self) -> None:
         """Apply the settings of the page to a run that has just begun."""
         s = self._settings
-        if s.rate is not None:
-            self._live.rate(CLOCK, s.rate)
+        if s.rate is not None or s.jitter:
+            self._change_rate(s.rate, s.jitter)
         for name in {*s.holds, *s.delays}:
             self._live.hold(name, s.holds.get(name), s.delays.get(name))
         for name in s.gains:
@@ -63,7 +66,8 @@ class Controls:
         return {
             "rate": None
             if self._rate is None
-            else {"value": s.rate or (float(self._rate) if fixed else None), "max": most},  # type: ignore[arg-type]
+            else {"value": s.rate or (float(self._rate) if fixed else None), "max": most}  # type: ignore[arg-type]
+            | {"jitter": s.jitter},
             "holds": [
                 {"connection": name, "hold": s.holds.get(name, choices[0]), "choices": choices}
                 | {"delay": s.delays.get(name, 0.0)}
@@ -74,18 +78,19 @@ class Controls:
                 | {"factor": s.gains.get(name, 1.0)}
                 for name, (value, units) in self._gains.items()
             ],
-            "topology": s.topology if all(name in self._gains for name in TOPOLOGY) else None,
+            "topology": s.topology if self._topology else None,
         }
 
     def apply(self, message: messages.Message) -> None:
         """Change the run. Raises InputFault where the message does not fit this scene; nothing is
         changed then."""
         match message:
-            case messages.Hand(at=at):
-                self._pull(at)
+            case messages.Hand(at=at, user=user):
+                self._pull(user, at)
             case messages.Rate(value=value):
-                self._live.rate(CLOCK, value)
-                self._settings.rate = value
+                self._change_rate(value, self._settings.jitter)
+            case messages.Jitter(value=value):
+                self._change_rate(self._settings.rate, value)
             case messages.Hold(connection=name, hold=hold):
                 self._require(name, self._holds)
                 self._live.hold(name, hold)
@@ -99,10 +104,10 @@ class Controls:
                 self._settings.gains[name] = factor
                 self._set(name)
             case messages.Topology(on=on):
-                for name in TOPOLOGY:
-                    self._require(name, self._gains)
+                if not self._topology:
+                    raise InputFault("this scene has no topology controller")
                 self._settings.topology = on
-                for name in TOPOLOGY:
+                for name in self._topology:
                     self._set(name)
 
     def fits(self, message: messages.Hold) -> bool:
@@ -117,27 +122,58 @@ class Controls:
         """Set a parameter to its multiple; the hand's stiffness acts while it pulls."""
         value, _ = self._gains[name]
         factor = self._settings.gains.get(name, 1.0)
-        if name in TOPOLOGY and not self._settings.topology:
+        if name in self._topology and not self._settings.topology:
             factor = 0.0
-        if name != "hand.stiffness" or self._pulling:
+        springs = {stiffness(user): pulling for user, pulling in self._pulling.items()}
+        if springs.get(name, True):
             self._live.set(name, factor * value)
 
-    def _pull(self, at: tuple[float, float] | None) -> None:
-        pulling = at is not None
+    def _change_rate(self, rate: float | None, jitter: float) -> None:
+        """Change the rate, that of the scene where it is None, with the jitter."""
+        if rate is None and not isinstance(self._rate, int | float):
+            raise InputFault("the rate varies in this scene: set the rate first")
+        self._live.rate(CLOCK, self._rate if rate is None else rate, jitter)  # type: ignore[arg-type]
+        self._settings.rate, self._settings.jitter = rate, jitter
+
+    def _pull(self, user: str, at: tuple[float, float] | None) -> None:
+        self._require(user, self._pulling)
         if at is not None:
-            self._live.set("hand.target", (*at, 0.0))
-        if pulling != self._pulling:
-            self._pulling = pulling
+            self._live.set(stiffness(user).replace("stiffness", "target"), (*at, 0.0))
+        pulling = at is not None
+        if pulling != self._pulling[user]:
+            self._pulling[user] = pulling
             if pulling:
-                self._set("hand.stiffness")
+                self._set(stiffness(user))
             else:
-                self._live.set("hand.stiffness", (0.0, 0.0, 0.0))
+                self._live.set(stiffness(user), (0.0, 0.0, 0.0))
+
+    @property
+    def _topology(self) -> list[str]:
+        """The gains of the topology controllers of all users."""
+        found = [name for name in self._gains if name.rpartition(".")[2] in TOPOLOGY]
+        return found if len(found) >= len(TOPOLOGY) else []
+
+
+def users(scene: Scene) -> tuple[str, ...]:
+    """The users of a scene by their points; the first one's name is empty."""
+    return ("", *scene.devices)
+
+
+def block(name: str, user: str) -> str:
+    """The FMU of a user, by its block."""
+    return f"{name}_{user}" if user else name
+
+
+def stiffness(user: str) -> str:
+    """The stiffness with which a user's mouse pulls."""
+    return f"{block('hand', user)}.stiffness"
 
 
 def _gains(live: RealTime) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
     """Values and units of the parameters that a page can scale, by their name."""
     found: dict[str, tuple[NDArray[np.float64], list[str]]] = {}
-    for fmu in (f for f in live.system.fmus if f.name in GAINS):
+    names = ["virtual_mechanism", *(block(b, user) for user in users(live.scene) for b in GAINS)]
+    for fmu in (live.system.fmu[name] for name in names if name in live.system.fmu):
         tunable = [
             s
             for s in fmu.description.scalars
@@ -147,8 +183,9 @@ def _gains(live: RealTime) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
             entries = fmu.description.port(port, "parameter")
             start = np.array([s.start for s in entries])
             found[f"{fmu.name}.{port}"] = start, [s.unit or "" for s in entries]
-    if "hand.stiffness" in found:
-        found["hand.stiffness"] = np.array(STIFFNESS), found["hand.stiffness"][1]
+    for name in (stiffness(user) for user in users(live.scene)):
+        if name in found:
+            found[name] = np.array(STIFFNESS), found[name][1]
     return found
 
 

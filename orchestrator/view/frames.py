@@ -14,21 +14,24 @@ from hapticlink.orchestrator.run.energy.meter import Energy
 SHOWN = {
     "q": ("virtual_mechanism.q",),
     "ghost": ("virtual_environment.q",),
-    "x": ("virtual_mechanism.x",),
-    "handle": ("haptic_device.x_true", "virtual_mechanism.x"),
-    "F_hand": ("hand.F",),
-    "F_drift": ("controller.F_drift",),
-    "F_constraint": ("controller.F_constraint",),
-    "F_env": ("virtual_mechanism.F_env",),
     "lambda": ("virtual_mechanism.lambda",),
     "closure_error": ("virtual_mechanism.closure_error",),
     "gap": ("virtual_mechanism.contact_gap",),
-    "n": ("virtual_environment.n_constraints", "virtual_mechanism.n_constraints"),
-    "P_c": ("virtual_environment.P_c", "virtual_mechanism.P_c"),
     "branch_ok": ("virtual_environment.branch_ok",),
-    "margin": ("haptic_device.workspace_margin",),
 }
 """By name in a frame, the output that it is, the first that the scene has."""
+OF_USER = {
+    "x": ("virtual_mechanism.{at}x",),
+    "handle": ("haptic_device{of}.x_true", "virtual_mechanism.{at}x"),
+    "F_hand": ("hand{of}.F",),
+    "F_drift": ("controller{of}.F_drift",),
+    "F_constraint": ("controller{of}.F_constraint",),
+    "F_env": ("virtual_mechanism.{at}F_env",),
+    "n": ("virtual_environment.{at}n_constraints", "virtual_mechanism.{at}n_constraints"),
+    "P_c": ("virtual_environment.{at}P_c", "virtual_mechanism.{at}P_c"),
+    "margin": ("haptic_device{of}.workspace_margin",),
+}
+"""The same of each user; what further ones have is in `others` of a frame, by their points."""
 PORT = "user's port"
 SELDOM = 5
 """Turns between two readings of energies and deadlines, which take longer."""
@@ -41,11 +44,8 @@ class Frames:
 
     def __init__(self, live: RealTime) -> None:
         fmus = live.system.fmu
-        self._outputs = {
-            key: next(name for name in names if _has(fmus, name))
-            for key, names in SHOWN.items()
-            if any(_has(fmus, name) for name in names)
-        }
+        self._outputs = _there(fmus, shown())
+        self._others = {user: _there(fmus, of_user(user)) for user in live.scene.devices}
         self._turns, self._start = 0, float(live["virtual_mechanism.energy"][0])
         self._past: deque[tuple[float, float, float]] = deque()
         self._slow: dict[str, Any] = {}
@@ -61,6 +61,11 @@ class Frames:
         else:
             self._slow = {}
         self._turns += 1
+        if self._others:
+            found["others"] = {
+                user: {k: live[name].tolist() for k, name in outputs.items()}
+                for user, outputs in self._others.items()
+            }
         return {"t": live.time} | found | self._slow
 
     def _energies(self, live: RealTime) -> dict[str, Any]:
@@ -78,9 +83,16 @@ class Frames:
 
     def _port(self, live: RealTime, booked: Mapping[str, Energy]) -> float:
         """The energy generated at the user's port, as results/user_port has it: what the mechanism
-        has stored beyond the work of the hands on the handle and on further points."""
-        handle = "haptic_device" if "haptic_device" in live.system.fmu else "virtual_mechanism"
-        hands = [n for n in booked if n.startswith("hand_") or n.startswith(f"hand.F -> {handle}.")]
+        has stored beyond the work of the hands on their handles and on further points."""
+        block = live.system.block
+        on = [live.system.connection[n] for n in booked]
+        handles = {c.source for c in on if block(c.target) == "haptic_device"}
+        hands = [
+            c.name
+            for c in on
+            if block(c.source) == "hand"
+            and (block(c.target) == "haptic_device" or c.source not in handles)
+        ]
         stored = float(live["virtual_mechanism.energy"][0]) - self._start
         return stored - sum(booked[name].held for name in hands)
 
@@ -91,6 +103,23 @@ def light(generated: float, put_in: float) -> str:
     amber from a tenth of that on; green otherwise."""
     most = max(put_in, 0.0) + FELT
     return "red" if generated > most else "amber" if generated > 0.1 * most else "green"
+
+
+def shown() -> dict[str, tuple[str, ...]]:
+    """What a frame shows of a scene and of its first user, without `others`."""
+    return SHOWN | of_user("")
+
+
+def of_user(user: str) -> dict[str, tuple[str, ...]]:
+    """What a frame shows of a user, whose name is that of the point, "" for the first one's."""
+    of, at = (f"_{user}", f"{user}.") if user else ("", "")
+    return {k: tuple(n.format(of=of, at=at) for n in names) for k, names in OF_USER.items()}
+
+
+def _there(fmus: Any, asked: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
+    """The first of the outputs that the scene has, by name in a frame."""
+    found = {k: [name for name in names if _has(fmus, name)] for k, names in asked.items()}
+    return {k: names[0] for k, names in found.items() if names}
 
 
 def _has(fmus: Any, name: str) -> bool:

@@ -17,11 +17,13 @@ MOST = 4096
 
 @dataclass(frozen=True)
 class Hand:
-    """The hand pulls to `at` (x, y m), or has let go."""
+    """The hand pulls to `at` (x, y m), or has let go; user: the point that it holds, "" for the
+    first user's."""
 
     __pydantic_config__ = STRICT
     type: Literal["hand"]
     at: tuple[Place, Place] | None
+    user: Name = ""
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,15 @@ class Rate:
     __pydantic_config__ = STRICT
     type: Literal["rate"]
     value: Annotated[Number, Field(gt=0, le=1e4)]
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """Share of the graphics period by which each may be shorter or longer."""
+
+    __pydantic_config__ = STRICT
+    type: Literal["jitter"]
+    value: Annotated[Number, Field(ge=0, le=0.9)]
 
 
 @dataclass(frozen=True)
@@ -81,7 +92,7 @@ class Time:
     do: Literal["pause", "resume", "step", "reset", "record"]
 
 
-Message = Hand | Rate | Hold | Delay | Gain | Topology | Time
+Message = Hand | Rate | Jitter | Hold | Delay | Gain | Topology | Time
 _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Discriminator("type")])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
@@ -18,31 +19,44 @@ from hapticlink.orchestrator.results.mechanism_geometry import geometry
 class Picture:
     """The picture of a scene; `shapes` are those of `mechanism_geometry`."""
 
-    def __init__(self, linkage: Linkage, device: Device | None, contacts: Contacts | None) -> None:
+    def __init__(
+        self,
+        linkage: Linkage,
+        device: Device | None,
+        contacts: Contacts | None,
+        others: Mapping[str, Device] | None = None,
+    ) -> None:
         self.shapes = geometry(linkage, contacts)
         self._names, self._poses = pose_function(linkage)
-        self._arms = link_function(device) if device else None
+        self._arms = {"": link_function(device)} if device else {}
+        self._arms |= {user: link_function(each) for user, each in (others or {}).items()}
 
     def drawn(self, frame: dict[str, Any]) -> dict[str, Any]:
-        """The frame with `poses`, `ghost` by body's name, `arms` of the device, and the constrained
-        `directions` in the plane, in place of coordinates and projector."""
-        shown = {k: v for k, v in frame.items() if k not in ("q", "ghost", "P_c")}
+        """The frame with `poses`, `ghost` by body's name, and of each user `arms` of the device and
+        the constrained `directions` in the plane, in place of coordinates and projector."""
+        shown = {k: v for k, v in self._of("", frame).items() if k not in ("q", "ghost")}
         for key, q in (("poses", frame["q"]), ("ghost", frame.get("ghost"))):
             if q is not None:
                 found = np.asarray(self._poses(q)).T.tolist()
                 shown[key] = dict(zip(self._names, found, strict=True))
-        if self._arms:
-            shown["arms"] = self.arms(frame["handle"])
-        if "P_c" in frame:
-            shown["directions"] = directions(frame["P_c"])
+        if others := frame.get("others"):
+            shown["others"] = {user: self._of(user, found) for user, found in others.items()}
         return shown
 
-    def arms(self, handle: list[float]) -> list[list[float] | None]:
-        """Base joint, elbow and crank end of each arm of the device at a pose of the handle; none
-        without a device."""
-        if not self._arms or not handle:
+    def _of(self, user: str, found: dict[str, Any]) -> dict[str, Any]:
+        shown = {k: v for k, v in found.items() if k != "P_c"}
+        if user in self._arms:
+            shown["arms"] = self.arms(found["handle"], user)
+        if "P_c" in found:
+            shown["directions"] = directions(found["P_c"])
+        return shown
+
+    def arms(self, handle: list[float], user: str = "") -> list[list[float] | None]:
+        """Base joint, elbow and crank end of each arm of a user's device at a pose of the handle;
+        none without a device."""
+        if user not in self._arms or not handle:
             return []
-        return _finite(np.asarray(self._arms(ca.DM(handle))).T.tolist())
+        return _finite(np.asarray(self._arms[user](ca.DM(handle))).T.tolist())
 
 
 def directions(P_c: list[float]) -> list[list[float]]:

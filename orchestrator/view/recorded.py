@@ -6,7 +6,7 @@ has its newest sample there, as the other blocks had it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,15 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.episodes import episodes
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-from hapticlink.orchestrator.results.tracking import of_any_shape, of_block, table_of
+from hapticlink.orchestrator.results.tracking import (
+    further_users,
+    of_any_shape,
+    of_block,
+    table_of,
+)
 from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.results.whole_run import load_whole, scene_part
-from hapticlink.orchestrator.view.frames import PORT, SHOWN
+from hapticlink.orchestrator.view.frames import PORT, of_user, shown
 from hapticlink.orchestrator.view.picture import Picture
 
 NEEDED = ("virtual_mechanism.q", "virtual_mechanism.x")
@@ -61,7 +66,9 @@ class Recorded:
         self.every = -(-len(times) // MOST)
         self.times: Vector = times[:: self.every]
         device = self.device if "handle" in self.signals else None
-        self.picture = Picture(linkage, device, self.contacts)
+        self.users = further_users(results)
+        others = scene_part(results, "devices", Mapping[str, Device]) if self.users else {}
+        self.picture = Picture(linkage, device, self.contacts, others)
 
     @property
     def period(self) -> float:
@@ -86,7 +93,7 @@ class Recorded:
         energy = np.interp(self.times, port.time_s, port.generated_J) if port else None
         made = []
         for i in range(len(self.times)):
-            frame = self.picture.drawn({key: found[i].tolist() for key, found in values.items()})
+            frame = self.picture.drawn(_by_user({k: v[i].tolist() for k, v in values.items()}))
             made.append(frame | ({} if energy is None else {"energy": {PORT: float(energy[i])}}))
         return made
 
@@ -104,9 +111,20 @@ class Recorded:
             "every": self.every,
             "missing": self.missing,
             "energies": [PORT],
+            "users": ["", *self.users],
             "frames": {key: _changes([frame.get(key) for frame in frames]) for key in keys},
             "episodes": [e._asdict() for e in episodes(self.results)],
         }
+
+
+def _by_user(values: dict[str, Any]) -> dict[str, Any]:
+    """A frame in which `user.name` is a name of that one in `others`."""
+    frame: dict[str, Any] = {}
+    for key, value in values.items():
+        user, _, name = key.rpartition(".")
+        of = frame.setdefault("others", {}).setdefault(user, {}) if user else frame
+        of[name] = value
+    return frame
 
 
 def newest(table: Table, times: Vector) -> NDArray[np.intp]:
@@ -119,7 +137,10 @@ def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
     scene has them. A signal that stands in for another one does so only where there is no other."""
     left_out = results.run.get("not_recorded", ())
     found, missing = dict[str, str](), list[str]()
-    for key, names in SHOWN.items():
+    asked = shown()
+    for user in further_users(results):
+        asked |= {f"{user}.{key}": names for key, names in of_user(user).items()}
+    for key, names in asked.items():
         for name in names:
             if name in left_out:
                 missing.append(name)

@@ -14,16 +14,17 @@ DURATION = 600.0
 
 
 def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scene:
-    """The scene with a spring hand that pulls nowhere yet, of compiled FMUs if the options say
-    nothing else, and without its end at the border of the workspace. Raises InputFault for a scene
-    without a linkage, or one that has an FMU of the user's in place of the hand."""
+    """The scene with a spring hand for each user that pulls nowhere yet, of compiled FMUs if the
+    options say nothing else, and without its end at the border of the workspace. Raises InputFault
+    for a scene without a linkage, or one that has an FMU of the user's in place of a hand."""
     read = open_scene.load(name, (*written({"packaging": "native"}), *written(options)))
     if read.linkage is None:
         raise InputFault(
             f"{name}: has no [linkage], so that there is nothing to take hold of; view shows "
             "mechanisms, for instance `hapticlink view closed-loop`"
         )
-    if any(fmu.replaces == "hand" for fmu in read.fmu):
+    hands = ("hand", *(f"hand_{user}" for user in read.devices))
+    if any(fmu.replaces in hands for fmu in read.fmu):
         raise InputFault(
             f"{name}: an FMU replaces the hand, which the mouse has to be: leave it out"
         )
@@ -35,6 +36,7 @@ def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scen
     }
     record = {"signals": "all"}  # what is not recorded is not read from its FMU
     changes: dict[str, object] = {"hand": hand, "duration": duration, "record": record}
+    changes |= {f"hands.{user}": hand for user in read.devices}
     if read.stop_when is None and read.ends_when:
         changes["stop_when"] = ""
     return open_scene.load(read, changes)

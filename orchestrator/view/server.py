@@ -47,12 +47,12 @@ HEADERS = {
 
 
 class Pages:
-    """All windows: each sees the same run; one at a time has hold of the handle."""
+    """All windows: each sees the same run; one at a time has hold of a user's handle."""
 
     def __init__(self, token: str, out: IO[bytes]) -> None:
         self._token, self._out = token, out
         self._windows: set[ServerConnection] = set()
-        self._holding: ServerConnection | None = None
+        self._holding: dict[str, ServerConnection | None] = {"": None}
         self._picture: Picture | None = None
         self._kept: dict[str, str] = {}
         self._files = {p.name: p for p in PAGE.iterdir() if p.suffix in TYPES}
@@ -65,6 +65,7 @@ class Pages:
         if kind == "scene":
             self._picture = Picture(*message.pop("picture"))
             message["shapes"] = self._picture.shapes
+            self._holding = {user: self._holding.get(user) for user in message["users"]}
         elif kind == "frame" and self._picture:
             message = self._picture.drawn(message)
         text = json.dumps(message)
@@ -105,15 +106,17 @@ class Pages:
             pass  # without a farewell, as where the browser was ended
         finally:
             self._windows.discard(connection)
-            if self._holding is connection:
-                self._holding = None
-                self._tell(messages.Hand("hand", None))
+            for user in [u for u, holder in self._holding.items() if holder is connection]:
+                self._holding[user] = None
+                self._tell(messages.Hand("hand", None, user))
 
     def _take(self, connection: ServerConnection, message: messages.Message) -> None:
         if isinstance(message, messages.Hand):
-            if self._holding not in (None, connection):
-                return  # another window has hold of it
-            self._holding = connection if message.at else None
+            if message.user not in self._holding:
+                raise ValueError(f"user: there is no {message.user!r}")
+            if self._holding[message.user] not in (None, connection):
+                raise ValueError("another window has hold of this handle")
+            self._holding[message.user] = connection if message.at else None
         self._tell(message)
 
     def _tell(self, message: messages.Message) -> None:

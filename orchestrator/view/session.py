@@ -14,7 +14,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.view import messages
-from hapticlink.orchestrator.view.controls import Controls, Settings
+from hapticlink.orchestrator.view.controls import Controls, Settings, users
 from hapticlink.orchestrator.view.frames import PORT, Frames
 from hapticlink.orchestrator.view.link import Link
 
@@ -96,7 +96,8 @@ class Session:
             {
                 "type": "scene",
                 "title": scene.title,
-                "picture": (scene.linkage, scene.device, scene.contacts),
+                "picture": (scene.linkage, scene.device, scene.contacts, scene.devices),
+                "users": [*users(scene)],
                 "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
                 "energies": [PORT, *live.energies()],
             }

@@ -5,7 +5,7 @@ const PER_NEWTON = 22, MOST = 170; // px
 const FORCES = [
   ["F_hand", "hand", "#b85c00"],
   ["F_constraint", "topology controller", "#aa3377"],
-  ["F_env", "contacts", "#cc3311"],
+  ["F_env", "contacts and others", "#cc3311"],
   ["lambda", "in the cut joints", "#228833"],
 ];
 
@@ -15,11 +15,9 @@ export class Arrows {
   draw(context, frame, shapes, toScreen, at) {
     if (this.shown !== shapes) this.begin(frame, shapes);
     for (const [key, , color] of FORCES) {
-      if (!frame[key]) continue;
-      const values = frame[key];
-      let size = Math.hypot(values[0], values[1]);
-      if (key === "lambda") {
-        size = 0;
+      let size = 0;
+      if (key === "lambda" && frame.lambda) {
+        const values = frame.lambda;
         shapes.loops.forEach((loop, i) => {
           const first = shapes.rows[i], across = loop.type !== "revolute" && frame.poses[loop.second[0]][2] + loop.axis;
           // That of a slot or a prismatic joint is along its normal; a moment has no arrow.
@@ -28,7 +26,12 @@ export class Arrows {
           size = Math.max(size, Math.hypot(...force));
           arrow(context, at(...loop.at), force, color);
         });
-      } else arrow(context, toScreen(key === "F_env" ? frame.x : frame.handle ?? frame.x), values, color);
+      }
+      for (const user of key === "lambda" ? [] : [frame, ...Object.values(frame.others ?? {})]) {
+        if (!user[key]) continue;
+        size = Math.max(size, Math.hypot(user[key][0], user[key][1]));
+        arrow(context, toScreen(key === "F_env" ? user.x : user.handle ?? user.x), user[key], color);
+      }
       this.values[key].textContent = text(size, "N");
     }
   }

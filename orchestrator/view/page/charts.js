@@ -3,11 +3,12 @@ import { fitted, text } from "./canvas.js";
 
 const SPAN = 10, LEFT = 44, COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee"];
 const size = (v) => v && Math.hypot(v[0], v[1]);
+// Series of every user are read from what a frame has of that one.
 const CHARTS = [
-  { title: "tracking error", unit: "mm", series: { error: (f) => f.arms && 1e3 * Math.hypot(f.x[0] - f.handle[0], f.x[1] - f.handle[1]) } },
-  { title: "force", unit: "N", colors: ["#b85c00", "#aa3377", "#cc3311"], series: { hand: (f) => size(f.F_hand), topology: (f) => size(f.F_constraint), contacts: (f) => size(f.F_env) } },
+  { title: "tracking error", unit: "mm", each: { error: (u) => u.arms && 1e3 * Math.hypot(u.x[0] - u.handle[0], u.x[1] - u.handle[1]) } },
+  { title: "force", unit: "N", colors: ["#b85c00", "#aa3377", "#cc3311", "#4477aa", "#66ccee", "#228833"], each: { hand: (u) => size(u.F_hand), topology: (u) => size(u.F_constraint), others: (u) => size(u.F_env) } },
   { title: "closure error", unit: "m", series: { gap: (f) => f.closure_error?.[0] } },
-  { title: "constrained directions", unit: "count", series: { number: (f) => f.n?.[0] } },
+  { title: "constrained directions", unit: "count", each: { number: (u) => u.n?.[0] } },
   { title: "energy generated", unit: "mJ", energies: true },
   { title: "deadlines missed", unit: "count", series: { missed: (f) => f.missed } },
 ];
@@ -18,8 +19,11 @@ export class Charts {
     this.charts = [];
   }
 
-  begin(energies, runs = 1) {
-    this.charts = CHARTS.map((chart) => new Chart(chart, energies, runs));
+  begin(energies, users, runs = 1) {
+    this.charts = CHARTS.map((chart) => {
+      const series = chart.series ?? ofUsers(chart.each, users);
+      return new Chart({ ...chart, series }, energies, runs);
+    });
     this.host.replaceChildren(...this.charts.map((chart) => chart.figure));
   }
 
@@ -34,6 +38,16 @@ export class Charts {
     if (!(target instanceof HTMLCanvasElement)) return null;
     return from + ((to - from) * (offsetX - LEFT)) / (target.clientWidth - LEFT - 2);
   }
+}
+
+// The series of each user, named by the user where there are several.
+function ofUsers(each, users) {
+  const of = (frame, user) => (user ? frame.others?.[user] : frame);
+  const read = (user) => Object.entries(each ?? {}).map(([name, value]) => [
+    user ? `${user}: ${name}` : name,
+    (frame) => of(frame, user) && value(of(frame, user)),
+  ]);
+  return Object.fromEntries(users.flatMap(read));
 }
 
 // The user's port, or what is held by a connection, and where.

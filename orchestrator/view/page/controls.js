@@ -8,7 +8,12 @@ const NAMES = {
   "controller.K_d": "Desired stiffness", "controller.B_d": "Desired damping",
   "virtual_mechanism.k_contact": "Contact: stiffness", "virtual_mechanism.b_contact": "Contact: damping",
 };
-const named = (connection) => connection.split(" -> ")[0].split(".")[1];
+const named = (connection) => connection.split(" -> ")[0].split(".").slice(1).join(" ");
+// A gain's name, and the user's where it is of a further one: hand_left.damping.
+const titled = (gain) => {
+  const [, fmu, user, port] = gain.match(/^(hand|controller)_(\w+)\.(.+)$/) ?? [];
+  return fmu ? `${user}: ${titled(`${fmu}.${port}`)}` : NAMES[gain] ?? gain;
+};
 
 export class Controls {
   constructor(host, send) {
@@ -33,6 +38,8 @@ export class Controls {
       this.slider("rate", "Rate", 0, Math.log10(Math.min(found.rate.max, 200)), 0.01,
         (s) => ({ type: "rate", value: Math.round(10 ** s * 10) / 10 }),
         (f) => (f.rate.value ? [Math.log10(f.rate.value), text(f.rate.value, "Hz")] : [0, "varying"]));
+      this.slider("jitter", "Jitter", 0, 90, 5, (share) => ({ type: "jitter", value: share / 100 }),
+        (f) => [100 * f.rate.jitter, `${(100 * f.rate.jitter).toFixed(0)} % of a period`]);
     }
     if (found.topology !== null) {
       this.group("Controller");
@@ -50,7 +57,7 @@ export class Controls {
     found.gains.forEach((gain, i) => {
       if (!i) this.group("Gains");
       // 0 at the left end, then 0.1 to 10 times the scene's value.
-      this.slider(gain.name, NAMES[gain.name] ?? gain.name, -1.05, 1, 0.05,
+      this.slider(gain.name, titled(gain.name), -1.05, 1, 0.05,
         (s) => ({ type: "gain", name: gain.name, factor: s < -1 ? 0 : 10 ** s }),
         (f) => {
           const { factor, value, units } = f.gains[i];

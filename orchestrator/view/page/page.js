@@ -4,7 +4,7 @@ import { Controls } from "./controls.js";
 import { Stage } from "./stage.js";
 
 const $ = (id) => document.getElementById(id);
-const stage = new Stage($("scene"), $("legend"), (at) => send({ type: "hand", at }));
+const stage = new Stage($("scene"), $("legend"), (at, user) => send({ type: "hand", at, user }));
 const charts = new Charts($("charts"));
 const controls = new Controls($("controls"), send);
 const view = { frame: null, state: {}, frames: 0, refused: null, stage };
@@ -19,7 +19,7 @@ const HANDLERS = {
   scene(message) {
     document.title = $("title").textContent = message.title;
     stage.begin(message.shapes);
-    charts.begin(message.energies);
+    charts.begin(message.energies, message.users);
     view.frame = null;
   },
   controls: (message) => controls.show(message),

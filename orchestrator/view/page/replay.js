@@ -113,7 +113,7 @@ function begin() {
   document.title = $("title").textContent = [...new Set(recordings.map((r) => r.title))].join(" and ");
   $("slider").max = end;
   $("speed").append(...SPEEDS.map((s) => new Option(`${s}×`, s, s === 1, s === 1)));
-  charts.begin(recordings[0].energies, recordings.length);
+  charts.begin(recordings[0].energies, recordings[0].users, recordings.length);
   recordings.forEach((recording, k) => {
     for (let i = 0; i < recording.times.length; i++) charts.add(recording.frame(i), k, Infinity);
   });

@@ -1,4 +1,5 @@
-// The mechanism on its canvas, and the pointer that pulls the handle where `pull` is given.
+// The mechanism on its canvas, and where `pull` is given the pointers that pull the handles: each
+// that of the user whose handle is nearest when it is pressed.
 import { fitted } from "./canvas.js";
 import { Arrows } from "./arrows.js";
 import { drawBody, drawClosure, drawGhost, drawJoint, drawObstacles, drawSpring } from "./shapes.js";
@@ -12,36 +13,36 @@ export class Stage {
   constructor(canvas, legend, pull) {
     this.canvas = canvas;
     this.arrows = new Arrows(legend);
-    this.target = null;
+    this.pulls = new Map(); // by pointer: the user, the target, and when it was sent
     this.limits = null;
     this.bounds = null; // the part of the plane to show, in place of what the first frame has
-    let sent = 0;
     const at = (event) => {
       const box = canvas.getBoundingClientRect();
       return this.toWorld(event.clientX - box.left, event.clientY - box.top);
     };
-    const hold = (event) => {
-      this.target = at(event);
-      canvas.classList.add("held");
-      pull(this.target);
-    };
-    const release = () => {
-      if (!this.target) return;
-      this.target = null;
-      canvas.classList.remove("held");
-      pull(null);
+    const release = ({ pointerId }) => {
+      const held = this.pulls.get(pointerId);
+      if (!held) return;
+      this.pulls.delete(pointerId);
+      canvas.classList.toggle("held", this.pulls.size > 0);
+      pull(null, held.user);
     };
     if (pull) canvas.addEventListener("pointerdown", (event) => {
       if (!this.limits || event.button) return;
+      const target = at(event), user = this.nearest(target);
+      if (user === undefined) return;
       canvas.setPointerCapture(event.pointerId);
-      hold(event);
+      this.pulls.set(event.pointerId, { user, target, sent: event.timeStamp });
+      canvas.classList.add("held");
+      pull(target, user);
     });
     canvas.addEventListener("pointermove", (event) => {
-      if (!this.target) return;
-      this.target = at(event);
-      if (event.timeStamp - sent < 8) return;
-      sent = event.timeStamp;
-      pull(this.target);
+      const held = this.pulls.get(event.pointerId);
+      if (!held) return;
+      held.target = at(event);
+      if (event.timeStamp - held.sent < 8) return;
+      held.sent = event.timeStamp;
+      pull(held.target, held.user);
     });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
@@ -55,15 +56,24 @@ export class Stage {
   begin(shapes) {
     this.shapes = shapes;
     this.limits = null;
-    this.target = null;
+    this.pulls.clear();
     this.canvas.classList.remove("held");
   }
 
   refit() { this.limits = null; }
 
+  // The user whose handle is nearest to a place, of those that no pointer here pulls.
+  nearest([x, y]) {
+    const pulled = [...this.pulls.values()].map((held) => held.user);
+    const free = users(this.frame).filter(([name]) => !pulled.includes(name));
+    const apart = ([, { handle }]) => Math.hypot(handle[0] - x, handle[1] - y);
+    return free.sort((a, b) => apart(a) - apart(b))[0]?.[0];
+  }
+
   // The part of the plane that is shown (m): all that the first frame has, with a margin.
   frameLimits(frame, open = 0.45) {
-    const points = [(frame.handle ?? frame.x).slice(0, 2), ...this.shapes.enclosure, ...this.shapes.polygons.flat()];
+    const handles = users(frame).map(([, user]) => (user.handle ?? user.x).slice(0, 2));
+    const points = [...handles, ...this.shapes.enclosure, ...this.shapes.polygons.flat()];
     for (const [[x, y], r] of this.shapes.discs) points.push([x - r, y - r], [x + r, y + r]);
     for (const body of this.shapes.bodies) {
       for (const at of [...body.outline, ...body.shape]) points.push(place(frame.poses, body.name, at));
@@ -86,6 +96,7 @@ export class Stage {
 
   // `others` are runs in the same picture: shapes, frame and color of each.
   draw(frame, others = []) {
+    this.frame = frame;
     const { context, width, height } = fitted(this.canvas);
     this.limits ??= this.bounds ?? this.frameLimits(frame);
     this.fit(width, height);
@@ -93,8 +104,11 @@ export class Stage {
     const at = on(frame.poses);
     context.lineJoin = context.lineCap = "round";
     drawObstacles(context, shapes, this.toScreen, this.scale);
-    this.drawArms(context, frame.arms, marked(frame, "saturated") ? SATURATED : ARMS);
-    this.drawDirections(context, frame, width + height);
+    const arms = marked(frame, "saturated") ? SATURATED : ARMS;
+    for (const [name, user] of users(frame)) {
+      this.drawArms(context, user.arms, name ? ARMS : arms);
+      this.drawDirections(context, user, width + height);
+    }
     for (const body of shapes.bodies) drawBody(context, body, at);
     for (const spring of shapes.springs) drawSpring(context, at(...spring[0]), at(...spring[1]));
     for (const joint of shapes.joints) drawJoint(context, joint, at, frame.poses);
@@ -102,7 +116,7 @@ export class Stage {
     const folded = frame.branch_ok?.[0] === 0;
     if (frame.ghost) for (const body of shapes.bodies) drawGhost(context, body, on(frame.ghost), folded ? HANDLE : GHOST);
     for (const other of others) this.drawOther(context, other, on(other.frame.poses));
-    this.drawHandle(context, frame, HANDLE);
+    for (const [name, user] of users(frame)) this.drawHandle(context, user, HANDLE, name);
     this.arrows.draw(context, frame, shapes, this.toScreen, at);
     this.drawScale(context, height);
   }
@@ -124,14 +138,14 @@ export class Stage {
     }
   }
 
-  drawDirections(context, frame, reach) {
-    if (!frame.directions?.length) return;
-    const [x, y] = this.toScreen(frame.x);
+  drawDirections(context, user, reach) {
+    if (!user.directions?.length) return;
+    const [x, y] = this.toScreen(user.x);
     context.save();
     context.strokeStyle = "#aa337788";
     context.lineWidth = 1.5;
     context.setLineDash([2, 5]);
-    for (const [dx, dy] of frame.directions) {
+    for (const [dx, dy] of user.directions) {
       context.beginPath();
       context.moveTo(x - reach * dx, y + reach * dy);
       context.lineTo(x + reach * dx, y - reach * dy);
@@ -140,10 +154,11 @@ export class Stage {
     context.restore();
   }
 
-  drawHandle(context, frame, color) {
-    const handle = this.toScreen(frame.handle ?? frame.x), [x, y] = this.toScreen(frame.x);
-    if (this.target) {
-      const target = this.toScreen(this.target);
+  drawHandle(context, user, color, name) {
+    const handle = this.toScreen(user.handle ?? user.x), [x, y] = this.toScreen(user.x);
+    const held = [...this.pulls.values()].find((pull) => pull.user === name);
+    if (held) {
+      const target = this.toScreen(held.target);
       drawSpring(context, handle, target, HAND);
       context.beginPath();
       context.arc(...target, 4, 0, 7);
@@ -155,10 +170,10 @@ export class Stage {
     context.beginPath();
     for (const s of [-1, 1]) { context.moveTo(x - 5, y - 5 * s); context.lineTo(x + 5, y + 5 * s); }
     context.stroke();
-    if (!frame.handle) return;
+    if (!user.handle) return;
     context.beginPath();
     context.arc(...handle, 9, 0, 7);
-    if (marked(frame, "energy")) {
+    if (marked(user, "energy")) {
       context.fillStyle = GENERATED;
       context.fill();
     }
@@ -179,6 +194,9 @@ export class Stage {
     context.fillText(`${+(length * 1e3).toPrecision(3)} mm`, 14, height - 24);
   }
 }
+
+// The users of a frame: name of the point ("" for the first one's), and what the frame has of them.
+export const users = (frame) => [["", frame], ...Object.entries(frame.others ?? {})];
 
 // The place in the world (m) of a point of a body.
 export function place(poses, body, [px, py]) {

@@ -105,6 +105,7 @@ def test_an_input_of_an_fmu_beside_the_loop_is_set_before_its_next_step(tmp_path
         (lambda live: live.hold("hand.F", "foh"), "connection with a hold"),
         (lambda live: live.rate("haptics", 100.0), "clock 'haptics'"),
         (lambda live: live.rate("graphics", 600.0), "up to that of the haptics"),
+        (lambda live: live.rate("graphics", 256.0, 0.6), "at 256 Hz give 0 to 0.5"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_and_changes_nothing(change: Turn, said: str) -> None:
@@ -142,6 +143,22 @@ def test_a_rate_is_changed_from_the_end_of_the_step_on() -> None:
     want = [*(k / 32 for k in range(4)), *(k / 64 for k in range(8, 20))]
     assert made.graphics["time"].tolist() == want
     assert made.run["real_time"]["samples"]["graphics"]["late"] == 0
+
+
+def test_jitter_moves_each_end_by_up_to_half_its_share_of_a_period() -> None:
+    """Around the ends of a steady rate, on ticks, without drift; a seed gives the same again."""
+    ends = {}
+    for seed in (0, 0, 1):
+        change = once(0.1, lambda live, s=seed: live.rate("graphics", 20.0, 0.5, s))
+        made = ran("closed-loop", change, "duration=4.0", "graphics.rate=32")
+        time = made.graphics["time"]
+        off = 20 * (time[5:] - time[4] - np.arange(1, len(time) - 4) / 20)
+        assert np.abs(off).max() < 0.25 + 20 / 512
+        assert 0.12 < off.std() < 0.17  # uniform: 0.5 / sqrt(12) = 0.144
+        assert np.array_equal(time * 512, np.round(time * 512))
+        assert ends.setdefault(seed, time.tolist()) == time.tolist()
+        assert "jitter 0.5" in made.run["real_time"]["changes"][0][1]
+    assert ends[0] != ends[1]
 
 
 def test_time_stands_still_in_a_pause_and_goes_on_by_steps() -> None:

@@ -32,11 +32,11 @@ Condition = Callable[[dict[str, Any]], object]
 
 
 class Served:
-    """`hapticlink view` of SCENE in a folder."""
+    """`hapticlink view` of a scene, by default of SCENE, in a folder."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
+    def __init__(self, folder: Path, *arguments: str, scene: str = "scene.toml") -> None:
         (folder / "scene.toml").write_text(SCENE)
-        command = [sys.executable, "-m", "hapticlink.orchestrator", "view", "scene.toml"]
+        command = [sys.executable, "-m", "hapticlink.orchestrator", "view", scene]
         self.process = subprocess.Popen(
             [*command, "--no-browser", "--port", "0", "--out", "made", *arguments],
             cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,

@@ -18,6 +18,8 @@ from hapticlink.orchestrator.view.scene import viewed
 
 def test_a_pull_is_read() -> None:
     assert parse('{"type": "hand", "at": [0.1, -0.2]}') == Hand("hand", (0.1, -0.2))
+    other = '{"type": "hand", "at": null, "user": "left"}'
+    assert parse(other) == Hand("hand", None, "left")
 
 
 @pytest.mark.parametrize(
@@ -37,6 +39,8 @@ def test_a_pull_is_read() -> None:
         '{"type": "hand", "at": [0.1, NaN]}',
         '{"type": "hand", "at": [0.1, 1e999]}',
         '{"type": "hand", "at": [0.1, 0.2], "more": 1}',
+        '{"type": "hand", "at": null, "user": 1}',
+        '{"type": "jitter", "value": 1.0}',
         '{"type": "rate", "value": 0}',
         '{"type": "rate", "value": -3}',
         '{"type": "rate", "value": true}',
@@ -89,4 +93,6 @@ def test_the_mouse_takes_the_place_of_the_hand() -> None:
     assert scene.hand.type == "spring"
     assert scene.hands["left"].type == "arm"
     assert scene.packaging == "native"
+    two = viewed("two-users")
+    assert two.hands["left"] == two.hand
     assert viewed("closed-loop", ["packaging=python"]).packaging == "python"
