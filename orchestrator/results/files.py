@@ -95,7 +95,7 @@ class Recorder:
             return
         kept = self.block.rows[:filled]
         try:
-            self._write(memoryview(kept).cast("B"))
+            self._write(kept.data.cast("B"))
         except OSError:
             for row in kept:
                 self._write(row.tobytes())
