@@ -18,6 +18,8 @@ BENCHES = {
     "singular": "benchmarks.singular:bench",
     "local-model": "benchmarks.local_model:bench",
     "master": "benchmarks.master:bench",
+    "cosimulation": "benchmarks.cosimulation:bench",
+    "skip": "benchmarks.skip:bench",
     "real-time": "benchmarks.real_time:bench",
     "stress": "benchmarks.stress:bench",
 }
@@ -26,7 +28,16 @@ FOLDERS = {"stress": "stability"}
 
 
 def bench(
-    what: Literal["mechanism", "singular", "local-model", "master", "real-time", "stress"],
+    what: Literal[
+        "mechanism",
+        "singular",
+        "local-model",
+        "master",
+        "cosimulation",
+        "skip",
+        "real-time",
+        "stress",
+    ],
     /,
     *,
     out: Out = None,
@@ -34,8 +45,9 @@ def bench(
 ) -> int:
     """Benchmark the mechanism: run time against error, with the multibody codes that are installed;
     errors over many rates on motions through singular poses; cost and error of the local model; the
-    event loop, with the masters that are installed; deadlines missed in real time; and stress: hard
-    scenes at the edge of stability and beyond it, each with the outcome that it has to have.
+    event loop, with the masters that are installed; run time against error of whole
+    co-simulations; what skipping the unneeded saves; deadlines missed in real time; and stress:
+    hard scenes at the edge of stability and beyond it, each with the outcome that it has to have.
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
