@@ -28,6 +28,7 @@ from hapticlink.components.dynamics.closed_loop_solver import TINY, ClosedLoopSo
 TOLERANCE = 1e-9
 MU = 1e-13  # replaces the pivot of a dependent closure, far below TOLERANCE
 ITERATIONS = 30
+ANY = 1e300  # large values tell of a singular pose, not of a run that has diverged
 GOLDEN = 0.6180339887498949
 
 
@@ -35,7 +36,11 @@ def outputs() -> list[Variable]:
     """The outputs of `mechanism.diagnostics`."""
     return [
         Variable("rank", description="number of closures that are independent at this pose"),
-        Variable("condition", description="condition of W D^-1 W' without its zero eigenvalues"),
+        Variable(
+            "condition",
+            description="condition of W D^-1 W' without its zero eigenvalues",
+            max=ANY,
+        ),
     ]
 
 

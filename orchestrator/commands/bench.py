@@ -18,6 +18,8 @@ BENCHES = {
     "singular": "benchmarks.singular:bench",
     "local-model": "benchmarks.local_model:bench",
     "master": "benchmarks.master:bench",
+    "cosimulation": "benchmarks.cosimulation:bench",
+    "skip": "benchmarks.skip:bench",
     "real-time": "benchmarks.real_time:bench",
     "stress": "benchmarks.stress:bench",
     "view": "benchmarks.view:bench",
@@ -27,17 +29,33 @@ FOLDERS = {"stress": "stability"}
 
 
 def bench(
-    what: Literal["mechanism", "singular", "local-model", "master", "real-time", "stress", "view"],
+    what: Literal[
+        "mechanism",
+        "singular",
+        "local-model",
+        "master",
+        "cosimulation",
+        "skip",
+        "real-time",
+        "stress",
+        "view",
+    ],
     /,
     *,
     out: Out = None,
     quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
 ) -> int:
-    """Benchmark the mechanism: run time against error, with the multibody codes that are installed;
-    errors over many rates on motions through singular poses; cost and error of the local model; the
-    event loop, with the masters that are installed; deadlines missed in real time;
-    stress: hard scenes at the edge of stability and beyond it, each with the outcome that it has to
-    have; view: deadlines missed and latencies while a browser drags.
+    """Measure run time, error and limits; WHAT is one of
+
+    - mechanism: run time against error, beside the multibody codes that are installed
+    - singular: errors over many rates on motions through singular poses
+    - local-model: cost and error of the local model
+    - master: the event loop, beside the masters that are installed
+    - cosimulation: run time against error of whole co-simulations
+    - skip: what leaving out the unneeded saves
+    - real-time: deadlines missed in real time
+    - stress: hard scenes at the edge of stability and beyond, each with the outcome it has to have
+    - view: deadlines missed and latencies while a browser drags
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.

@@ -45,6 +45,8 @@ NOT_RUN = {
     "hapticlink reproduce": "its runs: tests/reference/test_closed_loop.py",
     "hapticlink bench mechanism": "needs other codes",
     "hapticlink bench singular": "is long",
+    "hapticlink bench cosimulation": "is long",
+    "hapticlink bench skip": "is long",
     "hapticlink bench master": "is long, and measures the machine",
     "hapticlink bench real-time": "takes a minute, and measures the machine",
     "hapticlink bench stress": "is long; its short form: tests/reference/test_stress.py",

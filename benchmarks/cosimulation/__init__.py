@@ -1,0 +1,29 @@
+"""Run time against error of the whole co-simulation: `hapticlink bench cosimulation`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import hapticlink.orchestrator
+from benchmarks import state
+from benchmarks.continuous import kept
+from benchmarks.cosimulation.measure import Told, measure
+from benchmarks.cosimulation.points import CONTACT, LOOP, points
+
+ROUNDS = 5
+KEPT = ("reference.csv", "runs.csv")
+
+
+def bench(out: Path, quick: bool, told: Told, command: str) -> None:
+    """Write README.md, the figure and the rows to `out`; finished rows and references of the same
+    version of the code are reused."""
+    from benchmarks.cosimulation import page  # loads Matplotlib
+
+    state.begin(out, KEPT, hapticlink.orchestrator)
+    references = {}
+    for k, name in enumerate((LOOP, CONTACT)):
+        told(f"{name}: two continuous runs", k, 2)
+        references[name] = kept(out / "reference.csv", name)
+    chosen = points(quick)
+    rows = measure(out / "runs.csv", chosen, references, 2 if quick else ROUNDS, told)
+    page.write(out, rows, references, command)
