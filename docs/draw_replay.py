@@ -1,5 +1,5 @@
-"""Draws the replays of results/view/: the animation of the README, and screenshots of a replay and
-of a report in a headless Chromium.
+"""Draws the replays of results/view/: the animation of the README, screenshots of a replay and of a
+report in a headless Chromium, and the figures of a run and of a comparison.
 
 `python docs/draw_replay.py`, with playwright and Debian's chromium installed.
 """
@@ -12,7 +12,9 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 import hapticlink as hl
+from hapticlink.orchestrator.compare import overlay
 from hapticlink.orchestrator.compare import page as report
+from hapticlink.orchestrator.results import figures
 from hapticlink.orchestrator.results.whole_run import named
 from hapticlink.orchestrator.view import replay
 from hapticlink.orchestrator.view.recorded import Recorded
@@ -34,6 +36,10 @@ def main() -> None:
         for folder, topology in zip(folders, RUNS.values(), strict=True):
             options = {"graphics.rate": 10, "controller.topology": topology}
             hl.run("closed-loop", options, out=folder, figures=False)
+        OUT.joinpath("figures").mkdir(exist_ok=True)
+        figures.save(figures.figures(hl.run("enclosure")), OUT / "figures")
+        over = overlay.figures(named(folders))
+        figures.save({f"compare_{name}": f for name, f in over.items()}, OUT / "figures")
         runs = [Recorded(str(folder)) for folder in folders]
         replay.write(runs, OUT / "topology.gif")
         page = started.chromium.launch(

@@ -98,6 +98,8 @@ def _figure(title: str, x: str, y: str, curves: Curves, steps: bool = False) -> 
     )
     axes.set_title(title.format(", ".join(most)), fontsize="medium", wrap=True)
     axes.set(xlabel=x, ylabel=y)
+    if steps:
+        axes.locator_params(axis="y", integer=True)
     axes.grid(alpha=0.3)
     axes.legend(fontsize="small")
     return figure
