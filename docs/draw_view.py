@@ -1,6 +1,6 @@
 """Draws the screenshots of results/view/: the page at work in a headless Chromium.
 
-`python docs/draw_view.py`, with playwright and Debian's chromium installed.
+`python docs/draw_view.py [NAME ...]`, with playwright and Debian's chromium installed.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +20,23 @@ OUT = Path(__file__).parents[1] / "results" / "view"
 SHOTS: dict[str, tuple[str, tuple[int, int], tuple[tuple[float, float], ...]]] = {
     "closed_loop": ("closed-loop", (1360, 820), ((-0.02, 0.02), (0.012, 0.03))),
     "enclosure": ("enclosure", (1360, 820), ((-0.01, 0.02), (-0.005, 0.035))),
+    "two_users": ("two-users", (1360, 820), ((-0.01, 0.012),)),
     "narrow": ("closed-loop", (400, 860), ((-0.02, 0.02), (0.012, 0.03))),
 }
 """By file, the scene, the window (px), and a path of the mouse from the operational point (m)."""
+OTHERS = {"two_users": ("left", ((0.012, -0.012),))}
+"""By file, the point of the user who drags in a second window, and that one's path (m)."""
 
 
-def dragged(page: Any, path: tuple[tuple[float, float], ...]) -> None:
+def dragged(page: Any, path: tuple[tuple[float, float], ...], user: str = "") -> None:
     """Drag along a path, and stay at its end for a while with the button down."""
     page.wait_for_function("() => view.frame && view.stage.limits && view.frame.t > 0.5")
     x, y, scale = page.evaluate(
-        """() => { const box = view.stage.canvas.getBoundingClientRect();
-                   const [x, y] = view.stage.toScreen(view.frame.x);
-                   return [box.left + x, box.top + y, view.stage.scale]; }"""
+        """(user) => { const box = view.stage.canvas.getBoundingClientRect();
+                       const point = (user ? view.frame.others[user] : view.frame).x;
+                       const [x, y] = view.stage.toScreen(point);
+                       return [box.left + x, box.top + y, view.stage.scale]; }""",
+        user,
     )
     page.mouse.move(x, y)
     page.mouse.down()
@@ -39,13 +45,14 @@ def dragged(page: Any, path: tuple[tuple[float, float], ...]) -> None:
         page.wait_for_timeout(1500)
 
 
-def main() -> None:
+def main(names: Collection[str]) -> None:
     OUT.mkdir(exist_ok=True)
     with sync_playwright() as started, tempfile.TemporaryDirectory() as folder:
         browser = started.chromium.launch(
             executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
         )
-        for name, (scene, (width, height), path) in SHOTS.items():
+        for name in names or SHOTS:
+            scene, (width, height), path = SHOTS[name]
             command = [sys.executable, "-m", "hapticlink.orchestrator", "view", scene]
             served = subprocess.Popen(
                 [*command, "--no-browser", "--port", "0"],
@@ -54,14 +61,21 @@ def main() -> None:
             assert served.stdout
             found = re.search(r"http://\S+", served.stdout.readline())
             assert found
-            page = browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
+            window = {"viewport": {"width": width, "height": height}, "bypass_csp": True}
+            page = browser.new_page(**window)
             page.goto(found[0])
+            if name in OTHERS:
+                user, other = OTHERS[name]
+                second = browser.new_page(**window)
+                second.goto(found[0])
+                dragged(second, other, user)
             dragged(page, path)
             page.screenshot(path=OUT / f"{name}.png")
-            page.close()
+            for each in [*browser.contexts]:
+                each.close()
             served.send_signal(signal.SIGTERM)
             served.wait()
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

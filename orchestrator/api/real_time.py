@@ -37,9 +37,6 @@ from hapticlink.orchestrator.system.assign_holds import misfit
 from hapticlink.orchestrator.system.ports import names
 from hapticlink.orchestrator.system.system import Connection, System
 
-TURN = 20_000_000
-"""ns between two turns."""
-
 
 class RealTime:
     """A scene that runs in real time and is watched and changed meanwhile, as by a page on which a
@@ -63,10 +60,12 @@ class RealTime:
         turn: Callable[[RealTime], object],
         out: str | Path | None = None,
         tables: bool = True,
+        every: float = 0.02,
     ) -> Run:
         """Run the scene to its duration, or until `stop`; results as of `hl.run`. After a `reset`
-        they are those from then on. Without `out` and `tables` they have no tables."""
-        self._called = turn
+        they are those from then on. Without `out` and `tables` they have no tables. Turns come
+        about `every` so many seconds."""
+        self._called, self._every = turn, round(1e9 * every)
         while True:
             self._until: int | None = None
             self._again = False
@@ -230,10 +229,10 @@ class RealTime:
         self._until = None
         self._called(self)
         while self.paused and self._until is None:
-            pace.wait(pace.now() + TURN)
+            pace.wait(pace.now() + self._every)
             interrupt.check(self.time)
             self._called(self)
-        loop.patience(TURN if self._until is None else 0)
+        loop.patience(self._every if self._until is None else 0)
         if self.paused or stepping:
             pace.c.origin += pace.now() - begun
 

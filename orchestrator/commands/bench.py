@@ -20,13 +20,14 @@ BENCHES = {
     "master": "benchmarks.master:bench",
     "real-time": "benchmarks.real_time:bench",
     "stress": "benchmarks.stress:bench",
+    "view": "benchmarks.view:bench",
 }
 FOLDERS = {"stress": "stability"}
 """Folders in results/ that are not named like the benchmark."""
 
 
 def bench(
-    what: Literal["mechanism", "singular", "local-model", "master", "real-time", "stress"],
+    what: Literal["mechanism", "singular", "local-model", "master", "real-time", "stress", "view"],
     /,
     *,
     out: Out = None,
@@ -34,8 +35,9 @@ def bench(
 ) -> int:
     """Benchmark the mechanism: run time against error, with the multibody codes that are installed;
     errors over many rates on motions through singular poses; cost and error of the local model; the
-    event loop, with the masters that are installed; deadlines missed in real time; and stress: hard
-    scenes at the edge of stability and beyond it, each with the outcome that it has to have.
+    event loop, with the masters that are installed; deadlines missed in real time;
+    stress: hard scenes at the edge of stability and beyond it, each with the outcome that it has to
+    have; view: deadlines missed and latencies while a browser drags.
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.

@@ -18,6 +18,9 @@ from hapticlink.orchestrator.view.controls import Controls, Settings, users
 from hapticlink.orchestrator.view.frames import PORT, Frames
 from hapticlink.orchestrator.view.link import Link
 
+TURN, FRAME = 0.0035, 0.015
+"""Times (s) between two looks at the messages while the scene runs, every other tick at 512 Hz,
+and between two frames, at most."""
 WAIT = 0.02
 """Time (s) between two looks at the messages while nothing runs."""
 
@@ -29,6 +32,7 @@ class Session:
         self._scene, self._link, self._root = scene, link, root
         self._controls: Controls | None = None
         self._settings = Settings()
+        self._shown = 0.0
         self._state: dict[str, Any] = {"paused": False, "recording": None, "ended": None}
         self.recordings: list[Path] = []
 
@@ -40,7 +44,7 @@ class Session:
             live = RealTime(self._scene)
             self._live, self._controls, self._again = live, None, False
             try:
-                made = live.run(self._turn, out, tables=False)
+                made = live.run(self._turn, out, tables=False, every=TURN)
             finally:
                 if out and (out / "run.json").exists():
                     self.recordings.append(out)
@@ -73,7 +77,9 @@ class Session:
             if not isinstance(message, messages.Hand):
                 self._tell_controls()
         self._require_server()
-        self._link.send({"type": "frame"} | self._frames.frame(live), frame=True)
+        if (now := time.monotonic()) - self._shown > FRAME:
+            self._shown = now
+            self._link.send({"type": "frame"} | self._frames.frame(live), frame=True)
 
     def _refuse(self, message: messages.Message, fault: InputFault) -> None:
         """Say why; a hold that only a run that begins with it can have begins anew with it."""

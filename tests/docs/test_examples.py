@@ -51,6 +51,7 @@ NOT_RUN = {
     "hapticlink report runs/closed-loop": "of a run that is shorter here, elsewhere; replay.md",
     "hapticlink compare runs/closed-loop "
     "runs/closed-loop,graphics.rate=10,controller.topology=false": "as its runs; replay.md",
+    "hapticlink bench view": "takes a minute, and measures the machine",
     "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
         "compiles for minutes; tests/orchestrator/scene/test_packaging.py",
     "hapticlink sweep closed-loop --vary graphics.rate=10..60 --scheduler tcp://10.0.0.5:8786":

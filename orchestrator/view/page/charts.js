@@ -55,7 +55,9 @@ function named(connection) {
   const [source, target] = connection.split(" -> ");
   if (!target) return source;
   const what = source.startsWith("hand") ? "F_hand" : source.split(".")[1];
-  return `${what} to ${target.split(".")[0].replace("virtual_", "").replace("haptic_", "")}`;
+  const [fmu, ...port] = target.split("."); // the port of a further user has that one's name first
+  const user = port.length > 1 ? ` ${port[0]}` : "";
+  return `${what} to ${fmu.replace("virtual_", "").replace("haptic_", "").replace("_", " ")}${user}`;
 }
 
 class Chart {

@@ -1,0 +1,76 @@
+"""A headless Chromium drags a handle on a page, and says when: `python -m benchmarks.dragging URL
+SECONDS`, in a process of its own. Prints JSON with times of the wall clock (s):
+
+sent    [x, y (m), time of the mouse event] of each pull that the page sent
+shown   [simulated time of the frame, time at which the page had drawn it, time of the next
+         refresh of the screen, requestAnimationFrame]
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import sys
+import time
+from typing import Any
+
+EVERY = 1 / 60  # s, of a mouse that moves
+RADIUS, TURN = 0.012, 2.0  # m and s of the circle that it moves along
+
+NOTE = """() => {
+  const log = window.log = { sent: [], shown: [] }, stage = view.stage;
+  const draw = stage.draw.bind(stage), wall = (ms) => (performance.timeOrigin + ms) / 1e3;
+  let last = null;
+  stage.draw = (frame) => {
+    draw(frame);
+    if (frame.t === last) return;
+    last = frame.t;
+    const row = [frame.t, wall(performance.now()), null];
+    log.shown.push(row);
+    requestAnimationFrame((now) => { row[2] = wall(now); });
+  };
+  stage.canvas.addEventListener("pointermove", (event) => {
+    const held = [...stage.pulls.values()][0];
+    if (held?.sent === event.timeStamp) log.sent.push([...held.target, wall(event.timeStamp)]);
+  });
+  const box = stage.canvas.getBoundingClientRect(), [x, y] = stage.toScreen(view.frame.x);
+  return [box.left + x, box.top + y, stage.scale];
+}"""
+"""Notes the times, and returns the operational point on the screen (px) and px to a metre."""
+
+
+def dragged(page: Any, seconds: float) -> dict[str, Any]:
+    """Drag around a circle."""
+    page.wait_for_function("() => view.frame && view.stage.limits && view.frame.t > 1.0")
+    x, y, scale = page.evaluate(NOTE)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    start = time.monotonic()
+    while (now := time.monotonic() - start) < seconds:
+        angle = 2 * math.pi * now / TURN
+        dx, dy = RADIUS * (math.cos(angle) - 1), RADIUS * math.sin(angle)
+        page.mouse.move(x + scale * dx, y - scale * dy)
+        time.sleep(max(0.0, start + now + EVERY - time.monotonic()))
+    page.mouse.up()
+    found: dict[str, Any] = page.evaluate("() => window.log")
+    return found
+
+
+def main() -> None:
+    from playwright.sync_api import sync_playwright
+
+    url, seconds = sys.argv[1:]
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    with sync_playwright() as started:
+        browser = started.chromium.launch(
+            executable_path=chromium, args=["--no-sandbox", "--disable-gpu"]
+        )
+        page = browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
+        page.goto(url)
+        json.dump(dragged(page, float(seconds)), sys.stdout)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""The page in use: 60 s of scripted dragging at 512 Hz, with the deadlines that the haptic loop
+missed and the latencies of what a person feels and sees.
+
+    mouse to force    from the mouse event in the browser to the step of the hand that takes the
+                      pull, whose force acts from that instant on
+    step to screen    from when a frame's newest step was due to the refresh of the screen that
+                      follows the drawing of it (requestAnimationFrame)
+
+Both clocks are the machine's: the browser's `performance.timeOrigin` is wall-clock time.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hapticlink.orchestrator.api.real_time import RealTime
+from hapticlink.orchestrator.results.figure_axes import short
+from hapticlink.orchestrator.view.link import Link
+from hapticlink.orchestrator.view.scene import viewed
+from hapticlink.orchestrator.view.session import Session
+
+SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 5
+SERVER = "hapticlink.orchestrator.view.server"
+
+
+class Done(Exception):
+    """The dragging has ended."""
+
+
+class Measured(Session):
+    """A session that ends with the process of the dragging, and notes when pulls act, and by how
+    much wall-clock time is ahead of simulated time."""
+
+    def begin(self, driver: subprocess.Popen[str]) -> None:
+        """Run until the driver has ended."""
+        self.driver = driver
+        self.acted: dict[tuple[float, float], float] = {}
+        self.ahead: list[tuple[float, float]] = []
+        self.before: dict[str, Any] = {}
+        with suppress(Done):
+            self.run()
+
+    def _turn(self, live: RealTime) -> None:
+        pace = live._run.pace
+        self.ahead.append((live.time, time.time() - 1e-9 * (pace.now() - pace.c.origin)))
+        if not self.before and self.acted:
+            self.before = live.report()
+        if not hasattr(live, "noted"):
+            self._note_pulls(live)
+        super()._turn(live)
+        if self.driver.poll() is not None:
+            self.after = live.report()
+            raise Done
+
+    def _note_pulls(self, live: RealTime) -> None:
+        given = live.set
+
+        def noted(name: str, value: ArrayLike) -> None:
+            given(name, value)
+            if name == "hand.target":
+                x, y = np.ravel(value)[:2].tolist()
+                hand = live._simulation.instances["hand"]
+                hand.before_step(lambda: self.acted.setdefault((x, y), time.time()))
+
+        live.set, live.noted = noted, True  # type: ignore[method-assign,attr-defined]
+
+
+def bench(folder: Path, quick: bool, told: Callable[[str, int, int], object], command: str) -> None:
+    """Write the page to `folder`. Raises what playwright does without a browser."""
+    seconds = QUICK if quick else SECONDS
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    scene = viewed(SCENE, [f"haptics.rate={RATE}"])
+    told(f"{SCENE}, dragged", 0, seconds)
+    with tempfile.TemporaryDirectory() as room, Link(SERVER, "127.0.0.1", "0", "bench") as link:
+        url = f"http://127.0.0.1:{link.first['port']}/bench/"
+        log = Path(room, "log.json")
+        with log.open("w") as out:
+            dragging = [sys.executable, "-m", "benchmarks.dragging", url, str(seconds)]
+            root = Path(__file__).parents[1]
+            driver = subprocess.Popen(dragging, cwd=root, stdout=out, text=True)
+        try:
+            session = Measured(scene, link, Path(room, "made"))
+            session.begin(driver)
+        finally:
+            driver.kill()
+            driver.wait()
+        found = json.loads(log.read_text())
+    folder.mkdir(parents=True, exist_ok=True)
+    text = page(session, found, seconds, load, command)
+    readme = folder / "README.md"
+    kept = readme.read_text().partition(AFTER)[2] if readme.exists() else ""
+    readme.write_text(text + AFTER + kept)
+
+
+AFTER = "\n## Screenshots\n"
+"""What follows it on the page stays as it is."""
+
+
+def latencies(session: Measured, found: dict[str, Any]) -> dict[str, list[float]]:
+    """The latencies (s), one for each pull that acted and each frame that was shown."""
+    sent = {(x, y): at for x, y, at in found["sent"]}
+    felt = [session.acted[pull] - at for pull, at in sent.items() if pull in session.acted]
+    due = dict(session.ahead)
+    rows = [(t, drawn, seen) for t, drawn, seen in found["shown"] if t in due and seen]
+    return {
+        "mouse to force": felt,
+        "step to canvas": [drawn - (t + due[t]) for t, drawn, _ in rows],
+        "step to screen": [seen - (t + due[t]) for t, _, seen in rows],
+    }
+
+
+def page(session: Measured, found: dict[str, Any], seconds: int, load: float, command: str) -> str:
+    before, after = session.before, session.after
+    ticks, missed = (after[k] - before[k] for k in ("ticks", "deadlines_missed"))
+    rows = latencies(session, found)
+    felt, shown = (1e3 * float(np.median(rows[k])) for k in ("mouse to force", "step to screen"))
+    taken = len(rows["mouse to force"])
+    lines = [
+        "# The page in use",
+        "",
+        f"In {seconds} s of dragging at {RATE} Hz the haptic loop of `{SCENE}` missed {missed} of "
+        f"{ticks} deadlines; a pull of the mouse is felt after {short(felt)} ms, and a step is on "
+        f"the screen after {short(shown)} ms (medians).",
+        "",
+        f"Made by `{command}`, on {platform.system()} {platform.release()} with {os.cpu_count()} "
+        f"cores, shared with a headless Chromium that draws in software, and a load average of "
+        f"{load:.1f} before. Latencies in milliseconds: mouse to force, from the mouse event to "
+        f"the step of the hand that takes the pull ({taken} of {len(found['sent'])} pulls: newer "
+        "ones replace those that wait for the same step); step to canvas and to screen, from when "
+        "the newest step of a frame was due to the end of drawing it, and to the refresh after "
+        f"that ({len(rows['step to screen'])} frames).",
+        "",
+        "| | p50 | p99 | max |",
+        "|---|--:|--:|--:|",
+        *(f"| {name} | {' | '.join(_row(values))} |" for name, values in rows.items()),
+        f"| step time of the haptic loop, since its start | {_times(after['step_time'])} |",
+        f"| lateness of the haptic loop, since its start | {_times(after['lateness'])} |",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _row(values: Sequence[float]) -> list[str]:
+    return [short(1e3 * float(v)) for v in np.quantile(values, [0.5, 0.99, 1.0])]
+
+
+def _times(found: dict[str, float]) -> str:
+    return " | ".join(short(1e3 * found[k]) for k in ("p50", "p99", "max"))
