@@ -64,7 +64,7 @@ def kept(system: System) -> list[str]:
             lines.append(f"{fmu.name}: contact, if the wall is unilateral")
         if description.port("contact_gap", "output"):
             lines.append(f"{fmu.name}: which places touch")
-        if description.port("n_constraints", "output"):
+        if any(s.port.rpartition(".")[2] == "n_constraints" for s in description.outputs):
             lines.append(f"{fmu.name}: number of constrained directions")
     for c in system.connections:
         if c.hold and HOLDS[c.hold].needs in ("power", "spring"):
@@ -74,4 +74,5 @@ def kept(system: System) -> list[str]:
 
 def discrete(coordinate: Coordinate) -> bool:
     """Whether a coordinate is a switch or belongs to what is taken out."""
-    return coordinate.kind == "fmu" and coordinate.variable.partition("[")[0] in DISCRETE
+    variable = coordinate.variable.partition("[")[0].rpartition(".")[2]  # left.n_constrained
+    return coordinate.kind == "fmu" and variable in DISCRETE

@@ -150,3 +150,17 @@ def test_the_page_is_served_to_who_knows_its_path_alone() -> None:
         for path in ("", "secret", "other/", "secret/../secret/x"):
             with pytest.raises(urllib.error.HTTPError, match="404"):
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/{path}")
+
+
+def test_a_run_of_two_users_has_the_handles_and_arms_of_both(tmp_path: Path) -> None:
+    out = tmp_path / "two"
+    hl.run("two-users", {"duration": 0.1}, out=out, figures=False)
+    r, told = hl.load(out), Recorded(str(out)).told()
+    assert told["users"] == ["", "left"]
+    frame = Recorded(str(out)).frames()[-1]
+    left = frame["others"]["left"]
+    assert left["handle"] == r["haptic_device_left.x_true"][-1].tolist()
+    assert left["F_env"] == r["virtual_mechanism.left.F_env"][-1].tolist()
+    assert len(left["arms"]) == len(frame["arms"]) == 12
+    assert left["arms"] != frame["arms"]
+    assert len(left["directions"]) == left["n"][0] == 1
