@@ -25,6 +25,7 @@ def check(scene: Scene) -> Iterator[Problem]:
             yield (*path, "name"), f"{fmu.name!r} is taken: give every FMU and block its own name"
         taken[fmu.name] = None
         yield from _source(path, fmu)
+        yield from _velocity(path, fmu, scene)
         if fmu.replaces is not None:
             yield from _replacement(path, fmu, loop_names(scene))
     for i, wire in enumerate(scene.connection):
@@ -47,6 +48,20 @@ def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
     for key in ("block", "settings"):
         if fmu.path is not None and getattr(fmu, key):
             yield (*path, key), "is not for an FMU that is a file: take it out, or take path out"
+
+
+def _velocity(path: Path, fmu: ForeignFmu, scene: Scene) -> Iterator[Problem]:
+    """A problem if a wall's damper acts on a measured velocity that nothing feeds."""
+    settings = fmu.settings or {}
+    acts = settings.get("damping") is not None or settings.get("pulse") is not None
+    if fmu.block != "virtual_wall" or settings.get("velocity") != "measured" or not acts:
+        return
+    if "v" not in fmu.start and all(wire.to != f"{fmu.name}.v" for wire in scene.connection):
+        yield (
+            (*path, "settings", "velocity"),
+            f"'measured', but nothing feeds {fmu.name}.v, so that its damper never acts: connect "
+            "a velocity to it, or take velocity = 'difference'",
+        )
 
 
 def _replacement(path: Path, fmu: ForeignFmu, known: Collection[str]) -> Iterator[Problem]:

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
-from hapticlink.orchestrator.holds.energy_account import repayment
 
 Vector = NDArray[np.float64]
 
@@ -158,46 +157,3 @@ def test_no_hold_withstands_a_motion_that_waits_for_its_force(name: str) -> None
         now += 0.1 * np.sign(excess)
         force = fresh
     assert min(made) >= 0.1 * 0.5 - 1e-12
-
-
-def wall(stiffness: float, every: int, limit: float) -> tuple[float, float, float]:
-    """(peak mm, peak to peak of the last 0.5 s in mm, energy mJ) of a hand's push on a wall."""
-    mass, damping, period, substeps = 0.04, 0.8, 1e-3, 40
-    quantum = 2 * np.pi * 0.010 / 1024
-    x, v, energy, base, held, path = 0.029, 0.0, 0.0, 0.0, 0.0, []
-    before = np.floor(x / quantum) * quantum
-    for k in range(1500):
-        measured = np.floor(x / quantum) * quantum
-        moved, before = measured - before, measured
-        energy += held * moved
-        if k % every == 0:
-            base = min(max(stiffness * (measured - 0.030), 0.0), 2.0)
-        # The wall's force opposes x: what it absorbs is -(energy generated).
-        excess, largest = np.array([max(-energy, 0.0)]), np.array([limit * abs(moved) / period])
-        control = -float(repayment(excess, np.array([moved]), largest)[0])
-        held = min(max(base + control, -2.0), 2.0)
-        for _ in range(substeps):
-            v += period / substeps * (400.0 * (0.033 - x) - damping * v - held) / mass
-            x += period / substeps * v
-        path.append(x * 1e3)
-    return max(path), max(path[-500:]) - min(path[-500:]), energy * 1e3
-
-
-@pytest.mark.parametrize(
-    ("stiffness", "every", "limit", "expected"),
-    [
-        (400, 1, 0.0, (33.53, 0.001, -0.32)),
-        (2500, 1, 0.0, (31.79, 1.658, -17.6)),
-        (2500, 1, 0.8, (31.79, 0.080, -1.81)),
-        (400, 5, 0.0, (34.07, 5.277, -69.67)),
-        (400, 5, 0.8, (33.90, 0.001, -1.44)),
-    ],
-)
-def test_passivity_controller_on_a_virtual_wall(
-    stiffness: float, every: int, limit: float, expected: tuple[float, float, float]
-) -> None:
-    """The passivity controller of Hannaford & Ryu, alpha <= 0.8: rows computed independently."""
-    peak, swing, energy = wall(stiffness, every, limit)
-    assert peak == pytest.approx(expected[0], abs=0.006)
-    assert swing == pytest.approx(expected[1], abs=0.0006)
-    assert energy == pytest.approx(expected[2], abs=0.006 if abs(expected[2]) < 10 else 0.06)

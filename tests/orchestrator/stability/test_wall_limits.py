@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.stability import wall_limits
+from hapticlink.orchestrator.stability.session import Session
 
 M, D, T = 0.3, 5.0, 1 / 512
 """Mass (kg), damping (N.s/m) and period (s) of the scene."""
@@ -29,8 +31,7 @@ def test_closed_forms_give_the_reference_numbers() -> None:
     stable = [wall_limits.stable(M, D, T, periods) for periods in (0, 1, 2)]
     assert stable == pytest.approx([5147.9288, 1721.95, 1038.20], rel=1e-5)
     largest = [wall_limits.undamped(1.0, 1.0, n / 10) for n in range(1, 10)]
-    table = [0.1810, 0.3273, 0.4435, 0.5333, 0.6000, 0.6462, 0.6741, 0.6857, 0.6828]
-    assert largest == pytest.approx(table, abs=5e-5)
+    assert largest == pytest.approx(TABLE, abs=5e-5)
     assert wall_limits.passive(D, T) == pytest.approx(5120)
     assert wall_limits.passive(D, T, B=-1.0) == pytest.approx(4096)
     assert wall_limits.undamped_measured(T, 5.0) == pytest.approx(5120)
@@ -88,18 +89,38 @@ def test_the_lifted_map_has_the_limit(options: Options, key: str, limit: float) 
 
 @pytest.mark.parametrize(("options", "key", "limit"), CASES)
 def test_runs_grow_beyond_the_limit(options: Options, key: str, limit: float) -> None:
+    assert growth(options, key, 0.98 * limit) < 1 < growth(options, key, 1.02 * limit)
+
+
+def growth(options: Options, key: str, gain: float) -> float:
     """Growth between two parts of a run, of the velocity, which the damper alone acts on."""
+    given = options | {key: gain, "duration": 2.0, "stop_when": "wall.F > 1e6"}
+    if key == DAMPING:
+        given["linkage.start_velocity"] = {"rail": 0.01}
+    run = hl.run("virtual-wall", given)
+    assert run.fault is None
+    _, early, _, late = np.array_split(np.abs(run["virtual_mechanism.rail.velocity"]), 4)
+    return float(late.max() / early.max())
 
-    def growth(gain: float) -> float:
-        given = options | {key: gain, "duration": 2.0, "stop_when": "wall.F > 1e6"}
-        if key == DAMPING:
-            given["linkage.start_velocity"] = {"rail": 0.01}
-        run = hl.run("virtual-wall", given)
-        assert run.fault is None
-        _, early, _, late = np.array_split(np.abs(run["virtual_mechanism.rail.velocity"]), 4)
-        return float(late.max() / early.max())
 
-    assert growth(0.98 * limit) < 1 < growth(1.02 * limit)
+TABLE = [0.1810, 0.3273, 0.4435, 0.5333, 0.6000, 0.6462, 0.6741, 0.6857, 0.6828]
+"""The largest alpha = K T^2/m for beta = B T/m = .1, .2, ... .9 without damping of the device."""
+
+
+def test_the_lifted_map_has_the_table_of_a_sampled_damper() -> None:
+    with Session(open_scene.load("virtual-wall", UNDAMPED)) as session:
+        for n, alpha in enumerate(TABLE, start=1):
+            gains = [f"{DAMPING}={n / 10 * M / T}"]
+            for share, verdict in ((0.995, "stable"), (1.005, "unstable")):
+                K = share * alpha * M / T**2
+                assert session.judge([*gains, f"{STIFFNESS}={K}"]).verdict == verdict
+
+
+@pytest.mark.parametrize(("n", "alpha"), list(enumerate(TABLE, start=1)))
+def test_runs_grow_beyond_the_table(n: int, alpha: float) -> None:
+    options = UNDAMPED | {DAMPING: n / 10 * M / T}
+    assert growth(options, STIFFNESS, 0.98 * alpha * M / T**2) < 1
+    assert growth(options, STIFFNESS, 1.02 * alpha * M / T**2) > 1
 
 
 def test_a_unilateral_wall_has_the_same_limit_in_contact() -> None:
@@ -129,3 +150,10 @@ def test_a_quantised_wall_chatters_beyond_its_limit() -> None:
 
     assert speed(0.98 * limit) < 1e-9
     assert speed(1.02 * limit) > 1e-5
+
+
+def test_a_damper_whose_velocity_nothing_feeds_is_refused() -> None:
+    options = {"fmu.wall.settings.damping": 5.0, "fmu.wall.settings.velocity": "measured"}
+    with pytest.raises(hl.SceneFault, match=r"nothing feeds wall\.v"):
+        hl.scene("virtual-wall", options)
+    hl.scene("virtual-wall", options | {"fmu.wall.start.v": 0.0})
