@@ -62,28 +62,29 @@ def draw(made: Map) -> Figure:
         found_handles, labels = axes.get_legend_handles_labels()
         handles.update(zip(labels, found_handles, strict=True))
     shown = list(handles.values()), list(handles)
-    figure.suptitle(_finding(made), fontsize="medium")
+    figure.suptitle(fill(_finding(made), int(11 * figure.get_figwidth())), fontsize="medium")
     figure.legend(*shown, loc="outside lower center", ncols=4, fontsize="small")
     return figure
 
 
 def _finding(made: Map) -> str:
-    """Between which values of the second key, or of the only one, the scene is stable, or that the
-    boundary lies on the way; and how many runs agree."""
-    key = made.y or made.x
-    by_value: dict[float, set[str]] = {}
-    for row in made.of("grid"):
-        by_value.setdefault(float(row[key]), set()).add(row["verdict"])
-    always = [value for value, found in sorted(by_value.items()) if found == {"stable"}]
-    stable = sum(row["verdict"] == "stable" for row in made.of("grid"))
-    said = f"{made.scene.title}: {stable} of {len(made.of('grid'))} points are stable"
-    if always:
-        span = f"{always[0]:g}" + (f" to {always[-1]:g}" if len(always) > 1 else "")
-        said += f", all of them at {axis(key)} {span}"
+    """How many points are stable, at which values of a key all of them are, and how many runs
+    agree."""
+    grid = made.of("grid")
+    stable = [row for row in grid if row["verdict"] == "stable"]
+    said = f"{len(stable)} of {len(grid)} points are stable"
+    for key in filter(None, (made.y, made.x)):
+        others = {float(row[key]) for row in grid if row["verdict"] != "stable"}
+        always = sorted({float(row[key]) for row in stable} - others)
+        if others and always:
+            between = [value for value in others if always[0] < value < always[-1]]
+            if not between:
+                said += f", all with {axis(key)} from {always[0]:g} to {always[-1]:g}"
+                break
     checks = [row for row in made.of("check") if "agree" in row]
     if checks:
         said += f"; {sum(bool(r['agree']) for r in checks)} of {len(checks)} runs agree"
-    return fill(said, 100)
+    return said
 
 
 def _short(key: str) -> str:
