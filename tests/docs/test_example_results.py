@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -99,7 +100,8 @@ def test_libcosim_reaches_the_pose_of_our_jacobi(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True, text=True
     )
-    printed = next(line for line in done.stdout.splitlines() if line.startswith("["))
+    numbers = re.compile(r"\[[-+.e\d]+(, [-+.e\d]+)*\]")
+    printed = next(line for line in done.stdout.splitlines() if numbers.fullmatch(line))
     options = {"coupling": "jacobi", "graphics.rate": 32, "duration": 1.0}
     ours = hl.run("closed-loop", options)["virtual_mechanism.x"][-1].tolist()
     assert json.loads(printed) == ours
