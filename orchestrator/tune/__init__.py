@@ -36,7 +36,9 @@ from hapticlink.orchestrator.tune.poses import Pose, poses
 MARGIN, HERTZ = 2.0, 2.0
 HANDS = (100.0, 1000.0)
 """Stiffnesses (N/m) of the hands that a margin is for: a light touch and a firm grip."""
-WIDEST = 4.0**10
+STRIDE, FAST = 2.0, 20.0
+"""Of scales on the way to a limit; growth (1/s) at which no other hand or pose is asked."""
+WIDEST = 2.0**20
 """Scale of gains beyond which there is no limit of stability."""
 FINE, COARSE = 0.01, 0.1
 """Of the logarithm of a scale."""
@@ -84,6 +86,10 @@ class Tuned:
             "frequency": self.hertz,
             "felt_stiffness": self.felt,
             "felt_stiffness_of_scene": self.felt_before,
+            "compliance": {
+                name: np.stack([X.real, X.imag], axis=-1).tolist()
+                for name, X in self.compliances.items()
+            },
             "margins_at_neighbouring_rates": self.neighbours,
             "poses": {pose.name: list(pose.handle) for pose in self.poses},
             "wrenches": {pose.name: list(pose.along) for pose in self.poses},
@@ -227,7 +233,12 @@ class Search:
 
         def growth(factor: float) -> float:
             tried = {law: scale * factor for law, scale in each.items()}
-            return max(h.growth(tried, hand) for h in self._at.values() for hand in HANDS)
+            worst = -np.inf
+            for hand in HANDS[::-1]:
+                for place in self._at.values():
+                    if (worst := max(worst, place.growth(tried, hand))) > FAST:
+                        return worst
+            return worst
 
         return _limit(growth, "all gains", FINE)
 
@@ -281,14 +292,14 @@ def _limit(growth: Callable[[float], float], what: str, fine: float) -> float:
     WIDEST where there is none."""
     low = high = 1.0
     if growth(1.0) > 0.0:
-        while growth(low := low / 4.0) > 0.0:
+        while growth(low := low / STRIDE) > 0.0:
             if low < 1.0 / WIDEST:
                 raise InputFault(f"{what}: unstable however low the gains are")
-        high = low * 4.0
+        high = low * STRIDE
     else:
-        while growth(high := high * 4.0) <= 0.0:
+        while growth(high := high * STRIDE) <= 0.0:
             if high > WIDEST:
                 return WIDEST
-        low = high / 4.0
+        low = high / STRIDE
     found = brentq(lambda s: growth(float(np.exp(s))), np.log(low), np.log(high), xtol=fine)
     return float(np.exp(found))

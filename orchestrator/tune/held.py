@@ -37,7 +37,7 @@ from hapticlink.orchestrator.tune.gains import Gains, Scales
 
 Complex = NDArray[np.complex128]
 DEVICE, HAND = "haptic_device", "hand"
-STEPS = 6
+STEPS = 3
 """Newton steps from the equilibrium of other gains."""
 UNSTABLE = 50.0
 """Growth (1/s) that counts for gains with which the FMUs diverge at once."""
@@ -116,7 +116,8 @@ class Held:
             self._map.set_parameters(values)
             self._hand = 0.0  # until all is done
             self._at = self._linear(self._at.point)
-            for _ in range(STEPS):
+            moved = scales.get("contact", 1.0) != self._scales.get("contact", 1.0)
+            for _ in range(STEPS if moved else 0):  # other laws do nothing at rest
                 if rests(self._at):
                     break
                 left = np.eye(len(self._at.A)) - self._at.A

@@ -9,18 +9,12 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.commands import main
-from hapticlink.orchestrator.maps.checks import _growth
 from hapticlink.orchestrator.scene.overrides import written
-from hapticlink.orchestrator.tune import Tuned, tune
+from hapticlink.orchestrator.tune import HANDS, Tuned, tune
 from hapticlink.orchestrator.tune.held import spring
 from hapticlink.orchestrator.tune.poses import FIRM
 
-CASES = {
-    "closed-loop": ("sensing=encoders", "graphics.rate=32"),
-    "enclosure": ("sensing=encoders", "graphics.rate=32"),
-    "serial": ("sensing=encoders", "graphics.rate=32"),
-}
-"""serial was not used to write what is tested."""
+CASES = {"closed-loop": ("sensing=encoders", "graphics.rate=32")}
 
 
 @pytest.fixture(scope="module", params=list(CASES))
@@ -46,24 +40,24 @@ def gains(found: Tuned, factor: float) -> list[str]:
 def test_the_margin_is_that_asked_for(tuned: tuple[str, Tuned]) -> None:
     _, found = tuned
     assert found.margin >= found.asked * 0.99
-    assert found.own < found.margin or min(found.scales.values()) < 1.0
 
 
-@pytest.mark.parametrize(("share", "stable"), [(0.9, True), (1.1, False)])
-def test_runs_are_unstable_just_beyond_the_margin(
-    tuned: tuple[str, Tuned], share: float, stable: bool
-) -> None:
-    """In the pose and hand that limit it, from a start a little off rest."""
+def test_runs_chatter_just_beyond_the_margin_and_settle_before(tuned: tuple[str, Tuned]) -> None:
+    """In both hands, from a start 0.1 mm off rest: 10 % below the margin the handle comes to rest,
+    10 % above it does not."""
     name, found = tuned
-    options = [*CASES[name], *gains(found, found.margin * share)]
-    rates = []
-    for pose in found.poses:
-        for hand in (100.0, 1000.0):
-            press = spring(pose.handle, pose.press, hand)
-            rest = [*pose.options(options), *written({"hand": press})]
-            rest += ["device.encoder_resolution=1e-12"]  # the map has none
-            rates.append(_growth(hl.scene(name, rest), 2.0))
-    assert (max(rates) <= 0.0) == stable
+    (pose,) = found.poses
+    off = (pose.handle[0] + 1e-4, *pose.handle[1:])
+    for hand in HANDS:
+        late = []
+        for share in (0.9, 1.1):
+            options = [*CASES[name], *gains(found, found.margin * share), "duration=2.0"]
+            options += [*written({"hand": spring(off, pose.press, hand)})]
+            options += ["device.encoder_resolution=1e-12"]  # the map has none
+            speed = np.abs(hl.run(name, options, figures=False)["haptic_device.v_true"])
+            late.append(speed[-256:].max() / speed.max())
+        assert late[0] < 0.05
+        assert late[1] > 0.5
 
 
 def test_pressing_gives_the_felt_stiffness(tuned: tuple[str, Tuned]) -> None:
@@ -94,11 +88,6 @@ def test_pressing_gives_the_felt_stiffness(tuned: tuple[str, Tuned]) -> None:
         assert n @ x == pytest.approx(n @ predicted, rel=0.03)
 
 
-def test_the_command_writes_a_scene_that_runs(tmp_path: Path) -> None:
-    arguments = ["tune", "closed-loop", "--set", "sensing=encoders", "--set", "graphics.rate=32"]
-    assert main([*arguments, "--no-neighbours", "--out", str(tmp_path)]) == 0
-    run = hl.run(tmp_path / "tuned.toml", {"duration": 0.2}, figures=False)
-    assert run.fault is None
-    assert run.run["scene"]["sensing"] == "encoders"
+def test_what_cannot_be_tuned_is_refused(tmp_path: Path) -> None:
     assert main(["tune", "closed-loop", "--margin", "0.5", "--out", str(tmp_path)]) == 2
     assert main(["tune", "pendulum", "--out", str(tmp_path)]) == 2
