@@ -121,7 +121,7 @@ class Held:
                 if rests(self._at):
                     break
                 left = np.eye(len(self._at.A)) - self._at.A
-                step = np.linalg.lstsq(left, self._at.change, rcond=1e-9)[0]
+                step: NDArray[np.float64] = np.linalg.lstsq(left, self._at.change, rcond=1e-9)[0]
                 self._at = self._linear(self._at.moved(step))
             self._scales, self._hand = dict(scales), hand
         return self._at
