@@ -6,7 +6,7 @@
     r["virtual_mechanism.x"], r.time("virtual_mechanism.x")
 
 Scenes: `shipped`, `scene`, `explain`. Runs: `run`, `RealTime`, `sweep`, `load`.
-Files: `build`, `export`. Before a hand is on the device: `stability`.
+Files: `build`, `export`. Before a hand is on the device: `stability`, `tune`.
 Raised: `InputFault` for bad input, with all findings of a scene `SceneFault`; each is a `Fault`.
 """
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         Stability,
         Sweep,
         Table,
+        Tuned,
         VaryingStability,
         build,
         explain,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
         stability,
         stability_map,
         sweep,
+        tune,
     )
 
     __version__: str
@@ -74,6 +76,7 @@ __all__ = [
     "Stability",
     "Sweep",
     "Table",
+    "Tuned",
     "VaryingStability",
     "__version__",
     "build",
@@ -88,6 +91,7 @@ __all__ = [
     "stability",
     "stability_map",
     "sweep",
+    "tune",
 ]
 
 

@@ -42,6 +42,7 @@ ROOMS = {
         "ssp",
         ".",
         "stability",
+        "tune",
         "sweep",
         "maps",
         "report",

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from hapticlink.orchestrator.stability.passivity import Passivity as Passivity
     from hapticlink.orchestrator.stability.passivity import passivity as passivity
     from hapticlink.orchestrator.stability.varying import VaryingStability as VaryingStability
+    from hapticlink.orchestrator.tune import Tuned as Tuned
+    from hapticlink.orchestrator.tune import tune as tune
 else:
 
     def __getattr__(name: str) -> Any:
@@ -63,6 +65,8 @@ else:
                 from hapticlink.orchestrator.stability import finite_time as room
             case "passivity" | "Passivity":
                 from hapticlink.orchestrator.stability import passivity as room
+            case "tune" | "Tuned":
+                from hapticlink.orchestrator import tune as room
             case "stability_map":
                 from hapticlink.orchestrator.api import maps as room
             case "Map":

@@ -5,16 +5,11 @@ of further hands on the mechanism, should be what the mechanism has gained:
 
     generated(t) = E(t) - E(0) - sum F_hand . dx_D - sum F_k . dx_k
 
-summed over the users with a device each, and over hands k at further points, with E the
-mechanism's energy (kinetic, of gravity, springs and contacts) and each force paired with the
-displacement of the step that it acts over. It is the sum of three parts, of works at the end:
-
-    hand         of the users' wrenches on the mechanism, less the same on their handles
-    coupling     of -F_drift of all users on the mechanism
-    mechanism    what is left: friction, damping and contacts, drives, and the error of integration
-
-A positive value is energy that the hand could get back without having put it in; friction makes it
-negative, drives positive.
+summed over the users with a device each, and over hands k at further points, with E the mechanism's
+energy (kinetic, of gravity, springs and contacts) and each force paired with the displacement of
+the step that it acts over. A positive value is energy that the hand could get back without having
+put it in; friction makes it negative, drives positive. `port_blocks.py` tells which block it comes
+from.
 
 `works` are of single wrenches: on the handle of the hand, the motors, F_T, F_env; of F_env on the
 mechanism; and of what a mobility held from another rate adds to the motors' wrench,
@@ -28,6 +23,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hapticlink.orchestrator.results.port_blocks import (
+    BLOCK,
+    CONTACT,
+    HAND,
+    by_block,
+    ideal,
+    work,
+)
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
     DEVICE,
@@ -38,17 +41,17 @@ from hapticlink.orchestrator.results.tracking import (
     table_of,
 )
 
-BLOCK, MOBILITY, HAND = "virtual_mechanism", "Lambda_inv", "hand.F"
-ENERGY, POINT, CONTACT = f"{BLOCK}.energy", f"{BLOCK}.F_hand", f"{BLOCK}.F_env"
+MOBILITY = "Lambda_inv"
+ENERGY = f"{BLOCK}.energy"
 
 
 class UserPort(NamedTuple):
-    """Energy generated (J) at times (s), the mechanism's samples; its parts and the works of single
-    wrenches at the end (J), by name."""
+    """Energy generated (J) at times (s), the mechanism's samples; that of each block, of which it
+    is the sum; and the works of single wrenches at the end (J), by name."""
 
     time_s: Vector
     generated_J: Vector
-    parts: dict[str, float]
+    blocks_J: dict[str, Vector]
     works: dict[str, float]
 
     @property
@@ -57,7 +60,11 @@ class UserPort(NamedTuple):
         peak = int(np.argmax(self.generated_J))
         found = {"generated": self.generated_J[-1], "peak": self.generated_J[peak]}
         found |= {"time_of_peak": self.time_s[peak]}
-        return {k: float(v) for k, v in found.items()} | {"parts": self.parts, "works": self.works}
+        blocks = {
+            name: {"generated": float(energy[-1]), "peak": float(energy.max())}
+            for name, energy in self.blocks_J.items()
+        }
+        return {k: float(v) for k, v in found.items()} | {"blocks": blocks, "works": self.works}
 
 
 def user_port(results: Results) -> UserPort | None:
@@ -71,31 +78,27 @@ def user_port(results: Results) -> UserPort | None:
     time = time[time <= device["time"][-1]]
     energy = mechanism[ENERGY][: len(time)]
     stored = energy - energy[0]
-    put_in = _work(hands[HAND], hands["time"], device, DEVICE, time)
-    booked = _booked(results)
-    into = {n: w for n, w in booked.items() if " -> virtual_mechanism." in n}
-    hand = into.get(f"{_wrench(into)} -> {POINT}", 0.0)
-    coupling = sum(w for n, w in into.items() if n.endswith(".F_drift"))
-    further = sum(into.values()) - hand - coupling
-    others, on_handle = np.zeros(len(time)), float(put_in[-1])
+    put_in = {"": work(hands[HAND], hands["time"], device, DEVICE, time)}
     users = further_users(results)
-    for name in (n for n in into if n.endswith(".F_hand") and not n.endswith(f"-> {POINT}")):
-        point = name.rpartition(" -> ")[2].removesuffix(".F_hand").removeprefix(f"{BLOCK}.")
-        source = f"hand_{point}.F"
-        moved = poses(point)[1] if point in users else f"{BLOCK}.{point}.x"
-        table, hand_s = of_block(results, moved, 3), table_of(results, source)
-        if table and hand_s:
-            work = _work(hand_s[source], hand_s["time"], table, moved, time)
-            others += work
-            if point in users:
-                hand, on_handle = hand + into[name], on_handle + float(work[-1])
-                further -= into[name]
-    parts = {
-        "hand": hand - on_handle,
-        "coupling": coupling,
-        "mechanism": float(stored[-1]) - hand - coupling - further,
-    }
-    return UserPort(time, stored - put_in - others, parts, _works(results, device, time))
+    for name in users:
+        put_in[name] = np.zeros(len(time)) + _of_hand(results, name, poses(name)[1], time)
+    further = np.zeros(len(time))
+    for name in results.run["connections"]:
+        source, _, target = name.partition(" -> ")
+        point = target.removesuffix(".F_hand").removeprefix(f"{BLOCK}.")
+        if source == f"hand_{point}.F" and point not in users:
+            further += _of_hand(results, point, f"{BLOCK}.{point}.x", time)
+    blocks = by_block(results, time, stored - further, put_in)
+    generated = stored - further - sum(put_in.values())
+    return UserPort(time, generated, blocks, _works(results, device, time))
+
+
+def _of_hand(results: Results, name: str, position: str, time: Vector) -> Vector | float:
+    """The work (J) of the hand at a further point on a position; 0 where they are not recorded."""
+    table, hand = of_block(results, position, 3), table_of(results, f"hand_{name}.F")
+    if not (table and hand):
+        return 0.0
+    return work(hand[f"hand_{name}.F"], hand["time"], table, position, time)
 
 
 def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
@@ -107,17 +110,15 @@ def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
         "F_env": CONTACT,
     }
     found = {
-        name: float(_work(table[signal], table["time"], device, DEVICE, time)[-1])
+        name: float(work(table[signal], table["time"], device, DEVICE, time)[-1])
         for name, signal in signals.items()
         if (table := of_block(results, signal, 3))
     }
     if contact := of_block(results, CONTACT, 3):
-        force = contact[CONTACT]
-        mean = np.concatenate([(force[:-1] + force[1:]) / 2, force[-1:]])
-        on = _work(mean, contact["time"], contact, MECHANISM, time)
+        on = ideal(contact[CONTACT], contact["time"], contact, MECHANISM, time)
         found["F_env on the mechanism"] = float(on[-1])
     if (added := _held_mobility(results, device)) is not None:
-        found["held mobility"] = float(_work(added, device["time"], device, DEVICE, time)[-1])
+        found["held mobility"] = float(work(added, device["time"], device, DEVICE, time)[-1])
     return found
 
 
@@ -135,26 +136,3 @@ def _held_mobility(results: Results, device: Table) -> Vector | None:
         wrench = wrench + device[signal] if signal in device else wrench
     added: Vector = np.einsum("kij,kjl,kl->ki", device["haptic_device.M"], change, wrench)
     return added
-
-
-def _booked(results: Results) -> dict[str, float]:
-    """The work (J) of the held effort of each connection that carries power."""
-    across = results.run.get("energies", "none")
-    within = results.run.get("energies_within_a_rate", {})
-    booked = ({} if across == "none" else across) | within
-    return {name: energy["held"] for name, energy in booked.items()}
-
-
-def _wrench(into: dict[str, float]) -> str:
-    """What the mechanism's F_hand comes from: the hand, or the device's observer."""
-    return next((n.partition(" -> ")[0] for n in into if n.endswith(f"-> {POINT}")), HAND)
-
-
-def _work(force: Vector, stamps: Vector, moved: Table, position: str, at: Vector) -> Vector:
-    """The work (J) of the newest of the forces (n, 3), stamped `stamps`, over the steps of a
-    position until the times `at`."""
-    x, time = moved[position], moved["time"]
-    rows = np.searchsorted(stamps, time[:-1] + 1e-12, "right") - 1
-    held = force[np.maximum(rows, 0)]
-    work = np.concatenate([[0.0], (held * np.diff(x, axis=0)).sum(axis=1).cumsum()])
-    return np.interp(at, time, work)

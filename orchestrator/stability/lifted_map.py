@@ -150,7 +150,7 @@ class LiftedMap:
         for fmu, scalar, value in values:
             self._simulation.instances[fmu].connect([scalar], [0])(np.array([float(value)]))
         self._template = self._state.save()
-        self._tangent.forget()
+        self._tangent.forget({fmu for fmu, _, _ in values})
 
     def directions(self, point: Vector) -> Iterator[Vector]:
         """Orthonormal directions in which the state can be moved from `point`, that of the

@@ -14,7 +14,7 @@ are the same, so that around a state of rest each operation is differentiated on
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,9 +72,11 @@ class Tangent:
         self._known: dict[Any, list[tuple[Vector, Matrix, Matrix]]] = {}
         self._named: dict[Any, list[Coordinate]] = {}
 
-    def forget(self) -> None:
-        """Slopes found so far hold no longer, since a parameter was changed."""
-        self._known.clear()
+    def forget(self, fmus: Container[str]) -> None:
+        """Slopes of these FMUs hold no longer, since parameters of theirs were changed."""
+        for key in list(self._known):
+            if isinstance(key[0], Repeat) or getattr(key[0], "fmu", None) in fmus:
+                del self._known[key]
 
     def carry(
         self,

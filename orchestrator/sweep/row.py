@@ -99,7 +99,9 @@ def _folded(results: Results) -> Row:
 def _port(results: Results) -> Row:
     if (port := user_port(results)) is None:
         return {}
-    return {"port_generated_J": port.told["generated"], "port_peak_J": port.told["peak"]}
+    told = port.told
+    found = {"port_generated_J": told["generated"], "port_peak_J": told["peak"]}
+    return found | {f"port_J {name}": block["generated"] for name, block in told["blocks"].items()}
 
 
 def _switches(results: Results) -> Row:

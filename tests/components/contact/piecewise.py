@@ -41,7 +41,8 @@ def solve(
         found = solve_ivp(f, (t, t_end), y, "DOP853", rtol=1e-12, atol=1e-13, events=functions)
         t, y = found.t[-1], found.y[:, -1]
         for i, times in enumerate(found.t_events):
-            if len(times):
+            # One that changes at the same instant may be past it by rounding, and is not found.
+            if len(times) or functions[i](t, y) < 0.0:
                 pushing[i] = not pushing[i]
                 events += 1
     return y, events

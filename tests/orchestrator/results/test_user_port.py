@@ -17,18 +17,66 @@ SECOND = (
 )
 
 
-@pytest.mark.parametrize("options", [(), SECOND, ("coupling=jacobi",)])
-def test_its_parts_are_the_meters(tmp_path: Path, options: tuple[str, ...]) -> None:
-    """The hand's work is that of the meter on the handle, and nothing else than forces at its
-    points works on a mechanism without friction and drives."""
-    found = simulate("closed-loop", tmp_path, ["duration=1.0", *options]).results
-    port = user_port(found)
+SCENES = [
+    ("closed-loop", ()),
+    ("closed-loop", SECOND),
+    ("closed-loop", ("coupling=jacobi",)),
+    ("closed-loop", ("sensing=encoders", "controller.bias=full")),
+    ("closed-loop", ("controller.topology=false", "controller.teleoperation=false")),
+    ("closed-loop-direct", ()),
+    ("closed-loop-direct", ("hold=foh", "graphics.rate=60")),
+    ("closed-loop-direct", ("graphics.rate={min=20,max=40,seed=3}",)),
+    ("enclosure", ()),
+    ("two-users", ()),
+    ("two-users", ("graphics.rate=20", "sensing=encoders", "controllers.left.topology=false")),
+    ("serial", ("controller.damping=[1.0,1.0,0.01]",)),
+]
+
+
+@pytest.mark.parametrize(("scene", "options"), SCENES)
+def test_its_blocks_are_all_of_it(tmp_path: Path, scene: str, options: tuple[str, ...]) -> None:
+    """The blocks add up to the port at every sample, which is found from energy and works alone;
+    what the mechanism loses is its energy less the meters' works, and without friction, contacts
+    and drives, run at the ticks, nothing."""
+    results = simulate(scene, tmp_path, ["duration=1.0", *options]).results
+    port = user_port(results)
     assert port
-    booked = found.run["energies_within_a_rate"]
-    assert port.works["hand"] == pytest.approx(booked["hand.F -> haptic_device.F_hand"]["held"])
-    assert port.generated_J[-1] == pytest.approx(sum(port.parts.values()), abs=1e-12)
-    assert abs(port.parts["mechanism"]) < 1e-6
-    assert port.told["peak"] == port.generated_J.max() > 1e-4
+    total = sum(port.blocks_J.values())
+    assert np.abs(total - port.generated_J).max() < 1e-15 + 1e-13 * np.abs(port.generated_J).max()
+    across = results.run["energies"]
+    booked = ({} if across == "none" else across) | results.run["energies_within_a_rate"]
+    if port.time_s[-1] == results.run["end"]["time"]:
+        on_handle = booked["hand.F -> haptic_device.F_hand"]["held"]
+        assert port.works["hand"] == pytest.approx(on_handle)
+    energy = next(t["virtual_mechanism.energy"] for t in results.tables.values()
+                  if "virtual_mechanism.energy" in t)  # fmt: skip
+    into = sum(e["held"] for n, e in booked.items() if "-> virtual_mechanism." in n)
+    lost = port.told["blocks"]["mechanism"]["generated"]
+    assert lost == pytest.approx(energy[-1] - energy[0] - into, abs=1e-6)
+    if scene == "closed-loop":
+        assert abs(lost) < 1e-6
+
+
+def test_a_hold_of_its_drift_force_is_that_of_the_meter(tmp_path: Path) -> None:
+    results = simulate("closed-loop-direct", tmp_path, ["duration=1.0"]).results
+    port = user_port(results)
+    assert port
+    name = "controller.F_drift -> virtual_mechanism.F_drift"
+    hold = port.told["blocks"]["hold of controller.F_drift on the mechanism"]["generated"]
+    assert hold == pytest.approx(results.run["energies"][name]["generated"], abs=1e-12)
+    assert hold == pytest.approx(max(b["generated"] for b in port.told["blocks"].values()))
+
+
+def test_all_blocks_vanish_with_the_step(tmp_path: Path) -> None:
+    """At one rate, with all velocity terms, every block vanishes with the step."""
+    found = []
+    for rate in (512, 4096):
+        options = [f"haptics.rate={rate}", f"graphics.rate={rate}", "controller.bias=full"]
+        port = user_port(simulate("closed-loop", tmp_path / str(rate), options).results)
+        assert port
+        found.append({n: abs(b["generated"]) for n, b in port.told["blocks"].items()})
+    coarse, fine = found
+    assert sum(fine.values()) < sum(coarse.values()) / 4
 
 
 def test_a_held_mobility_modulates_power(tmp_path: Path) -> None:

@@ -1,0 +1,158 @@
+"""The energy generated at the user's port, by the block that generates it.
+
+With works over the mechanism (S) and the handle (D) of each user, `held` those of the wrenches as
+they are held and `ideal` those of their sources, linear in the displacement between samples
+(energy/meter.py),
+
+    drift        ideal(F_drift on D) + ideal(-F_drift on S)
+    topology     ideal(F_T on D)
+    environment  ideal(F_env on D) - ideal(F_env on S)
+    hold of C    held - ideal, of each connection C that works on the handle or the mechanism
+    shaping      F_hand on S - F_hand on D + ideal(F_env on S) - ideal(F_drift + F_T + F_env on D)
+                 - the holds in it
+    mechanism    E - E(0) - held works on S
+
+The sum is E - E(0) - F_hand on D. In an ideal rendering the handle has the motion and the kinetic
+energy of the operational point, and all are 0 but what springs and dampers store and lose: drift
+then is that of a spring-damper, mechanism that of friction, drives and the error of integration.
+Shaping is what the device, shaped by M_d Lambda^-1, has taken less than the mechanism was given: by
+a mobility or directions that are held or differ, velocity terms left out, saturation and stops.
+
+Works on the mechanism are those of the energy meters. Where a hold gives other values than the
+newest sample, they are known at the end alone, and reached there in proportion to those of the
+newest samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.tracking import of_block, poses, table_of
+
+BLOCK, CONTROLLER, HAND = "virtual_mechanism", "controller", "hand.F"
+CONTACT = f"{BLOCK}.F_env"
+
+
+class User(NamedTuple):
+    """The signals of a user: poses of the point and the handle, the wrenches on them, and the
+    mechanism's inputs `virtual_mechanism.<inputs>F_hand`, F_drift."""
+
+    point: str
+    handle: str
+    drift: str
+    topology: str
+    motors: str
+    contact: str
+    inputs: str
+
+
+def user(name: str = "") -> User:
+    """The signals of the user at a further point; the first user's name is empty."""
+    controller = f"{CONTROLLER}_{name}" if name else CONTROLLER
+    inputs = f"{BLOCK}.{name}." if name else f"{BLOCK}."
+    point, handle = poses(name)
+    return User(
+        point,
+        handle,
+        drift=f"{controller}.F_drift",
+        topology=f"{controller}.F_constraint",
+        motors=f"{controller}.F_motor",
+        contact=f"{inputs}F_env",
+        inputs=inputs,
+    )
+
+
+def by_block(
+    results: Results, time: Vector, stored: Vector, put_in: Mapping[str, Vector]
+) -> dict[str, Vector]:
+    """The energy (J) that each block has generated at the times (s), those of all users' blocks
+    added up. stored: E - E(0) less the work of hands without a device; put_in: the work of each
+    user's hand on the handle, by the user's name."""
+    blocks: dict[str, Vector] = {}
+    shaping, mechanism = np.zeros(len(time)), stored.copy()
+
+    def add(name: str, energy: Vector) -> None:
+        blocks[name] = blocks.get(name, 0.0) + energy
+
+    def on(signal: str, position: str) -> tuple[Vector, Vector] | None:
+        """Held and ideal work of a signal at a position."""
+        table, moved = of_block(results, signal, 3), of_block(results, position, 3)
+        if table is None or moved is None:
+            return None
+        force = table[signal], table["time"]
+        return work(*force, moved, position, time), ideal(*force, moved, position, time)
+
+    for each, done in ((user(name), done) for name, done in put_in.items()):
+        shaping = shaping - done
+        wrenches = {"drift": each.drift, "topology": each.topology, "environment": each.contact}
+        for name, signal in wrenches.items():
+            if found := on(signal, each.handle):
+                add(name, found[1])
+                shaping = shaping - found[1]
+        if motors := on(each.motors, each.handle):
+            add(f"hold of {each.motors}", motors[0] - motors[1])
+            shaping = shaping - (motors[0] - motors[1])
+        if contact := on(each.contact, each.point):
+            add("environment", -contact[1])
+            shaping = shaping + contact[1]
+        for name, (held, source) in _into_mechanism(results, each, time).items():
+            mechanism = mechanism - held
+            if name == each.drift:
+                add("drift", source)
+                add(f"hold of {name} on the mechanism", held - source)
+            else:
+                shaping = shaping + held
+    return {"shaping": shaping, **blocks, "mechanism": mechanism}
+
+
+def _into_mechanism(results: Results, each: User, time: Vector) -> dict[str, tuple[Vector, Vector]]:
+    """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
+    from, by that signal."""
+    across = results.run.get("energies", "none")
+    booked = ({} if across == "none" else across) | results.run.get("energies_within_a_rate", {})
+    moved, found = of_block(results, each.point, 3), {}
+    for name, energy in booked.items():
+        source, _, target = name.partition(" -> ")
+        table = table_of(results, source)
+        if target not in (f"{each.inputs}F_hand", f"{each.inputs}F_drift") or not (table and moved):
+            continue
+        sign = -1.0 if target.endswith("F_drift") else 1.0
+        force = sign * table[source], table["time"]
+        works = work(*force, moved, each.point, time), ideal(*force, moved, each.point, time)
+        found[source] = (
+            _ending(works[0], energy["held"]),
+            _ending(works[1], energy["ideal"]),
+        )
+    return found
+
+
+def _ending(series: Vector, end: float) -> Vector:
+    """`series` with the change at its end to `end` spread in proportion to its own path."""
+    path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
+    if not path[-1]:
+        path = np.linspace(0.0, 1.0, len(series)) if len(series) > 1 else np.ones(1)
+    spread: Vector = series + (end - series[-1]) * path / path[-1]
+    return spread
+
+
+def work(force: Vector, stamps: Vector, moved: Table, position: str, at: Vector) -> Vector:
+    """The work (J) of the newest of the forces (n, 3), stamped `stamps`, over the steps of a
+    position until the times `at`."""
+    x, time = moved[position], moved["time"]
+    rows = np.searchsorted(stamps, time[:-1] + 1e-12, "right") - 1
+    held = force[np.maximum(rows, 0)]
+    done = np.concatenate([[0.0], (held * np.diff(x, axis=0)).sum(axis=1).cumsum()])
+    return np.interp(at, time, done)
+
+
+def ideal(force: Vector, stamps: Vector, moved: Table, position: str, at: Vector) -> Vector:
+    """The work (J) of forces (n, 3) that are linear in the displacement between their stamps."""
+    x, time = moved[position], moved["time"]
+    at_stamps = np.stack([np.interp(stamps, time, column) for column in x.T], axis=1)
+    mean = (force[:-1] + force[1:]) / 2
+    done = np.concatenate([[0.0], (mean * np.diff(at_stamps, axis=0)).sum(axis=1).cumsum()])
+    return np.interp(at, stamps, done)
