@@ -41,7 +41,7 @@ NOT_RUN = {
     "--vary haptics.rate=512,1024 --vary 'holds.\"wall.F\"=zoh,foh' "
     "--vary 'delays.\"wall.F\"=0,0.001953125' --check 180 --seed 1 --out results/stability/wall":
         "700 points; tests/orchestrator/test_maps.py",
-    "hapticlink study": "more than 1,000 runs; tests/orchestrator/study/test_study.py",
+    "hapticlink study": "thousands of runs; tests/orchestrator/study/test_study.py",
     "hapticlink reproduce": "its runs: tests/reference/test_closed_loop.py",
     "hapticlink bench mechanism": "needs other codes",
     "hapticlink bench singular": "is long",
