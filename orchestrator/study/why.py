@@ -111,8 +111,8 @@ def _tracking(folder: Path, found: Found) -> Iterator[str]:
     unit = "largest |x_S - x_D| (mm), median"
     made = maps(folder, "tracking.png", title, panels, unit, UNSTABLE, "advised")
     text = (
-        f"{title}. Each column has the gains that the answer takes for it. Holds of higher order "
-        "track better where they are stable in every case, and generate more energy (below)."
+        f"{title}. Each column has the gains that the answer takes for it. `foh` tracks as well as "
+        "`zoh` or better where both are stable in every case, and generates more energy (below)."
     )
     yield _text(text, made, "Tracking error by hold and rate")
 
