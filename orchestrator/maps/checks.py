@@ -71,13 +71,18 @@ def work(each: Line) -> Row:
         row = judged(session, "check", [])
     if "growth_rate" not in row:
         return {"end": DONE, "rows": [row]}
-    seconds = min(LONGEST, max(SHORTEST, SPANS / max(abs(row["growth_rate"]), 1e-9)))
-    growth = _growth(each.scene, seconds)
+    seconds = long_enough(row["growth_rate"])
+    growth = growth_of_run(each.scene, seconds)
     row |= {"run_growth_rate": growth, "run_verdict": "unstable" if growth > 0 else "stable"}
     return {"end": DONE, "rows": [row | {"agree": row["run_verdict"] == row["verdict"]}]}
 
 
-def _growth(scene: Scene, seconds: float) -> float:
+def long_enough(growth: float) -> float:
+    """Seconds of a run that shows a growth rate (1/s)."""
+    return min(LONGEST, max(SHORTEST, SPANS / max(abs(growth), 1e-9)))
+
+
+def growth_of_run(scene: Scene, seconds: float) -> float:
     """The growth rate (1/s) of the mechanism's velocities between the second and the last quarter
     of a run of `seconds`; that of a run that diverges is infinite, that of one at rest minus
     infinite."""

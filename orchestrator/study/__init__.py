@@ -1,21 +1,72 @@
-"""The study of mismatched rates: effect of rates, holds and coupling on error and energy."""
+"""The study of mismatched rates: which hold, with which gains, at which graphics rate."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hapticlink.orchestrator.results import folders
-from hapticlink.orchestrator.study import errors, page
-from hapticlink.orchestrator.sweep import Tell, sweep, table
+from hapticlink.orchestrator.study import cases, choose, design, measure, page
+from hapticlink.orchestrator.study.cases import Case
+from hapticlink.orchestrator.study.methods import BIAS, COLUMNS, KEPT_APART, RATES
+from hapticlink.orchestrator.sweep import Measure, sweep, table
 from hapticlink.orchestrator.sweep.job import Job
+from hapticlink.orchestrator.sweep.row import Row
+
+SECONDS = {"run": 0.06, "map": 1.2}
+"""Processor time of a run, and of a scene at rest."""
 
 
-def study(jobs: Sequence[Job], folder: Path, room: Path, processes: int, tell: Tell) -> Path:
-    """Run the `jobs` that have no row in `room` yet, and write table, figures and README.md to
-    `folder`; `tell` is called with the number of finished runs. Raises as `sweep` does."""
+def expected(processes: int) -> float:
+    """Minutes that the whole study takes about."""
+    known, apart = cases.trained(), cases.kept_apart()
+    runs = design.count(len(known)) + design.count_apart(len(apart))
+    linkages = len({case.linkage for case in known})
+    maps = linkages * len(design.all_margins())
+    return (SECONDS["run"] * runs + SECONDS["map"] * maps) / processes / 60
+
+
+def study(
+    folder: Path,
+    room: Path,
+    processes: int,
+    tell: Callable[[str, int, int], None] = lambda stage, done, of: None,
+    trained: Sequence[Case] | None = None,
+    kept_apart: Sequence[Case] | None = None,
+) -> Path:
+    """Run what has no row in `room` yet, and write tables, figures and README.md to `folder`.
+
+    trained: the cases by which methods are chosen; kept_apart: those on which the advice is tried;
+    by default all. `tell` is called with the stage, and the numbers of its finished and of all its
+    jobs. Raises as `sweep` does.
+    """
     folders.ensure(folder)
-    rows = sweep(jobs, room, processes, tell=tell, measure=errors.measure)
-    found = errors.compared(rows)
-    table.write(folder / "table.csv", [errors.rounded(row) for row in found])
+    known, apart = trained or cases.trained(), kept_apart or cases.kept_apart()
+
+    def all_of(stage: str, jobs: Sequence[Job], by: Measure) -> list[Row]:
+        return sweep(
+            jobs, room, processes, tell=lambda done: tell(stage, done, len(jobs)), measure=by
+        )
+
+    runs = measure.compared(all_of("runs", design.runs(known), measure.of_run))
+    linkages = dict.fromkeys(case.linkage for case in known)
+    rest = all_of("maps", design.margins(linkages, design.all_margins()), measure.at_rest)
+    at = choose.margins(rest)
+    by_cell = choose.cells(r for r in runs if r["arrangement"] != design.CONTINUOUS)
+    advice = {cell: choose.choice(cell, found, at) for cell, found in by_cell.items()}
+    methods = {}
+    for arrangement in (design.DIRECT, design.MOBILITY):
+        for bias in BIAS:
+            for rate in (*COLUMNS, KEPT_APART):
+                chosen = advice[arrangement, bias, "20" if rate == KEPT_APART else rate]
+                methods[arrangement, bias, rate] = chosen.method or chosen.nearest
+    jobs = design.kept_apart_runs(apart, methods)
+    tried = measure.compared(all_of("kept apart", jobs, measure.of_run))
+    new = [x for x in dict.fromkeys(case.linkage for case in apart) if x not in linkages]
+    wanted = [(a, m, r) for (a, b, r), m in methods.items() if r in (*RATES, KEPT_APART)]
+    wanted = [w for w in dict.fromkeys(wanted) if design.mapped(w[1])]
+    rest_apart = all_of("maps kept apart", design.margins(new, wanted), measure.at_rest)
+    for name, rows in (("runs", runs), ("maps", rest), ("kept-apart", [*tried, *rest_apart])):
+        table.write(folder / f"{name}.csv", [measure.rounded(row) for row in rows])
+    found = page.Found(runs, by_cell, at, advice, methods, tried, choose.margins(rest_apart))
     return page.write(folder, found)

@@ -1,97 +1,117 @@
-"""The runs of the study, and the continuous runs that they are compared with."""
+"""The cases of the study: what is held, by which hand, with or without contact.
+
+A case is a block of the design: every hold is tried on the same cases, and holds are compared
+within a case. Hands draw their wrench or path by numpy's PCG64 with the case's seed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import product
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
-from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.sweep.job import Job, job
+import numpy as np
 
-RATES = ("10", "20", "24", "30", "40", "50", "60")
-VARIABLE = "10..60"
-SEEDS = (1, 2, 3)
-BIAS = ("none", "full")
-SYNC = ("operational", "joint")
-MODELS = {
-    "own": ("local_model=false",),
-    "held": ("local_model=true", "mechanism.stabilization=baumgarte"),
+from hapticlink.orchestrator.scene import overrides
+
+Pose = tuple[float, float, float]
+LINKAGES: dict[str, Pose] = {
+    "five-bar": (0.04452, 0.01480, -0.7878),
+    "four-bar": (0.04487, 0.01342, 0.4355),
+    "serial": (0.04455, 0.01485, -0.7854),
+    "slider-crank": (-0.00319, 0.02165, -0.2928),
 }
-"""The D, W, w and J_h of the mechanism: its own, or those held from the last frame (B.15)."""
-REFERENCE, FLOOR = 8192, 4096
-"""Rates (Hz) of the runs taken as continuous, and of those that estimate their error."""
-
-PRINTED = "printed"
-GAINS: dict[str, tuple[str, ...]] = {
-    PRINTED: (
-        "controller.teleoperation.stiffness=[100.0, 100.0, 0.5]",
-        "controller.teleoperation.damping=[70.0, 70.0, 0.375]",
-    ),
-    "weaker": (
-        "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]",
-        "controller.teleoperation.damping=[20.0, 20.0, 0.02]",
-    ),
+"""Linkages with the pose of the operational point at the start (m, m, rad)."""
+SHIPPED = {"five-bar": "closed-loop", "serial": "serial"}
+"""Scenes of linkages that are shipped with a device; the others are in linkages/."""
+WALLS = {
+    "five-bar": (-0.03, 0.068, -0.045, 0.036),
+    "serial": (-0.03, 0.068, -0.045, 0.036),
+    "four-bar": (0.025, 0.065, -0.007, 0.033),
+    "slider-crank": (-0.022, 0.018, 0.0, 0.042),
 }
-"""K_pc and B_pc: those of section B.6, and those of the scene closed-loop-direct."""
-
-MEANS = ("zoh", "foh", "foh-derivative")
-"""Holds that are also tried with the mean over the slow step in the other direction."""
-GUARDED = ("foh-derivative", "pspm")
-"""Holds of poses that are also tried with `passive` on the wrenches in the other direction."""
-WRENCHES = ("virtual_mechanism.F_hand", "virtual_mechanism.F_drift")
+"""Box of each linkage: its least and largest x, and y (m)."""
+TRAINED = ("five-bar", "four-bar", "serial")
+FORCE, MOMENT, STEP = 0.5, 0.0025, 0.02
+"""Wrenches are drawn up to these (N, N.m), steps of an arm's path up to STEP (m)."""
+AT_REST = "arm 300"
 
 
-def jobs() -> list[Job]:
-    """All runs, the references first."""
-    return [*_references(), *_direct(), *_closed_loop()]
+@dataclass(frozen=True)
+class Case:
+    """A linkage in a hand (`arm 300` is an arm of 300 N/m)."""
+
+    linkage: str
+    hand: str
+    contact: bool
+    seed: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.linkage}, {self.hand}{', contact' * self.contact}"
+
+    @property
+    def scene(self) -> str:
+        own = Path(__file__).parent / "linkages" / f"{self.linkage}.toml"
+        return SHIPPED.get(self.linkage) or str(own)
+
+    @cached_property
+    def options(self) -> tuple[str, ...]:
+        """The options of the case on its scene."""
+        found: dict[str, Any] = {"hand": _hand(self)}
+        if self.contact:
+            x0, x1, y0, y1 = WALLS[self.linkage]
+            found["contacts.enclosure"] = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+            found |= {"contacts.stiffness": 1000.0, "contacts.damping": 10.0}
+            found["controller.contact"] = True
+        return overrides.written(found)
 
 
-def _references() -> Iterator[Job]:
-    """All blocks at one high rate, with the mechanism's own Lambda^-1: nothing is held."""
-    for gains, bias, rate in product(GAINS, BIAS, (REFERENCE, FLOOR)):
-        options = ["directions_from=mechanism", f"haptics.rate={rate}", f"controller.bias={bias}"]
-        point = {"scene": "continuous", "gains": gains, "bias": bias, "rate": str(rate)}
-        yield job("closed-loop", [*options, *GAINS[gains]], point)
+def trained() -> list[Case]:
+    """The cases by which methods are chosen: 5 for each of three linkages."""
+    kinds = [("constant", False), ("profile", False), ("arm 100", False), ("arm 1000", False)]
+    kinds += [("arm 300", True)]
+    return list(_numbered(1, [(linkage, *kind) for linkage in TRAINED for kind in kinds]))
 
 
-def _closed_loop() -> Iterator[Job]:
-    """Lambda^-1 and P_c cross from the graphics rate; no power crosses rates."""
-    holds = _holds(("derivative", "power", "spring"))
-    for model, sync, bias, hold, (rate, seed, option) in product(
-        MODELS, SYNC, BIAS, holds, _rates()
-    ):
-        options = [*holds[hold], option, f"graphics.sync={sync}", f"controller.bias={bias}"]
-        point = {"gains": PRINTED, "model": model, "sync": sync, "bias": bias, "hold": hold}
-        point = {"scene": "closed-loop", **point, "rate": rate, "seed": seed}
-        yield job("closed-loop", [*options, *MODELS[model]], point)
+def kept_apart() -> list[Case]:
+    """The cases that no choice has seen: another linkage, another hand, and both."""
+    kinds = [("constant", False), ("arm 300", False), ("profile", True)]
+    found = [("slider-crank", *kind) for kind in kinds]
+    found += [(each, "spring 200", False) for each in ("five-bar", "serial", "slider-crank")]
+    return list(_numbered(101, found))
 
 
-def _direct() -> Iterator[Job]:
-    """The mechanism runs at the graphics rate: wrenches, poses and velocities cross rates."""
-    holds = _holds(())
-    for gains, bias, hold, (rate, seed, option) in product(GAINS, BIAS, holds, _rates()):
-        options = [*holds[hold], option, f"controller.bias={bias}", *GAINS[gains]]
-        point = {"gains": gains, "bias": bias, "hold": hold, "rate": rate, "seed": seed}
-        yield job("closed-loop-direct", options, {"scene": "closed-loop-direct", **point})
+def at_rest(linkage: str) -> Case:
+    """The case around whose equilibrium the lifted map is taken."""
+    return Case(linkage, AT_REST, False, 0)
 
 
-def _holds(without: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """Options of each hold from slow to fast, except for holds with the needs `without`, and for
-    `slope`, which belongs to the velocity of a pose that another hold holds."""
-    apart = (*without, "integral")
-    names = HOLDS.names(lambda kind: kind.needs not in apart and not kind.downsamples)
-    found: dict[str, tuple[str, ...]] = {n: (f"hold={n}",) for n in names}
-    means = {f"{n}, mean": (*found[n], "downsampling=mean") for n in MEANS if n in found}
-    passive = tuple(f"holds.{wrench}=passive" for wrench in WRENCHES)
-    guarded = {f"{n}, passive": (*found[n], *passive) for n in GUARDED if n in found}
-    return {**found, **means, **guarded}
+def _numbered(first: int, kinds: list[tuple[str, str, bool]]) -> Iterator[Case]:
+    for seed, kind in enumerate(kinds, first):
+        yield Case(*kind, seed)
 
 
-def _rates() -> Iterator[tuple[str, str, str]]:
-    """Rate, seed ("" for a fixed rate) and option of each graphics rate."""
-    for rate in RATES:
-        yield rate, "", f"graphics.rate={rate}"
-    low, high = VARIABLE.split("..")
-    for seed in SEEDS:
-        bounds = f"{{ min = {low}, max = {high}, seed = {seed} }}"
-        yield VARIABLE, str(seed), f"graphics.rate={bounds}"
+def _hand(case: Case) -> dict[str, Any]:
+    """The table [hand] of a case."""
+    draw = np.random.Generator(np.random.PCG64(case.seed))
+    kind, _, stiffness = case.hand.partition(" ")
+    if kind == "constant":
+        angle, turn = draw.uniform(-np.pi, np.pi), draw.uniform(-1.0, 1.0)
+        force = [FORCE * np.cos(angle), FORCE * np.sin(angle), MOMENT * turn]
+        return {"type": "constant", "wrench": [float(f) for f in force]}
+    if kind == "profile":
+        wrenches = draw.uniform(-1.0, 1.0, (5, 3)) * (FORCE, FORCE, MOMENT)
+        table = [[0.75 * i, *map(float, w)] for i, w in enumerate(wrenches)]
+        return {"type": "profile", "damping": [1.0, 1.0, 0.002], "table": table}
+    k = float(stiffness)
+    x, y, theta = LINKAGES[case.linkage]
+    steps = (1.5 if case.contact else 1.0) * draw.uniform(-STEP, STEP, (6, 2))
+    path = [[0.0, x, y, theta]]
+    if case.seed:
+        path += [[t / 2, x + dx, y + dy, theta] for t, (dx, dy) in enumerate(steps.tolist(), 1)]
+    b = 1.4 * np.sqrt(k)  # a damping ratio of 0.7 with an arm of 1 kg
+    hand = {"type": kind, "stiffness": [k, k, 0.0], "damping": [float(b), float(b), 0.01]}
+    return {**hand, "target": path}

@@ -45,7 +45,7 @@ NOT_RUN = {
         "takes minutes; tests/orchestrator/test_tune.py",
     "hapticlink tune enclosure --set sensing=encoders --margin 2 --hertz 2 --out tuned/enclosure":
         "takes minutes; tests/orchestrator/test_tune.py",
-    "hapticlink study": "more than 1,000 runs; tests/orchestrator/study/test_study.py",
+    "hapticlink study": "thousands of runs; tests/orchestrator/study/test_study.py",
     "hapticlink reproduce": "its runs: tests/reference/test_closed_loop.py",
     "hapticlink bench mechanism": "needs other codes",
     "hapticlink bench singular": "is long",

@@ -1,134 +1,192 @@
-"""The study: its cases are scenes, its errors are distances, its page says what the rows say."""
+"""The study: its cases are scenes, its comparisons are within cases, its page says what the rows
+say."""
 
+from __future__ import annotations
+
+import csv
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.study import cases, errors, figures, page
-from hapticlink.orchestrator.study.grids import COLUMNS, best, grid, short, stable_rates
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.study import cases, choose, design, expected, measure
+from hapticlink.orchestrator.study import study as make
+from hapticlink.orchestrator.study.choose import choice, within
+from hapticlink.orchestrator.study.design import DIRECT, MOBILITY
+from hapticlink.orchestrator.study.methods import HOLDS, RATES, Method
+from hapticlink.orchestrator.sweep.job import Job
 from hapticlink.orchestrator.sweep.row import Row
 from tests.orchestrator.conftest import status
 
+ALL = [*cases.trained(), *cases.kept_apart()]
 
-def test_every_case_is_a_scene_and_every_hold_a_case(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cases, "RATES", ("30",))
-    monkeypatch.setattr(cases, "SEEDS", (1,))
-    monkeypatch.setattr(cases, "BIAS", ("full",))
-    made = cases.jobs()
+
+@pytest.mark.parametrize("arrangement", [DIRECT, MOBILITY, design.CONTINUOUS])
+def test_every_case_is_a_scene(arrangement: str) -> None:
+    rate = str(design.REFERENCE) if arrangement == design.CONTINUOUS else "24"
+    made = [design.run(arrangement, c, Method("zoh", "stiff"), "full", rate) for c in ALL]
     assert [j.refusal for j in made if j.scene is None] == []
-    assert len({j.key for j in made}) == len(made)  # no two cases are one run
-    held = {j.point["hold"] for j in made if j.point["scene"] == "closed-loop-direct"}
-    assert {h for h in held if "," not in h} == HOLDS.keys() - {"latest", "mean", "slope"}
+    assert len({j.key for j in made}) == len(ALL)  # no two cases are one run
 
 
-def _row(path: Any, **point: str) -> Row:
-    return {**point, "end": "duration", "end_time_s": 3.0, errors.PATH: path}
-
-
-def test_errors_are_distances_up_to_the_first_end() -> None:
-    rest = np.zeros((385, 2))  # 3 s at 128 Hz
-    early, late = rest.copy(), rest.copy()
-    early[64:] = 3e-3, 4e-3  # 5 mm from .5 s on
-    late[129:] = 6e-3, 8e-3  # 10 mm, just after the first second
-    parts = {"scene": "s", "gains": "printed", "hold": "zoh", "rate": "30", "seed": ""}
-    rows = [
-        _row(rest, **errors.continuous("printed", "none")),
-        _row(rest, **errors.continuous("printed", "full")),
-        _row(late, **parts, bias="none"),
-        _row(early[:200], **parts, bias="full"),
+def test_every_method_is_a_scene() -> None:
+    made = [design.run(DIRECT, ALL[0], m, "none", "30") for m in design.methods(DIRECT, "none")]
+    made += [
+        design.run(MOBILITY, ALL[0], m, "none", "30") for m in design.methods(MOBILITY, "none")
     ]
-    reference, _, none, full = errors.compared(rows)
-    assert none["coupling_1s_mm"] == 0
-    assert none["coupling_max_mm"] == pytest.approx(10)
-    assert full["coupling_1s_mm"] == full["coupling_max_mm"] == pytest.approx(5)
-    assert none["modelling_1s_mm"] == none["modelling_max_mm"] == pytest.approx(5)
-    assert reference["modelling_max_mm"] == 0
-    assert "coupling_max_mm" not in reference
-    assert all(errors.PATH not in r for r in (reference, none, full))
+    assert [j.refusal for j in made if j.scene is None] == []
+    assert len({j.key for j in made}) == len(made)
 
 
-def test_a_cell_lasts_where_all_its_seeds_do() -> None:
+def test_what_is_kept_apart_is_in_no_choice() -> None:
+    known = {part for c in cases.trained() for part in (c.linkage, c.hand)}
+    for case in cases.kept_apart():
+        assert case.linkage not in known or case.hand not in known
+    assert not {c.seed for c in cases.trained()} & {c.seed for c in cases.kept_apart()}
+
+
+def test_the_expected_time_counts_all_jobs() -> None:
+    one = [cases.trained()[0]]
+    made = design.runs(one)
+    assert len(made) == design.count(1)
+    both = product((DIRECT, MOBILITY), ("none", "full"), (*RATES, "10..60", "24"))
+    methods = dict.fromkeys(both, Method("foh", "soft"))
+    assert len(design.kept_apart_runs(one, methods)) == design.count_apart(1)
+    assert 0 < expected(2) == 2 * expected(4)
+
+
+@pytest.mark.parametrize("linkage", cases.LINKAGES)
+def test_arms_start_at_the_mechanism(linkage: str, tmp_path: Path) -> None:
+    job = design.run(DIRECT, cases.at_rest(linkage), Method("zoh", "soft"), "none", "30")
+    assert job.scene
+    pose = simulate(job.scene, tmp_path, ["duration=0.01"]).results.graphics["virtual_mechanism.x"]
+    assert pose[0] == pytest.approx(cases.LINKAGES[linkage], abs=5e-5)
+
+
+def test_a_run_and_its_map_at_rest(tmp_path: Path) -> None:
+    """The serial arm at 57 Hz with medium gains: stable, and the run after a kick decays."""
+    scene = design.run(DIRECT, cases.at_rest("serial"), Method("zoh", "medium"), "none", "57").scene
+    assert scene
+    experiment = simulate(scene, tmp_path, ["duration=1.0"])
+    row = measure.of_run(experiment)
+    assert within(row)
+    assert len(row[measure.PATH]) == measure.GRID + 1
+    rest = measure.at_rest(experiment)
+    assert (rest["verdict"], rest[measure.RUN]) == ("stable", "stable")
+    assert 0.5 < rest[measure.MARGIN] < 20.0
+
+
+def test_coupling_errors_are_distances_up_to_the_first_end() -> None:
+    rest = np.zeros((65, 2))
+    moved = rest.copy()
+    moved[32:] = 3e-3, 4e-3
+    base = {"case": "c", "bias": "full", "end": "duration"}
+    reference = {**base, "arrangement": design.CONTINUOUS, "rate": str(design.REFERENCE)}
+    other = {**base, "arrangement": DIRECT, "rate": "30"}
+    rows = [
+        {**reference, measure.PATH: rest.tolist()},
+        {**other, measure.PATH: moved.tolist()},
+        {**other, measure.PATH: moved[:20].tolist()},
+    ]
+    first, whole, short = measure.compared(rows)
+    assert measure.COUPLING not in first
+    assert whole[measure.COUPLING] == pytest.approx(5.0)
+    assert short[measure.COUPLING] == 0.0
+    assert all(measure.PATH not in row for row in (first, whole, short))
+
+
+def _row(error: float, peak: float = 0.0, end: str = "duration") -> Row:
+    found: Row = {"tracking_max_mm": error, "theta_max_rad": 0.1, "port_peak_J": peak}
+    return found | {"hand_work_J": 0.02, "coupling_1s_mm": error, "end": end, "end_time_s": 3.0}
+
+
+def _of(errors: list[float]) -> dict[str, Row]:
+    return {f"case {i}": _row(e) for i, e in enumerate(errors)}
+
+
+CELL = (DIRECT, "none", "30")
+ZOH, FOH, PSPM = Method("zoh", "soft"), Method("foh", "soft"), Method("pspm, passive", "soft")
+
+
+def test_only_what_keeps_the_limits_everywhere_is_advised() -> None:
+    good = _of([2.0] * 8)
+    for bad in (_row(1.0, peak=5.1e-3), _row(43.0), _row(1.0, end="stop_when")):
+        found = choice(CELL, {ZOH: good, FOH: {**_of([1.0] * 8), "case 3": bad}}, {})
+        assert (found.method, found.ties) == (ZOH, (ZOH,))
+    enough = choice(CELL, {FOH: {**_of([1.0] * 8), "case 3": _row(1.0, peak=4.9e-3)}}, {})
+    assert enough.method == FOH
+    none = choice(CELL, {ZOH: {**good, "case 1": _row(50.0)}}, {})
+    assert (none.method, none.nearest, none.most, none.of) == (None, ZOH, 7, 8)
+
+
+def test_an_unstable_map_forbids_a_method() -> None:
+    rows = {ZOH: _of([1.0] * 4), FOH: _of([2.0] * 4)}
+    at = {
+        (DIRECT, ZOH, "30"): {"serial": {measure.MARGIN: 1.0}, "four-bar": {measure.MARGIN: -0.1}}
+    }
+    assert choice(CELL, rows, at).method == FOH
+    assert choice(CELL, rows, {}).method == ZOH
+
+
+def test_a_winner_only_beyond_the_spread() -> None:
+    """foh is better in 7 of 8 cases, then in 5: within the spread the simpler one is advised."""
+    zoh = [2.0] * 8
+    wins = choice(CELL, {ZOH: _of(zoh), FOH: _of([1.0] * 7 + [3.0])}, {})
+    assert (wins.method, wins.best, wins.ties) == (FOH, FOH, (FOH,))
+    ties = choice(CELL, {ZOH: _of(zoh), FOH: _of([1.0] * 5 + [3.0] * 3)}, {})
+    assert (ties.method, ties.best, ties.ties) == (ZOH, FOH, (ZOH, FOH))
+
+
+def test_errors_are_compared_within_cases() -> None:
+    """Cases that differ a hundredfold do not hide a tenth within each."""
+    scale = np.geomspace(0.1, 10.0, 8)
+    rows = {ZOH: _of((1.1 * scale).tolist()), FOH: _of(scale.tolist())}
+    assert choice(CELL, rows, {}).ties == (FOH,)
+
+
+def _sweep(jobs: list[Job], *_: Any, measure: Any, **__: Any) -> list[Row]:
+    """Rows as if `foh` were right, medium gains unstable at 10 Hz, and soft maps unstable never."""
     rows: list[Row] = []
-    for rate in COLUMNS:
-        for hold, factor in (("zoh", 2.0), ("foh", 1.0)):
-            for seed in (1, 2) if rate == cases.VARIABLE else ("",):
-                lost = hold == "foh" and seed == 2
-                end: Row = {"end": "stop_when", "end_time_s": 1.5} if lost else {"end": "duration"}
-                value = factor * (seed or 1)
-                point = {"hold": hold, "rate": rate, "bias": "full"}
-                together = {"tracking_max_mm": 5.0, "theta_max_rad": 0.1}
-                rows.append({**point, "m": value, **together, **end})
-    found = grid(rows, "m", bias="full")
-    assert found["zoh"]["10..60"].value == 4.0  # the worse seed
-    assert (found["foh"]["10..60"].value, found["foh"]["10..60"].end) == (None, 0.0)
-    assert (best(found, "30"), best(found, "10..60")) == ("foh", "zoh")
-    assert stable_rates(found, "foh") == list(cases.RATES)
-    assert grid(rows, "m", bias="none") == {}
-    for what, limit in (("tracking_max_mm", 42.0), ("theta_max_rad", 1.0)):
-        apart = [{**r, what: limit, "end_time_s": 3.0} for r in rows]
-        cell = grid(apart, "m", bias="full")["zoh"]["30"]
-        assert (cell.value, cell.end) == (None, 3.0)
-
-
-def test_numbers_are_short() -> None:
-    assert [short(v) for v in (1859.0, 0.0034, 104.9, 7.0, None, float("nan"))] == [
-        "1900", "0.0034", "100", "7", "", "",
-    ]  # fmt: skip
-
-
-@pytest.fixture
-def cells(monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[str, list[str]]]:
-    """What the cells of each map's first panel say, by file name and hold, a rate after another."""
-    found: dict[str, dict[str, list[str]]] = {}
-    save = figures.save
-
-    def keep(figure: Any, folder: Path, name: str) -> str:
-        texts = np.reshape([text.get_text() for text in figure.axes[0].texts], (-1, len(COLUMNS)))
-        holds = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-        found[name] = {h: row.tolist() for h, row in zip(holds, texts, strict=True)}
-        return save(figure, folder, name)
-
-    monkeypatch.setattr(figures, "save", keep)
-    return found
-
-
-def test_the_page_names_the_hold_of_the_least_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cells: dict[str, dict[str, list[str]]]
-) -> None:
-    """Rows of every case, as if the mean were right and the second-order hold lost everywhere."""
-    monkeypatch.setattr(cases, "job", lambda scene, options, point: point)
-    rows: list[Row] = []
-    for i, point in enumerate(cases.jobs()):
-        hold = point.get("hold", "")  # type: ignore[attr-defined]
-        lost = hold == "second-order" or point.get("model") == "held"  # type: ignore[attr-defined]
-        error = 1.0 if hold == "foh, mean" else 5.0 + i / 1e4
+    for job in jobs:
+        point = dict(job.point)
+        if point["hand"] == cases.AT_REST and point["contact"] == "false" and point["seed"] == "0":
+            found: Row = {"end": "duration", "verdict": "stable", "run_verdict": "stable"}
+            rows.append(
+                {**point, **found, "margin_1_per_s": 2.0 - 3.0 * (point["gains"] != "soft")}
+            )
+            continue
+        lost = point["rate"] == "10" and point["gains"] != "soft" and point["bias"] == "full"
+        error = 1.0 if point["hold"] == "foh" else 5.0
+        held = point["arrangement"] != design.CONTINUOUS
+        path = [[1e-3 * error * held, 0.0]] * 65
         rows.append(
-            {
-                **point,  # type: ignore[dict-item]
-                "end": "stop_when" if lost else "duration",
-                "end_time_s": 1.25 if lost else 3.0,
-                "tracking_max_mm": error,
-                "theta_max_rad": 0.1,
-                "coupling_1s_mm": error,
-                "coupling_max_mm": error,
-                "modelling_1s_mm": error,
-                "held_energy_peak_J": -0.002,
-            }
+            {**point, **_row(error, end="stop_when" if lost else "duration"), "handle": path}
         )
-    text = page.write(tmp_path, rows).read_text()
-    for rate in COLUMNS:
-        assert f"| {rate} | `foh, mean` | 1 | 5" in text
-    assert "| `second-order` | none | | | |" in text
-    assert "| of the last frame (B.15) | the pose | off | 64 of 64 |  |  |   |" in text
-    best = {"direct_tracking": "1", "direct_energy": "-2", "printed_gains": "1"}
-    for name, value in (best | {"loop_coupling": "1"}).items():
+    return rows
+
+
+def test_the_page_gives_the_advice_of_the_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hapticlink.orchestrator.study.sweep", _sweep)
+    monkeypatch.setattr(design, "job", lambda scene, options, point: Job(point, None))
+    trained = [c for c in cases.trained() if c.hand == "constant"]
+    path = make(tmp_path, tmp_path, 1, trained=trained, kept_apart=cases.kept_apart()[:2])
+    text = path.read_text()
+    assert text.index("| take |") < text.index("## Why") < text.index("## Kept apart")
+    for rate in ("10", "20", "30", "57"):
+        assert f"| {rate} | `foh`, soft | 3 of 3 | 1 (1 to 1; 1) |" in text
+    assert "Coriolis compensation on: graphics rate" in text
+    figures = ("gains", "tracking", "energy", "margins", "integrators", "mobility")
+    for name in figures:
         assert f"({name}.png)" in text
         assert (tmp_path / f"{name}.png").is_file()
-        assert cells[f"{name}.png"]["foh, mean"] == [value] * len(COLUMNS)
-        assert cells[f"{name}.png"]["second-order"] == ["1.2 s"] * len(COLUMNS)  # when it was lost
+    with (tmp_path / "runs.csv").open() as file:
+        assert sum(1 for _ in csv.DictReader(file)) == design.count(len(trained))
+    design.run.cache_clear()
 
 
 def test_a_folder_that_cannot_be_is_told_before_any_run(
@@ -137,3 +195,9 @@ def test_a_folder_that_cannot_be_is_told_before_any_run(
     monkeypatch.setattr("hapticlink.orchestrator.study.sweep", lambda *_, **__: pytest.fail("runs"))
     (tmp_path / "file").write_text("")
     assert status("study", "--out", tmp_path / "file") == 2
+
+
+def test_holds_and_gains_have_an_order() -> None:
+    assert choose.order(Method("zoh", "stiff")) < choose.order(Method("zoh", "soft"))
+    assert choose.order(Method("zoh", "soft")) < choose.order(Method("foh", "stiff"))
+    assert next(iter(HOLDS)) == "zoh"
