@@ -51,14 +51,14 @@ def margins(rows: Iterable[Row]) -> Margins:
     return found
 
 
-def energy(row: Row) -> float:
+def energy(row: Row, share: float = SHARE) -> float:
     """The peak of the energy generated at the user's port, relative to what is allowed."""
-    return max(0.0, float(row[PEAK])) / max(LEAST, SHARE * row[WORK])
+    return max(0.0, float(row[PEAK])) / max(LEAST, share * row[WORK])
 
 
-def within(row: Row) -> bool:
+def within(row: Row, share: float = SHARE) -> bool:
     """Whether a run keeps both limits."""
-    return stable(row) and energy(row) <= 1.0
+    return stable(row) and energy(row, share) <= 1.0
 
 
 def margin(at: Margins, arrangement: str, of: Method, rate: str) -> float | None:
@@ -88,9 +88,15 @@ class Choice:
     of: int
 
 
-def choice(cell: Cell, by_method: Mapping[Method, Mapping[str, Row]], at: Margins) -> Choice:
+def choice(
+    cell: Cell,
+    by_method: Mapping[Method, Mapping[str, Row]],
+    at: Margins,
+    share: float = SHARE,
+) -> Choice:
+    """The advice for a cell, with `share` as the limit of energy."""
     arrangement, _, rate = cell
-    counts = {m: sum(map(within, rows.values())) for m, rows in by_method.items()}
+    counts = {m: sum(within(r, share) for r in rows.values()) for m, rows in by_method.items()}
     of = max(len(rows) for rows in by_method.values())
     simple = sorted(by_method, key=order)
     nearest = max(simple, key=counts.__getitem__)

@@ -10,6 +10,7 @@ from hapticlink.orchestrator.study import apart, why
 from hapticlink.orchestrator.study.choose import (
     LEAST,
     SHARE,
+    choice,
     energy,
     margin,
     metric,
@@ -27,7 +28,8 @@ WIDTH = 108
 def write(folder: Path, found: Found) -> Path:
     """Writes the page, README.md of `folder`, and its figures; returns its path."""
     parts = ["# The mismatch of rates: which hold, with which gains, at which graphics rate"]
-    parts += [*_answer(found), *why.sections(folder, found), *apart.section(found), *_limits(found)]
+    parts += [*_answer(found), *why.sections(folder, found), *_other_limits(found)]
+    parts += [*apart.section(found), *_limits(found)]
     path = folder / "README.md"
     path.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
     return path
@@ -110,6 +112,33 @@ def _table(found: Found, arrangement: str, bias: str) -> Iterator[str]:
     yield "\n".join(lines)
 
 
+SHARES = (0.1, SHARE, 0.5, 1.0)
+
+
+def _other_limits(found: Found) -> Iterator[str]:
+    """What other limits of the energy at the user's port would advise."""
+    yield "## What the limit of energy decides"
+    yield paragraph(
+        f"The share of {SHARE:.0%} was set when runs had been seen, so that it is no part of the "
+        "evidence. A mechanism at the graphics rate, with other shares of the hand's work:"
+    )
+    columns = [(bias, rate) for bias in BIAS for rate in COLUMNS]
+    heads = [f"{COMPENSATION[bias].split()[-1]}, {rate}" for bias, rate in columns]
+    lines = ["| | " + " | ".join(heads) + " |", "|---" * (1 + len(columns)) + "|"]
+    for share in SHARES:
+        row = []
+        for bias, rate in columns:
+            cell = (DIRECT, bias, rate)
+            chosen = choice(cell, found.cells[cell], found.margins, share)
+            row.append(named(chosen.method) if chosen.method else f"{chosen.most} of {chosen.of}")
+        lines.append(f"| {share:.0%} | " + " | ".join(row) + " |")
+    yield "\n".join(lines)
+    yield paragraph(
+        "Columns: Coriolis compensation, graphics rate (Hz). Where nothing is advised: the most "
+        "cases within the limits."
+    )
+
+
 def _ties(ties: Sequence[Method]) -> str:
     others = [named(m) for m in ties[1:]]
     if not others:
@@ -145,7 +174,7 @@ def _limits(found: Found) -> Iterator[str]:
         "quarter: the continuous runs, which no hold disturbs, generate up to "
         f"{_continuous(found):.0%} without Coriolis compensation, and a limit below that would "
         "refuse the ideal. The report's gains and the integrators were tried without Coriolis "
-        "compensation, as in the report, alone. The continuous "
+        "compensation alone, to save runs. The continuous "
         f"runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by up to {size:.1g} mm "
         "within 1 s, so that smaller differences mean nothing."
     )
