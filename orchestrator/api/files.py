@@ -69,6 +69,8 @@ def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path)
 
 
 def _starts(scene: Scene) -> dict[str, dict[str, tuple[float, ...]]]:
+    if not (scene.device or scene.connection or scene.fmu):
+        return {}  # a mechanism alone, which no connection starts: its FMU is built once
     # Python FMUs give the same values as native ones, and need no compiler.
     with built(replace(scene, packaging="python")) as system:
         return start_parameters.by_port(system)
