@@ -78,9 +78,8 @@ def _how(
         "Run time: native FMUs under the compiled loop, only the handle recorded, without "
         "start-up; median and quartiles of interleaved rounds, comparable within one run of the "
         "benchmark. A run is unstable if it ends early, or if its handle is a link's length "
-        f"({APART:g} mm) from the reference; unstable points stay, marked. Holds of Lambda^-1 and "
-        "P_c other than `zoh` keep them semidefinite and a projector by eigenvalues, in Python, "
-        "and so do repetitions of `iterated`: their run time is that of Python. All points: "
+        f"({APART:g} mm) from the reference; unstable points stay, marked. Repetitions of "
+        "`iterated` run in Python: their run time is that of Python. All points: "
         "[table.csv](table.csv), all runs: [runs.csv](runs.csv)."
     )
     texts = (text, *_study(found), time)
