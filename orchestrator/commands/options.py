@@ -55,11 +55,12 @@ Json = Annotated[
 
 
 def options(set: Iterable[str] | None, swap: Iterable[str] | None) -> tuple[str, ...]:
-    """The options of a scene: those of --set, and an [[fmu]] with `replaces` for each --swap.
+    """The options of a scene: an [[fmu]] with `replaces` for each --swap, then those of --set,
+    which may change it (`--set fmu.controller.start.k=2`).
 
     Raises InputFault for a swap that is not block=file.
     """
-    return (*(set or ()), *map(_swap, swap or ()))
+    return (*map(_swap, swap or ()), *(set or ()))
 
 
 def _swap(given: str) -> str:

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from hapticlink.orchestrator.base.say import say
 
 Runs = Annotated[list[Path], Parameter(help="Folders of runs.", negative="")]
-Out = Annotated[Path | None, Parameter(help="File to write; by default reports/<runs>.html.")]
+Out = Annotated[Path | None, Parameter(help="File to write; by default reports/RUNS.html.")]
 
 
 def report(runs: Runs, /, *, out: Out = None) -> int:

@@ -25,7 +25,7 @@ KINDS = {
     "folded": ("#cc3311", "graphics copy folded"),
     "saturated": ("#ee7733", "motors at their limit"),
     "energy": ("#ddaa00", "energy generated at the user's port"),
-    "constraints": ("#aa3377", "other number of constrained directions"),
+    "constraints": ("#aa3377", "unusual number of constrained directions"),
     "contacts": ("#4477aa", "contacts"),
     "outside": ("#777777", "outside the device's workspace"),
 }

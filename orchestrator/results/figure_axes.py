@@ -15,6 +15,7 @@ import numpy as np
 from hapticlink.orchestrator.results.tables import Results
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _ENDS = {
@@ -82,6 +83,16 @@ def legend_below(figure: Figure) -> None:
     legend = figure.legend(fontsize="x-small", ncols=COLUMNS, loc="lower center")
     rows = -(-len(legend.get_texts()) // COLUMNS)
     framed(figure, bottom=MARGINS["bottom"] + 0.15 + ROW * rows)
+
+
+def legend_above_curves(axes: Axes, columns: int) -> None:
+    """A legend at the top of the axes, which are extended so that it covers no curve."""
+    legend = axes.legend(fontsize="x-small", ncols=columns, loc="upper left")
+    rows = -(-len(legend.get_texts()) // columns)
+    height = axes.get_position().height * axes.figure.get_size_inches()[1]
+    covered = min((ROW * rows + 0.2) / height, 0.5)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, low + (high - low) / (1 - covered))
 
 
 def save(figure: Figure, path: Path) -> None:

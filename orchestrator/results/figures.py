@@ -39,6 +39,13 @@ if TYPE_CHECKING:
 
 DRAWN = 0.02
 """Of the largest energy at the user's port, above which a block's is drawn."""
+SOURCES = {
+    "shaping": "shaping of the device's inertia",
+    "drift": "virtual coupling, F_drift",
+    "topology": "topology controller, F_T",
+    "environment": "contacts, F_env",
+}
+"""The blocks of `port_blocks.py` as a reader knows them."""
 CONTACT, COORDINATES = "virtual_mechanism.F_env", "virtual_mechanism.q"
 
 
@@ -189,13 +196,15 @@ def _constraints(results: Results, table: Table, name: str) -> Figure:
 def _port(results: Results, port: UserPort) -> Figure:
     peak = 1e3 * port.told["peak"]
     largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
-    title = f"The rendering generates at most {short(peak)} mJ, most of it by: {largest}"
+    title = f"The rendering generates at most {short(peak)} mJ"
+    if peak > 0:
+        title += f"; its largest source is the {SOURCES.get(largest, largest)}"
     label = "energy generated at the user's port (mJ)"
     figure, axes = titled(results, title, "time (s)", label)
-    axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="all")
+    axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="in all")
     for name, energy in port.blocks_J.items():
         if np.abs(energy).max() > DRAWN * np.abs(port.generated_J).max():
-            axes.plot(port.time_s, 1e3 * energy, lw=1.0, label=fill(name, 28))
+            axes.plot(port.time_s, 1e3 * energy, lw=1.0, label=fill(SOURCES.get(name, name), 28))
     axes.axhline(0, color="0.4", lw=0.8)
     figure_axes.legend_below(figure)
     return figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hapticlink.components.specs.device import Device
-from hapticlink.orchestrator.results.figure_axes import short, titled
+from hapticlink.orchestrator.results.figure_axes import legend_above_curves, short, titled
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.orchestrator.results.tracking import of_block
 
@@ -53,19 +53,20 @@ def forces(results: Results, device: Device | None) -> Figure | None:
     if not found:
         return None
     largest, (_, force, _) = max(found.items(), key=lambda item: item[1][1].max())
-    title = f"Largest force {short(force.max())} N, of {largest}"
+    title = f"The largest force is that of the {largest}: {short(force.max())} N"
     labels = ["force (N)", "moment (N.m)", *(["motor torque (N.m)"] if driven else [])]
     if driven and device:
         share = 100 * np.abs(driven[1]).max() / device.torque_limit
-        title += f"; motors use {short(share)} % of their torque"
+        title += f"; motors reach {short(share)} % of their torque limit"
     figure, axes = titled(results, title, "time (s)", *labels)
     for name, (time, force, moment) in found.items():
         axes[0].plot(time, force, lw=1, label=name)
         axes[1].plot(time, moment, lw=1)
-    axes[0].legend(fontsize="x-small", ncols=2)
+    legend_above_curves(axes[0], columns=2)
     if driven and device:
         axes[2].plot(driven[0], driven[1], lw=1, label=[f"motor {i}" for i in (1, 2, 3, 4)])
         for limit in (-device.torque_limit, device.torque_limit):
-            axes[2].axhline(limit, color="k", lw=0.8, ls="--")
-        axes[2].legend(fontsize="x-small", ncols=4)
+            label = "limit" if limit > 0 else None
+            axes[2].axhline(limit, color="k", lw=0.8, ls="--", label=label)
+        legend_above_curves(axes[2], columns=5)
     return figure

@@ -53,7 +53,7 @@ def numbers(results: Results) -> Iterator[str]:
         rms = float(np.sqrt(np.mean(distance**2)))
         yield (
             f"handle at most {short(distance.max())} mm from the operational point, "
-            f"{short(rms)} mm RMS; at most {short(error.angle_rad.max())} rad"
+            f"{short(rms)} mm RMS; turned from it by at most {short(error.angle_rad.max())} rad"
         )
     for user in further_users(results):
         further = pose_error(results, user)
@@ -61,7 +61,7 @@ def numbers(results: Results) -> Iterator[str]:
             continue
         yield (
             f"handle of {user} at most {short(further.distance_mm.max())} mm from its point; "
-            f"at most {short(further.angle_rad.max())} rad"
+            f"turned from it by at most {short(further.angle_rad.max())} rad"
         )
         margin = f"haptic_device_{user}.workspace_margin"
         table = of_block(results, margin)

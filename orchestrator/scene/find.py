@@ -15,7 +15,8 @@ def shipped() -> dict[str, Any]:
     """The files of the scenes that are shipped with the package, by name."""
     folder = importlib.resources.files("hapticlink.scenes")
     names = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return {entry.name.removesuffix(".toml"): entry for entry in sorted(names, key=str)}
+    files = {entry.name.removesuffix(".toml"): entry for entry in names}
+    return dict(sorted(files.items()))
 
 
 def find(scene: str, folder: FilePath | None = None) -> tuple[str, str]:

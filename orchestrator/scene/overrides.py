@@ -125,7 +125,10 @@ def _entry(entries: list[Any], name: str, option: str) -> int:
         return len(entries) - 1
     if re.fullmatch(r"[0-9]{1,9}", name) and int(name) < len(entries):
         return int(name)
-    known = [str(e.get("name", i)) for i, e in enumerate(entries) if isinstance(e, dict)]
+    own = [
+        e.get("name", e.get("replaces", i)) for i, e in enumerate(entries) if isinstance(e, dict)
+    ]
+    known = [str(each) for each in own]
     if name in known:
         return known.index(name)
     raise InputFault(f"--set {shortened(option)}: {unknown('entry', name, known)}")

@@ -47,17 +47,19 @@ export class Arrows {
       return entry(color, `force, ${name} `, this.values[key]);
     });
     for (const [key] of FORCES) this.values[key] ??= document.createElement("b");
-    if (frame.directions) items.push(entry("#aa3377", "constrained directions", null, true));
-    if (frame.ghost) items.push(entry("#333", "as the graphics block has it", null, true));
+    if (frame.handle) items.unshift(entry("#cc3311", "operational point", null, "cross"), entry("#cc3311", "handle", null, "ring"));
+    if (frame.directions) items.push(entry("#aa3377", "constrained directions", null, "dashed"));
+    if (frame.ghost) items.push(entry("#333", "as the graphics block has it", null, "dashed"));
     if (frame.arms) items.push(entry("#c3c7d0", "device"));
     this.legend.replaceChildren(...items);
   }
 }
 
-function entry(color, name, value, dashed) {
+// A line of a colour, or what `look` says: dashed, cross, ring.
+function entry(color, name, value, look) {
   const item = document.createElement("li"), chip = document.createElement("i");
-  chip.style.borderTopColor = color;
-  if (dashed) chip.className = "dashed";
+  chip.style.color = color;
+  if (look) chip.className = look;
   item.append(chip, name);
   if (value) item.append(value);
   return item;

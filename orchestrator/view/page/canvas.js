@@ -12,10 +12,14 @@ export function fitted(canvas) {
   return { context, width, height };
 }
 
+// Below it a value is rounding, which a chart does not magnify and a number leaves out.
+export const ROUNDING = { mm: 1e-6, N: 1e-6, m: 1e-15, mJ: 1e-6 };
+
 // A number with its unit, in three digits; a count, without a unit, as it is.
 export function text(value, unit) {
-  const size = Math.abs(value);
+  const size = Math.abs(value) < (ROUNDING[unit] ?? 0) ? 0 : Math.abs(value);
   if (unit === "count" || !size) return unit === "count" ? String(value) : `0 ${unit}`;
+  if (unit === "1") return value.toFixed(2);
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
   return `${size && size < 0.01 ? value.toExponential(0) : value.toFixed(digits)} ${unit}`;
 }

@@ -1,5 +1,5 @@
 // Strip charts: of the last 10 s of a run that goes on, or of whole runs that are recorded.
-import { fitted, text } from "./canvas.js";
+import { ROUNDING, fitted, text } from "./canvas.js";
 
 const SPAN = 10, LEFT = 44, COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee"];
 const size = (v) => v && Math.hypot(v[0], v[1]);
@@ -96,16 +96,15 @@ class Chart {
     const [from, to] = span ?? [newest - SPAN, newest];
     const { context, width, height } = fitted(this.canvas);
     const all = this.runs.flatMap(({ rows }) => rows.flat()).filter((v) => v !== null);
-    const low = all.reduce((a, b) => Math.min(a, b), 0);
-    const high = all.reduce((a, b) => Math.max(a, b), low + (this.unit === "count" ? 1 : 1e-18));
-    const top = low + nice(high - low), base = height - 4;
+    const { low, top } = limits(all, this.unit === "count" ? 1 : ROUNDING[this.unit]), base = height - 4;
     const x = (t) => LEFT + ((width - LEFT - 2) * (t - from)) / (to - from);
     const y = (v) => base - ((base - 12) * (v - low)) / (top - low);
     context.font = "11px system-ui, sans-serif";
     context.textBaseline = "middle";
     context.textAlign = "right";
     context.lineWidth = 1;
-    for (const v of [low, (low + top) / 2, top]) {
+    const crowded = Math.min(y(low) - y(0), y(0) - y(top)) < 12;
+    for (const v of !low || !top ? [low, (low + top) / 2, top] : crowded ? [low, top] : [low, 0, top]) {
       line(context, "#e4e6ec", [[LEFT, y(v)], [width, y(v)]]);
       context.fillStyle = "#667";
       context.fillText(tick(v), LEFT - 4, y(v));
@@ -154,6 +153,13 @@ function line(context, color, points) {
 function tick(v) {
   const size = Math.abs(v);
   return size >= 1e4 || (size && size < 1e-2) ? v.toExponential(1).replace(".0e", "e") : +v.toPrecision(2);
+}
+
+// Round limits of an axis that has 0 and all values, at least of a length.
+function limits(values, least) {
+  const low = values.reduce((a, b) => Math.min(a, b), 0), high = values.reduce((a, b) => Math.max(a, b), 0);
+  if (high - low < least) return { low: 0, top: least };
+  return { low: low < -0.02 * (high - low) ? -nice(-low) : 0, top: high > 0.02 * (high - low) ? nice(high) : 0 };
 }
 
 // The least of 1, 2, 5 times a power of ten that is not below a length.

@@ -7,6 +7,7 @@ const NAMES = {
   "controller.k_j": "Topology: stiffness k_j", "controller.b_j": "Topology: damping b_j",
   "controller.K_d": "Desired stiffness", "controller.B_d": "Desired damping",
   "virtual_mechanism.k_contact": "Contact: stiffness", "virtual_mechanism.b_contact": "Contact: damping",
+  "virtual_mechanism.hysteresis": "Constrained directions: hysteresis", "virtual_environment.hysteresis": "Constrained directions: hysteresis",
 };
 const named = (connection) => connection.split(" -> ")[0].split(".").slice(1).join(" ");
 // A gain's name, and the user's where it is of a further one: hand_left.damping.

@@ -27,6 +27,7 @@ const HANDLERS = {
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));
+    if (message.ended) $("light").classList.remove("green"); // a run that diverged at once never turned red
     $("record").textContent = message.recording ? "End recording" : "Record";
     note();
   },

@@ -88,7 +88,7 @@ def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
     best = {"graphics.rate": "60", "hold": "foh"}
     told = title.title(best, 0.4361, "RMS tracking error (mm)", list(best), 3, 12)
     assert told == (
-        "Smallest RMS tracking error: 0.436 mm at graphics.rate = 60 Hz, hold = foh; "
+        "RMS tracking error down to 0.436 mm at graphics.rate = 60 Hz, hold = foh; "
         "3 of 12 runs ended early or failed"
     )
     assert title.axis("graphics.rate") == "graphics.rate (Hz)"
