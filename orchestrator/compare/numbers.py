@@ -115,8 +115,8 @@ def _energies(run: Results) -> Iterator[tuple[str, str]]:
         told = port.told
         yield "user's port, largest generated (mJ)", short(1e3 * told["peak"])
         yield "user's port, generated at the end (mJ)", short(1e3 * told["generated"])
-        for name, part in told["parts"].items():
-            yield f"of it, {name} (mJ)", short(1e3 * part)
+        for name, block in told["blocks"].items():
+            yield f"of it at the end, {name} (mJ)", short(1e3 * block["generated"])
     across = run.run.get("energies", "none")
     yield (
         "connections that carry power across rates",
