@@ -116,7 +116,7 @@ def _energies(run: Results) -> Iterator[tuple[str, str]]:
         yield "user's port, largest generated (mJ)", short(1e3 * told["peak"])
         yield "user's port, generated at the end (mJ)", short(1e3 * told["generated"])
         for name, block in told["blocks"].items():
-            yield f"of it at the end, by {name} (mJ)", short(1e3 * block["generated"])
+            yield f"of it at the end, {name} (mJ)", short(1e3 * block["generated"])
     across = run.run.get("energies", "none")
     yield (
         "connections that carry power across rates",
