@@ -18,9 +18,10 @@ then is that of a spring-damper, mechanism that of friction, drives and the erro
 Shaping is what the device, shaped by M_d Lambda^-1, has taken less than the mechanism was given: by
 a mobility or directions that are held or differ, velocity terms left out, saturation and stops.
 
-Works on the mechanism are those of the energy meters. Where a hold gives other values than the
-newest sample, they are known at the end alone, and reached there in proportion to those of the
-newest samples.
+Works on the handle and the mechanism are those of the energy meters, of the wrenches as they act:
+a sample that always comes as late, by a latency or in the order of Jacobi, is paired with the
+displacement over which it acts. Where a hold gives other values than samples, the work is known at
+the meter's last sample alone, and reached there in proportion to that of the samples.
 """
 
 from __future__ import annotations
@@ -79,12 +80,9 @@ def by_block(
         blocks[name] = blocks.get(name, 0.0) + energy
 
     def on(signal: str, position: str) -> tuple[Vector, Vector] | None:
-        """Held and ideal work of a signal at a position."""
-        table, moved = of_block(results, signal, 3), of_block(results, position, 3)
-        if table is None or moved is None:
+        if of_block(results, signal, 3) is None or of_block(results, position, 3) is None:
             return None
-        force = table[signal], table["time"]
-        return work(*force, moved, position, time), ideal(*force, moved, position, time)
+        return works(results, signal, position, time)
 
     for each, done in ((user(name), done) for name, done in put_in.items()):
         shaping = shaping - done
@@ -112,31 +110,60 @@ def by_block(
 def _into_mechanism(results: Results, each: User, time: Vector) -> dict[str, tuple[Vector, Vector]]:
     """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
     from, by that signal."""
-    across = results.run.get("energies", "none")
-    booked = ({} if across == "none" else across) | results.run.get("energies_within_a_rate", {})
-    moved, found = of_block(results, each.point, 3), {}
-    for name, energy in booked.items():
+    found = {}
+    for name in meters(results):
         source, _, target = name.partition(" -> ")
-        table = table_of(results, source)
-        if target not in (f"{each.inputs}F_hand", f"{each.inputs}F_drift") or not (table and moved):
+        if target not in (f"{each.inputs}F_hand", f"{each.inputs}F_drift"):
             continue
-        sign = -1.0 if target.endswith("F_drift") else 1.0
-        force = sign * table[source], table["time"]
-        works = work(*force, moved, each.point, time), ideal(*force, moved, each.point, time)
-        found[source] = (
-            _ending(works[0], energy["held"]),
-            _ending(works[1], energy["ideal"]),
-        )
+        if table_of(results, source) and of_block(results, each.point, 3):
+            sign = -1.0 if target.endswith("F_drift") else 1.0
+            found[source] = works(results, source, each.point, time, sign, name)
     return found
 
 
-def _ending(series: Vector, end: float) -> Vector:
-    """`series` with the change at its end to `end` spread in proportion to its own path."""
+def meters(results: Results) -> dict[str, dict[str, float]]:
+    """The energy meters of a run, by connection."""
+    across = results.run.get("energies", "none")
+    return ({} if across == "none" else across) | results.run.get("energies_within_a_rate", {})
+
+
+def works(
+    results: Results,
+    signal: str,
+    position: str,
+    at: Vector,
+    sign: float = 1.0,
+    connection: str | None = None,
+) -> tuple[Vector, Vector]:
+    """The work (J) of a wrench at a position until the times `at`: as it acts, and that of its
+    source. `connection` is that with which it acts; by default one from the signal to the FMU of
+    the position, without which the newest sample acts."""
+    table, moved = table_of(results, signal), table_of(results, position)
+    if not (table and moved):
+        raise KeyError(f"work needs the signals {signal} and {position}")
+    force, stamps, booked = sign * table[signal], table["time"], meters(results)
+    source = ideal(force, stamps, moved, position, at)
+    start = f"{signal} -> {position.partition('.')[0]}."
+    name = connection or next((n for n in booked if n.startswith(start)), None)
+    if name is None:
+        return work(force, stamps, moved, position, at), source
+    late = results.run["delays"].get(name, {}).get("max", 0.0) if table is moved else 0.0
+    acts, meter = work(force, stamps + late, moved, position, at), booked[name]
+    return tuple(
+        _passing(series, at, meter["until"], meter[part])
+        for series, part in ((acts, "held"), (source, "ideal"))
+    )
+
+
+def _passing(series: Vector, at: Vector, until: float, value: float) -> Vector:
+    """`series` at the times `at`, changed in proportion to its own path so that it passes `value`
+    at the time `until`."""
     path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
-    if not path[-1]:
-        path = np.linspace(0.0, 1.0, len(series)) if len(series) > 1 else np.ones(1)
-    spread: Vector = series + (end - series[-1]) * path / path[-1]
-    return spread
+    to, reached = (float(np.interp(until, at, y)) for y in (path, series))
+    if not to:
+        path, to = at - at[0], max(until - float(at[0]), 1e-300)
+    changed: Vector = series + (value - reached) * path / to
+    return changed
 
 
 def work(force: Vector, stamps: Vector, moved: Table, position: str, at: Vector) -> Vector:

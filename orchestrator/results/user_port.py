@@ -6,10 +6,10 @@ of further hands on the mechanism, should be what the mechanism has gained:
     generated(t) = E(t) - E(0) - sum F_hand . dx_D - sum F_k . dx_k
 
 summed over the users with a device each, and over hands k at further points, with E the mechanism's
-energy (kinetic, of gravity, springs and contacts) and each force paired with the displacement of
-the step that it acts over. A positive value is energy that the hand could get back without having
-put it in; friction makes it negative, drives positive. `port_blocks.py` tells which block it comes
-from.
+energy (kinetic, of gravity, springs and contacts) and each force, as it acts, paired with the
+displacement of the step that it acts over. A positive value is energy that the hand could get back
+without having put it in; friction makes it negative, drives positive. `port_blocks.py` tells which
+block it comes from.
 
 `works` are of single wrenches: on the handle of the hand, the motors, F_T, F_env; of F_env on the
 mechanism; and of what a mobility held from another rate adds to the motors' wrench,
@@ -30,6 +30,7 @@ from hapticlink.orchestrator.results.port_blocks import (
     by_block,
     ideal,
     work,
+    works,
 )
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
@@ -70,7 +71,7 @@ class UserPort(NamedTuple):
 def user_port(results: Results) -> UserPort | None:
     """The energy at the user's port; None without hand, handle and mechanism."""
     mechanism, device = of_block(results, ENERGY), of_block(results, DEVICE, 3)
-    if mechanism is None or device is None or (hands := of_block(results, HAND, 3)) is None:
+    if mechanism is None or device is None or of_block(results, HAND, 3) is None:
         return None
     if not len(device["time"]) or not len(mechanism["time"]):
         return None
@@ -78,7 +79,7 @@ def user_port(results: Results) -> UserPort | None:
     time = time[time <= device["time"][-1]]
     energy = mechanism[ENERGY][: len(time)]
     stored = energy - energy[0]
-    put_in = {"": work(hands[HAND], hands["time"], device, DEVICE, time)}
+    put_in = {"": works(results, HAND, DEVICE, time)[0]}
     users = further_users(results)
     for name in users:
         put_in[name] = np.zeros(len(time)) + _of_hand(results, name, poses(name)[1], time)
@@ -95,10 +96,10 @@ def user_port(results: Results) -> UserPort | None:
 
 def _of_hand(results: Results, name: str, position: str, time: Vector) -> Vector | float:
     """The work (J) of the hand at a further point on a position; 0 where they are not recorded."""
-    table, hand = of_block(results, position, 3), table_of(results, f"hand_{name}.F")
-    if not (table and hand):
+    hand = f"hand_{name}.F"
+    if not (of_block(results, position, 3) and table_of(results, hand)):
         return 0.0
-    return work(hand[f"hand_{name}.F"], hand["time"], table, position, time)
+    return works(results, hand, position, time)[0]
 
 
 def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
@@ -110,9 +111,9 @@ def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
         "F_env": CONTACT,
     }
     found = {
-        name: float(work(table[signal], table["time"], device, DEVICE, time)[-1])
+        name: float(works(results, signal, DEVICE, time)[0][-1])
         for name, signal in signals.items()
-        if (table := of_block(results, signal, 3))
+        if of_block(results, signal, 3)
     }
     if contact := of_block(results, CONTACT, 3):
         on = ideal(contact[CONTACT], contact["time"], contact, MECHANISM, time)

@@ -6,10 +6,13 @@ termination that does not change with time mixes none of them: it is a block for
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigvals
+from scipy.optimize import minimize_scalar
 
 from hapticlink.orchestrator.stability.cut import Complex, Response
 
@@ -18,6 +21,11 @@ STILL = 1e-9
 """Mobility, relative to the largest, of a coordinate in which the device does not move."""
 RIGID = 1e-6
 """That of a direction in which the rendering does not let the handle move."""
+
+SHARP = 0.1
+"""Half width w P of a resonance that a grid of frequencies can miss."""
+SEARCH = 16
+"""Evaluations of the search for the angle at which most is lacking."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,35 @@ class Scale:
         _, sizes, directions = np.linalg.svd(np.vstack([parts.real, parts.imag]))
         self.moving: Matrix = self.free @ directions[sizes > RIGID * sizes[0]].T
 
+    def resonances(self, found: Response) -> Matrix:
+        """Angles w P in (0, pi), ever closer to the poles of F = Z v near the unit circle, beside
+        which an impedance can peak: z of the modes with the handle held still,
+
+            (A - z) z_0 + B u = 0,   x_{k+1} - x_k = 0
+        """
+        k, m, n = found.forces, found.m, len(found.A)
+        along = np.kron(np.eye(k // m), self._lengths[:, None] * self.moving)
+        x, dx = (
+            np.hstack([found.C, found.D])[:k, : n + k],
+            np.hstack([found.A, found.B])[:, : n + k],
+        )
+        after = np.vstack([x[m:], found.C[:m] @ dx])
+        B, moved = found.B[:, :k] @ along, along.T @ (after - x)
+        held = np.block([[found.A, B], [moved[:, :n], moved[:, n:] @ along]])
+        mass = np.zeros_like(held)
+        mass[:n, :n] = np.eye(n)
+        poles = eigvals(held, mass)
+        poles = poles[np.isfinite(poles) & (np.abs(poles) > 0.5) & (np.abs(poles) < 2.0)]
+        angles, widths = np.abs(np.angle(poles)), np.abs(np.log(np.abs(poles)))
+        sharp = (widths < SHARP) & (widths > STILL)
+        near = [
+            at + side * width * 2.0 ** np.arange(-1, np.log2(SHARP / width))
+            for at, width in zip(angles[sharp], widths[sharp], strict=True)
+            for side in (-1, 1)
+        ]
+        near = np.concatenate([*near, angles[sharp]])
+        return np.unique(near[(near > STILL) & (near < np.pi)].round(9))
+
     def at(self, found: Response, angle: float, H: float, along: Matrix) -> Hybrid:
         """A response at z' = exp(i angle) z, with steps H (s) of the mechanism. Velocities are
         means over the steps, and enter as displacements by the square root of their length, so
@@ -89,6 +126,15 @@ class Scale:
             left[1] @ G[k:, k:] @ two,
             along.shape[1],
         )
+
+
+def with_worst(angles: Matrix, lacks: Callable[[float], float]) -> Matrix:
+    """The angles, and beside the one at which `lacks` is largest the one where it peaks."""
+    worst = int(np.argmax([lacks(angle) for angle in angles]))
+    bounds = angles[max(worst - 1, 0)], angles[min(worst + 1, len(angles) - 1)]
+    options = {"maxiter": SEARCH, "xatol": 1e-9}
+    found = minimize_scalar(lambda a: -lacks(a), bounds=bounds, method="bounded", options=options)
+    return np.union1d(angles, [float(found.x)])
 
 
 def hertz(angle: float, h: int, N: int, period: float) -> float:

@@ -49,7 +49,7 @@ from hapticlink.orchestrator.stability.cut import (
     response,
 )
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
-from hapticlink.orchestrator.stability.harmonics import Scale, hertz
+from hapticlink.orchestrator.stability.harmonics import Complex, Hybrid, Scale, hertz, with_worst
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
 from hapticlink.orchestrator.stability.two_port import ROUNDING, TwoPort, mixes
@@ -146,30 +146,49 @@ def of(
     curve: list[tuple[float, float]] = []
     needed, own = -np.inf, np.inf
     N = whole.forces // whole.m
-    angles = _angles(N)
-    for angle in angles:
-        port = scale.at(whole, angle, 0.0, scale.moving)
+
+    def impedances(angle: float) -> tuple[Hybrid, Complex]:
+        """The port, and the device alone in its directions."""
         device_Z = scale.at(device, angle, 0.0, scale.free).impedance
         along = np.kron(np.eye(N), free)
-        alone = along.T @ device_Z @ along
-        own = min(own, -least(alone))
+        return scale.at(whole, angle, 0.0, scale.moving), along.T @ device_Z @ along
+
+    def lacks(angle: float) -> list[float]:
+        """The damping that is necessary, by harmonic."""
+        port, alone = impedances(angle)
+        found = []
         for h in range(N):
             i = slice(h * port.r, (h + 1) * port.r)
             Z = port.harmonic(h).impedance
-            found = least(Z - alone[i, i])
+            lacking_here = least(Z - alone[i, i])
             none = ROUNDING * float(np.abs(Z).max())
-            curve.append((hertz(angle, h, N, P), found if abs(found) > none else 0.0))
+            found.append(lacking_here if abs(lacking_here) > none else 0.0)
+        return found
+
+    angles = np.union1d(_angles(N), scale.resonances(whole))
+    angles = with_worst(angles, lambda angle: max(lacks(angle)))
+    for angle in angles:
+        port, alone = impedances(angle)
+        own = min(own, -least(alone))
+        curve += [(hertz(angle, h, N, P), found) for h, found in enumerate(lacks(angle))]
         if mixes(port):
-            lacks = lacking(port.impedance - alone, [port.r] * (len(port.Y) // port.r))
-            needed = max(needed, lacks)
+            most = lacking(port.impedance - alone, [port.r] * (len(port.Y) // port.r))
+            needed = max(needed, most)
     frequency, at_least = max(curve, key=lambda pair: pair[1])
     needed = max(needed, at_least)
     both = None
     if mechanism:
         cut = response(map_, at, hand, mechanism)
         H = P * len(mechanism.moved) / (len(cut.D) - cut.forces)
-        ports = [(angle, scale.at(cut, angle, H, scale.moving)) for angle in angles]
-        both = two_port.judged(ports, P, scale.turns, cut.radius)
+
+        def cut_at(angle: float) -> Hybrid:
+            return scale.at(cut, angle, H, scale.moving)
+
+        angles = np.union1d(angles, scale.resonances(cut))
+        angles = with_worst(angles, lambda angle: two_port.most_lacking(cut_at(angle)))
+        both = two_port.judged(
+            [(angle, cut_at(angle)) for angle in angles], P, scale.turns, cut.radius
+        )
     return Passivity(
         title,
         needed,

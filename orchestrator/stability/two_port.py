@@ -120,6 +120,12 @@ def judged(
     )
 
 
+def most_lacking(port: Hybrid) -> float:
+    """The damping that is necessary in the harmonic that lacks most."""
+    alone = (port.harmonic(h) for h in range(len(port.Y) // port.r))
+    return max(lacking_of_two(one.impedance, one.r)[0] for one in alone)
+
+
 def mixes(port: Hybrid) -> bool:
     """Whether the answer to a harmonic has others in it."""
     N, n = len(port.Y) // port.r, len(port.own) // port.r

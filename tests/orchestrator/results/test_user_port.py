@@ -57,6 +57,47 @@ def test_its_blocks_are_all_of_it(tmp_path: Path, scene: str, options: tuple[str
         assert abs(lost) < 1e-6
 
 
+LATE = [
+    ("two-users", ("coupling=jacobi",), 1),
+    ("two-users", ('delays."hand.F"=0.01', 'delays."hand_left.F"=0.01'), 6),
+]
+
+
+@pytest.mark.parametrize(("scene", "options", "ticks"), LATE)
+def test_a_force_that_comes_late_counts_where_it_acts(
+    tmp_path: Path, scene: str, options: tuple[str, ...], ticks: int
+) -> None:
+    """By a latency, or in the order of Jacobi, a force acts `ticks` after its stamp: paired with
+    the displacements there, at every sample (the first one acts until the second arrives)."""
+    found = simulate(scene, tmp_path, ["duration=0.5", *options]).results
+    port, table = user_port(found), found.haptics
+    assert port
+    work = np.zeros(len(table["time"]))
+    for hand, handle in (("hand", "haptic_device"), ("hand_left", "haptic_device_left")):
+        force = table[f"{hand}.F"]
+        acts = np.concatenate([np.repeat(force[:1], ticks, axis=0), force])[: len(force) - 1]
+        work[1:] += (acts * np.diff(table[f"{handle}.x_true"], axis=0)).sum(axis=1).cumsum()
+    energy = table["virtual_mechanism.energy"]
+    expected = energy - energy[0] - work
+    np.testing.assert_allclose(port.generated_J, expected, atol=1e-9 * np.abs(work).max())
+
+
+def test_a_run_that_ends_beside_a_frame(tmp_path: Path) -> None:
+    """Meters stop at the newest sample of the source that the mechanism has stepped past, the
+    account at the newest one of the mechanism, 2 ms later: the mechanism's loss is still its energy
+    less the work of what it held from frame to frame."""
+    found = simulate("closed-loop-direct", tmp_path, ["duration=0.95"]).results
+    port, frames, ticks = user_port(found), found.graphics, found.haptics
+    assert port
+    assert port.time_s[-1] > found.run["energies"]["hand.F -> virtual_mechanism.F_hand"]["until"]
+    rows = np.searchsorted(ticks["time"], frames["time"][:-1] + 1e-12, "right") - 1
+    acts = (ticks["hand.F"] - ticks["controller.F_drift"])[rows]
+    work = (acts * np.diff(frames["virtual_mechanism.x"], axis=0)).sum()
+    energy = frames["virtual_mechanism.energy"]
+    lost = port.blocks_J["mechanism"][-1]
+    assert lost == pytest.approx(energy[-1] - energy[0] - work, abs=1e-9)
+
+
 def test_a_hold_of_its_drift_force_is_that_of_the_meter(tmp_path: Path) -> None:
     results = simulate("closed-loop-direct", tmp_path, ["duration=1.0"]).results
     port = user_port(results)
