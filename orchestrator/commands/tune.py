@@ -43,7 +43,7 @@ def tune(
     found = find(scene, given, margin=margin, hertz=hertz, neighbours=neighbours, tell=say)
     folder = folders.ensure(out or default_folder("tuned", scene))
     write_json(folder / "tune.json", found.record())
-    (folder / "tuned.toml").write_text(tuned_scene(scene, given, found), encoding="utf-8")
+    (folder / "tuned.toml").write_text(tuned_scene(scene, found), encoding="utf-8")
     save(figure.draw(found), folder / "tune.png")
     say(*(f"  {line}" for line in found.lines()), sep="\n")
     say(f"  {folder}/: tune.json, tune.png, tuned.toml")

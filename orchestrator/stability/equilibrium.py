@@ -55,8 +55,9 @@ def equilibrium(map_: LiftedMap, seconds: float) -> Linear:
 
 
 def _require_rest(map_: LiftedMap, at: Linear) -> None:
-    """Raises InputFault where the equilibrium moves with time, as under a target that does."""
-    once, again = at.image[at.taken], map_.second(at.point)[at.taken]
+    """Raises InputFault where the second period is another map than the first one, as under a
+    target that moves."""
+    once, again = map_.image(at.image)[at.taken], map_.second(at.point)[at.taken]
     moved = np.abs(again - once) / np.maximum(1.0, np.abs(once))
     if moved.max() > 10 * TOLERANCE:
         raise InputFault(

@@ -25,12 +25,12 @@ from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability import frozen
 from hapticlink.orchestrator.stability.closures import Closures
-from hapticlink.orchestrator.stability.equilibrium import equilibrium, rests
+from hapticlink.orchestrator.stability.equilibrium import COARSE, equilibrium, rests
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
 from hapticlink.orchestrator.stability.modes import modes
 from hapticlink.orchestrator.stability.state_vector import SIGNALS
-from hapticlink.orchestrator.stability.tangent import Columns, Instruction
+from hapticlink.orchestrator.stability.tangent import SAME, Columns, Instruction
 from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.tune.gains import Gains, Scales
@@ -39,6 +39,7 @@ Complex = NDArray[np.complex128]
 DEVICE, HAND = "haptic_device", "hand"
 STEPS = 3
 """Newton steps from the equilibrium of other gains."""
+SETTLING = 5.0
 UNSTABLE = 50.0
 """Growth (1/s) that counts for gains with which the FMUs diverge at once."""
 
@@ -48,7 +49,8 @@ class Held:
 
     def __init__(self, map_: LiftedMap, system: System, T: float, seconds: float) -> None:
         self._map, self._system, self.T = map_, system, T
-        self._at = equilibrium(map_, seconds)
+        map_.start = _settling(map_)
+        self._home = self._at = equilibrium(map_, seconds)
         self.gains = Gains.of(system)
         self._scales: dict[str, float] = {}
         self._hand = 0.0
@@ -66,9 +68,9 @@ class Held:
         return counted[0].growth if counted else -np.inf
 
     def signal(self, port: str) -> NDArray[np.float64]:
-        """The value of an output `fmu.port` at rest."""
+        """The value of an output `fmu.port` at rest, with the scene's gains."""
         found = [
-            float(self._at.image[i])
+            float(self._home.image[i])
             for i, c in enumerate(self._map.coordinates)
             if c.kind == "signal" and str(c).partition("[")[0] == port
         ]
@@ -110,26 +112,30 @@ class Held:
         return found
 
     def _settled(self, scales: Scales, hand: float) -> Linear:
-        """The map at its equilibrium with these gains; the search starts from the last one."""
+        """The map at its equilibrium with these gains; the search starts from that of the scene's
+        own, so that the result does not depend on what was asked before."""
         if scales != self._scales or hand != self._hand:
             values = [*self.gains.parameters(scales), *self._held(hand)]
             self._map.set_parameters(values)
             self._hand = 0.0  # until all is done
-            self._at = self._linear(self._at.point)
-            moved = scales.get("contact", 1.0) != self._scales.get("contact", 1.0)
-            for _ in range(STEPS if moved else 0):  # other laws do nothing at rest
-                if rests(self._at):
-                    break
-                left = np.eye(len(self._at.A)) - self._at.A
-                step = np.linalg.lstsq(left, self._at.change, rcond=1e-9)[0]
-                self._at = self._linear(self._at.moved(np.asarray(step, float)))
+            moved = scales.get("contact", 1.0) != 1.0  # other laws do nothing at rest
+            self._at = self._linear(self._home.point, COARSE if moved else SAME)
+            if moved:
+                for _ in range(STEPS):
+                    if rests(self._at):
+                        break
+                    left = np.eye(len(self._at.A)) - self._at.A
+                    step = np.linalg.lstsq(left, self._at.change, rcond=1e-9)[0]
+                    self._at = self._linear(self._at.moved(np.asarray(step, float)), COARSE)
+                self._at = self._linear(self._at.point)
             self._scales, self._hand = dict(scales), hand
         return self._at
 
-    def _linear(self, point: NDArray[np.float64]) -> Linear:
-        """The map along the directions of the first equilibrium, whatever the gains."""
+    def _linear(self, point: NDArray[np.float64], same: float = SAME) -> Linear:
+        """The map along the directions of the first equilibrium, whatever the gains; slopes are
+        shared by numbers that differ by `same`."""
         V = self._at.V
-        image, M, D = self._map.slopes(point, V, after=_Bounded(self.T))
+        image, M, D = self._map.slopes(point, V, same, after=_Bounded(self.T))
         return Linear(point, image, V, V.T @ M, V.T @ D)
 
     def _held(self, stiffness: float) -> Iterator[tuple[str, Scalar, float]]:
@@ -141,6 +147,18 @@ class Held:
         for i, stiff in enumerate((stiffness, stiffness, stiffness * LEVER)):
             yield HAND, named[f"stiffness[{i + 1}]"], stiff
             yield HAND, named[f"target[{i + 1}]"], float(x[i] + F[i] / stiff)
+
+
+def _settling(map_: LiftedMap) -> NDArray[np.float64]:
+    """The state after SETTLING seconds, next to the equilibrium that the scene settles to, so that
+    Newton's method begins on the side of a contact where there is one."""
+    state = map_.start
+    try:
+        for _ in range(round(SETTLING / map_.period)):
+            state = map_.image(state)
+    except FmuFault:  # diverges
+        return map_.start
+    return state if np.isfinite(state).all() else map_.start
 
 
 class _Bounded:

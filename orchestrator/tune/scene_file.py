@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
 from pathlib import Path
 
-from hapticlink.orchestrator.tune import Tuned
+from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.tune.tuned import Tuned
 
 
-def tuned_scene(scene: str | Path, options: Sequence[str], tuned: Tuned) -> str:
+def tuned_scene(scene: str | Path, tuned: Tuned) -> str:
     """The text of a TOML file: `extends`, the options that the scene was tuned with, the gains."""
     name = Path(str(scene))
-    base = str(name.resolve()) if name.suffix == ".toml" else str(scene)
-    head = [
-        f'extends = "{base}"',
-        f'title = "{tuned.title}, gains tuned to a margin of {tuned.asked:g}"',
-    ]
-    lines = [option.partition("=") for option in (*options, *tuned.options)]
-    return "\n".join([*head, *(f"{key} = {value}" for key, _, value in lines), ""])
+    lines = {
+        "extends": str(name.resolve()) if name.suffix == ".toml" else str(scene),
+        "title": f"{tuned.title}, gains tuned to a margin of {tuned.asked:g}",
+    }
+    for option in (*tuned.given, *tuned.options):
+        names, value = overrides.parse(option)
+        lines[".".join(n if n.isidentifier() else json.dumps(n) for n in names)] = value
+    return "".join(f"{key} = {overrides.toml(value, key)}\n" for key, value in lines.items())
