@@ -89,7 +89,7 @@ def legend_above_curves(axes: Axes, columns: int) -> None:
     """A legend at the top of the axes, which are extended so that it covers no curve."""
     legend = axes.legend(fontsize="x-small", ncols=columns, loc="upper left")
     rows = -(-len(legend.get_texts()) // columns)
-    height = axes.get_position().height * axes.figure.get_size_inches()[1]
+    height = axes.get_window_extent().height / axes.figure.dpi
     covered = min((ROW * rows + 0.2) / height, 0.5)
     low, high = axes.get_ylim()
     axes.set_ylim(low, low + (high - low) / (1 - covered))

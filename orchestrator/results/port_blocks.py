@@ -149,10 +149,8 @@ def works(
         return work(force, stamps, moved, position, at), source
     late = results.run["delays"].get(name, {}).get("max", 0.0) if table is moved else 0.0
     acts, meter = work(force, stamps + late, moved, position, at), booked[name]
-    return tuple(
-        _passing(series, at, meter["until"], meter[part])
-        for series, part in ((acts, "held"), (source, "ideal"))
-    )
+    until = meter["until"]
+    return _passing(acts, at, until, meter["held"]), _passing(source, at, until, meter["ideal"])
 
 
 def _passing(series: Vector, at: Vector, until: float, value: float) -> Vector:

@@ -104,8 +104,8 @@ class Scale:
             for at, width in zip(angles[sharp], widths[sharp], strict=True)
             for side in (-1, 1)
         ]
-        near = np.concatenate([*near, angles[sharp]])
-        return np.unique(near[(near > STILL) & (near < np.pi)].round(9))
+        all_of = np.concatenate([*near, angles[sharp]])
+        return np.unique(all_of[(all_of > STILL) & (all_of < np.pi)].round(9))
 
     def at(self, found: Response, angle: float, H: float, along: Matrix) -> Hybrid:
         """A response at z' = exp(i angle) z, with steps H (s) of the mechanism. Velocities are

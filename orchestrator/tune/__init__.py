@@ -46,13 +46,19 @@ def tune(
     margin: float = MARGIN,
     hertz: float = HERTZ,
     neighbours: bool = True,
-    tell: Tell = lambda text: None,
+    tell: Tell | None = None,
 ) -> Tuned:
-    """The gains of a scene (see the module's text); it is run once to find a contact.
+    """The gains of a scene with which a contact and a joint constraint feel equally stiff, as stiff
+    as a stability margin allows; it is run once to find a contact.
+
+    `margin` is the factor on all stiffnesses up to instability, `hertz` the frequency of pressing
+    (Hz) at which the felt stiffness is taken. `neighbours`: whether margins at neighbouring rates
+    are found, too. `tell` is called with what has been found so far.
 
     Raises InputFault for a margin below 1, a scene without a law to tune or a handle, and one that
     is unstable with any gains.
     """
+    tell = tell or (lambda text: None)
     if not margin >= 1.0:
         raise InputFault(f"--margin {margin}: give 1 or more, the factor up to instability")
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"), ExitStack() as stack:
