@@ -39,7 +39,9 @@ Complex = NDArray[np.complex128]
 DEVICE, HAND = "haptic_device", "hand"
 STEPS = 3
 """Newton steps from the equilibrium of other gains."""
-SETTLING = 5.0
+SETTLING = 3.0
+RESTLESS = 1e-3
+"""Seconds to settle; change over a period of what has not come to rest."""
 UNSTABLE = 50.0
 """Growth (1/s) that counts for gains with which the FMUs diverge at once."""
 
@@ -49,7 +51,7 @@ class Held:
 
     def __init__(self, map_: LiftedMap, system: System, T: float, seconds: float) -> None:
         self._map, self._system, self.T = map_, system, T
-        map_.start = _settling(map_)
+        map_.start = _settling(map_, map_.start)
         self._home = self._at = equilibrium(map_, seconds)
         self.gains = Gains.of(system)
         self._scales: dict[str, float] = {}
@@ -64,8 +66,9 @@ class Held:
             return grown.rate
         except FmuFault:
             return UNSTABLE
-        counted = [mode for mode in modes(at, self._map.period) if not mode.neutral]
-        return counted[0].growth if counted else -np.inf
+        found = modes(at, self._map.period)  # an error as large as z says nothing of z = 1
+        counted = [mode for mode in found if not (mode.neutral and mode.uncertainty < SURE)]
+        return counted[0].growth if counted else UNSTABLE
 
     def signal(self, port: str) -> NDArray[np.float64]:
         """The value of an output `fmu.port` at rest, with the scene's gains."""
@@ -119,15 +122,17 @@ class Held:
             self._map.set_parameters(values)
             self._hand = 0.0  # until all is done
             moved = scales.get("contact", 1.0) != 1.0  # other laws do nothing at rest
-            self._at = self._linear(self._home.point, COARSE if moved else SAME)
             if moved:
+                self._at = self._linear(_settling(self._map, self._home.point), COARSE)
                 for _ in range(STEPS):
                     if rests(self._at):
                         break
                     left = np.eye(len(self._at.A)) - self._at.A
                     step = np.linalg.lstsq(left, self._at.change, rcond=1e-9)[0]
                     self._at = self._linear(self._at.moved(np.asarray(step, float)), COARSE)
-                self._at = self._linear(self._at.point)
+                if not np.abs(self._at.change).max() < RESTLESS:
+                    raise _GrownError(UNSTABLE)
+            self._at = self._linear(self._at.point if moved else self._home.point)
             self._scales, self._hand = dict(scales), hand
         return self._at
 
@@ -149,16 +154,17 @@ class Held:
             yield HAND, named[f"target[{i + 1}]"], float(x[i] + F[i] / stiff)
 
 
-def _settling(map_: LiftedMap) -> NDArray[np.float64]:
-    """The state after SETTLING seconds, next to the equilibrium that the scene settles to, so that
-    Newton's method begins on the side of a contact where there is one."""
-    state = map_.start
+def _settling(map_: LiftedMap, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The state SETTLING seconds after `state`, next to the equilibrium that the scene settles to,
+    so that Newton's method begins on the side of a contact where there is one. As it is where the
+    scene diverges."""
+    start = state
     try:
         for _ in range(round(SETTLING / map_.period)):
             state = map_.image(state)
-    except FmuFault:  # diverges
-        return map_.start
-    return state if np.isfinite(state).all() else map_.start
+    except FmuFault:
+        return start
+    return state if np.isfinite(state).all() else start
 
 
 class _Bounded:
@@ -189,6 +195,8 @@ class _GrownError(Exception):
 
 FIRST, MOST = 4, 1e7
 """Ticks whose largest perturbation is the size of all, and how much more is growth."""
+SURE = 0.01
+"""Uncertainty of an eigenvalue below which it may count as 1."""
 LEVER = 1 / 300
 """Rotational stiffness of the hand (N.m/rad) over that of its translations (N/m)."""
 DAMPING = (5.0, 5.0, 0.01)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.tune.held import Complex, Held
+from hapticlink.orchestrator.tune.held import UNSTABLE, Complex, Held
 
 HANDS = (100.0, 1000.0)
 """Stiffnesses (N/m) of the hands that a margin is for: a light touch and a firm grip."""
@@ -122,7 +122,8 @@ def _limit(growth: Callable[[float], float], what: str, fine: float) -> float:
 
     def at(logarithm: float) -> float:
         if logarithm not in known:
-            known[logarithm] = growth(float(np.exp(logarithm)))
+            found = growth(float(np.exp(logarithm)))
+            known[logarithm] = found if np.isfinite(found) else UNSTABLE
         return known[logarithm]
 
     low = high = 0.0

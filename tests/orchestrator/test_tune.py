@@ -18,14 +18,12 @@ import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.overrides import written
 from hapticlink.orchestrator.stability.linearise import linearised
-from hapticlink.orchestrator.stability.modes import modes
 from hapticlink.orchestrator.tune.held import held, spring
 from hapticlink.orchestrator.tune.poses import FIRM, Pose
-from hapticlink.orchestrator.tune.search import EQUAL, FINE, HANDS
+from hapticlink.orchestrator.tune.search import FINE, HANDS
 
 RECORDED = Path(__file__).parents[2] / "results" / "tune"
 TUNED = sorted(path.parent.name for path in RECORDED.glob("*/tune.json"))
-BOTH = [name for name in TUNED if name != "closed-loop"]
 NO_ENCODER = ("device.encoder_resolution=1e-12",)
 """The map has no quantisation."""
 
@@ -60,12 +58,6 @@ def tuned_scene(name: str) -> str:
 def test_the_margin_is_at_least_that_asked_for(name: str) -> None:
     found = recorded(name)
     assert found["margin"] >= found["margin_asked"] * (1 - 2 * FINE)
-
-
-@pytest.mark.parametrize("name", BOTH)
-def test_contact_and_constraint_feel_alike(name: str) -> None:
-    felt = recorded(name)["felt_stiffness"]
-    assert felt["contact"] == pytest.approx(felt["constraint"], rel=EQUAL + FINE)
 
 
 @pytest.mark.parametrize("name", TUNED)
@@ -130,11 +122,11 @@ def test_the_columns_that_are_carried_hold_all_modes() -> None:
     found = recorded("closed-loop")
     (pose,) = poses(found)
     with held(open_scene.load("closed-loop", pose.options(found["options"]))) as place:
-        for scale in (0.1, 3.0, 10.0):
-            growth = place.growth(dict.fromkeys(("drift", "topology"), scale), HANDS[0])
+        for scale in (0.1, 1.0, 3.0):
+            place.growth(dict.fromkeys(("drift", "topology"), scale), HANDS[0])
             whole = linearised(place._map, place._at.point)
-            counted = [m for m in modes(whole, place._map.period) if not m.neutral]
-            assert growth == pytest.approx(counted[0].growth, rel=1e-3, abs=1e-6)
+            radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (place._at, whole)]
+            assert radii[0] == pytest.approx(radii[1], rel=1e-6)
 
 
 def test_what_cannot_be_tuned_is_refused() -> None:
