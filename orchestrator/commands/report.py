@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.say import say
 
 Runs = Annotated[list[Path], Parameter(help="Folders of runs.", negative="")]
@@ -29,6 +30,8 @@ def report(runs: Runs, /, *, out: Out = None) -> int:
 
     found = named(runs)
     path = out or Path("reports") / f"{'+'.join(name.replace('/', '-') for name in found)}.html"
+    if path.is_dir():
+        raise InputFault(f"--out {path}: is a folder; name a file, such as {path / 'report.html'}")
     folders.ensure(path.parent)
     text = page.page(found)
     with atomic_file(path) as unfinished:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.orchestrator.results.figure_axes import short
+from hapticlink.orchestrator.results.figure_axes import plain, short
 from hapticlink.orchestrator.results.force_figure import wrenches
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.orchestrator.results.tracking import (
@@ -89,17 +89,17 @@ def _figure(title: str, x: str, y: str, curves: Curves, steps: bool = False) -> 
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     style: Any = "steps-post" if steps else "default"
-    for i, (name, (time, values)) in enumerate(curves.items()):
-        axes.plot(time, values, STYLES[i % len(STYLES)], lw=1.3, label=name, drawstyle=style)
+    for i, (time, values) in enumerate(curves.values()):
+        axes.plot(time, values, STYLES[i % len(STYLES)], lw=1.3, drawstyle=style)
     most = (
         f"{short(float(values.max()))} ({name})"
         for name, (_, values) in curves.items()
         if len(values)
     )
-    axes.set_title(title.format(", ".join(most)), fontsize="medium", wrap=True)
+    axes.set_title(plain(title.format(", ".join(most))), fontsize="medium", wrap=True)
     axes.set(xlabel=x, ylabel=y)
     if steps:
         axes.locator_params(axis="y", integer=True)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize="small")
+    axes.legend(axes.lines, [*map(plain, curves)], fontsize="small")
     return figure

@@ -13,6 +13,7 @@ from hapticlink.orchestrator.compare import numbers, overlay, settings
 from hapticlink.orchestrator.compare.again import scene_file
 from hapticlink.orchestrator.compare.numbers import Row
 from hapticlink.orchestrator.results import figures as of_a_run
+from hapticlink.orchestrator.results.figure_axes import plain
 from hapticlink.orchestrator.results.tables import Results
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def _figures(runs: Mapping[str, Results]) -> Iterator[str]:
         yield _picture(name, figure)
     for name, run in runs.items():
         if drawn := of_a_run.figures(run).get("mechanism"):
-            drawn.axes[0].set_title(name, fontsize="medium")
+            drawn.axes[0].set_title(plain(name), fontsize="medium")
             yield _picture(f"mechanism, {name}", drawn)
 
 

@@ -36,7 +36,9 @@ class Projector(Hold):
         self.hold, self._rank = make(), -1
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        rank = round(_sum_in_order(sample[:: self.n + 1].tolist()))
+        # Of what is no projector, too: no rank is negative or larger than the number of rows.
+        trace = max(0.0, _sum_in_order(sample[:: self.n + 1].tolist()))
+        rank = round(min(trace, self.n))
         if rank != self._rank:
             self.hold, self._rank = self._make(), rank
         self.hold.push(stamp, sample, arrival)

@@ -13,6 +13,7 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from hapticlink.orchestrator.maps import walls
+from hapticlink.orchestrator.results.figure_axes import plain
 from hapticlink.orchestrator.sweep.row import Row
 from hapticlink.orchestrator.sweep.title import axis
 
@@ -45,7 +46,7 @@ def draw(made: Map) -> Figure:
             continue
         named = zip(made.panels, values, strict=True)
         said = ", ".join(f"{_short(key)} = {value}" for key, value in named)
-        axes.set_title(fill(said, 36), fontsize="small")
+        axes.set_title(plain(fill(said, 36)), fontsize="small")
     for axes in all_axes[len(panels) :]:
         axes.remove()
     for axes in all_axes[::across]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from hapticlink.orchestrator.results.figure_axes import plain
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -40,7 +42,7 @@ def figure(system: System, title: str) -> Figure:
     axes = drawn.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(0, size[0]), ylim=(0, size[1]))
     axes.axis("off")
-    axes.text(0.12, size[1] - 0.22, title, va="center", fontsize="medium")
+    axes.text(0.12, size[1] - 0.22, plain(title), va="center", fontsize="medium")
     axes.text(
         0.12, size[1] - 0.45, "outputs leave to the side, inputs enter from above or below",
         va="center", fontsize="small", color="0.4",
@@ -77,7 +79,7 @@ def _arrow(
     )  # fmt: skip
     held = any("," in line for line in lines)
     axes.text(
-        to, y, "\n".join(lines), ha="center", va="center", fontsize=7.5, zorder=3,
+        to, y, plain("\n".join(lines)), ha="center", va="center", fontsize=7.5, zorder=3,
         bbox={"boxstyle": "round,pad=0.25", "fc": "#fff3e6" if held else "w", "ec": "0.75"},
     )  # fmt: skip
 

@@ -47,6 +47,12 @@ def short(value: float) -> str:
     return np.format_float_positional(value, precision=3, fractional=False, trim="-")
 
 
+def plain(text: str) -> str:
+    """A text that Matplotlib draws letter by letter; it takes what two dollar signs enclose for a
+    formula, and fails where it is none."""
+    return text.replace("$", r"\$")
+
+
 def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     """A figure whose title tells where a run ended early, and its axes: one, or one below the other
     for several labels y."""
@@ -64,7 +70,8 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     for axes, label in zip(every, y, strict=True):
         axes.set_ylabel(label)
         axes.grid(alpha=0.3)
-    every[0].set_title(fill(title, 70), fontsize="medium", y=1.0, pad=12)  # at a fixed height
+    # At a fixed height.
+    every[0].set_title(plain(fill(title, 70)), fontsize="medium", y=1.0, pad=12)
     every[-1].set_xlabel(x)
     return figure, every if len(y) > 1 else every[0]
 

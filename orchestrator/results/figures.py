@@ -6,6 +6,7 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.results import figure_axes, mechanism_drawing
 from hapticlink.orchestrator.results.episodes import KINDS, episodes
-from hapticlink.orchestrator.results.figure_axes import framed, last_time, short, titled
+from hapticlink.orchestrator.results.figure_axes import framed, last_time, plain, short, titled
 from hapticlink.orchestrator.results.force_figure import forces
 from hapticlink.orchestrator.results.real_time_figure import real_time
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
@@ -52,6 +53,8 @@ CONTACT, COORDINATES = "virtual_mechanism.F_env", "virtual_mechanism.q"
 def figures(results: Results) -> dict[str, Figure]:
     """Figures of a run by name, as far as it has the signals; none before its first step."""
     drawn: dict[str, Figure] = {}
+    with_rows = {name: table for name, table in results.tables.items() if len(table["time"])}
+    results = replace(results, tables=with_rows)
     if not last_time(results):
         return drawn
     linkage = scene_part(
@@ -98,7 +101,9 @@ def _mechanism(results: Results, linkage: Linkage, table: Table) -> Figure:
         scene_part(results, "contacts", Contacts),
     )
     for label, style, path in _paths(results):
-        axes.plot(*path.T, style, color=mechanism_drawing.RED, lw=0.8, label=f"path of {label}")
+        axes.plot(
+            *path.T, style, color=mechanism_drawing.RED, lw=0.8, label=plain(f"path of {label}")
+        )
     _mark(results, axes)
     mechanism_drawing.draw(axes, linkage, q[0], q[-1], device, contacts)
     figure.set_size_inches(7.4, 6.4)
@@ -151,7 +156,7 @@ def _trajectories(results: Results) -> Figure:
         title = f"The operational point moves up to {short(reach)} mm from its start"
     figure, axes = titled(results, title, "x (mm)", "y (mm)")
     for label, style, path in paths:
-        axes.plot(*path.T, style, label=label)
+        axes.plot(*path.T, style, label=plain(label))
     axes.plot(*np.array([path[0] for _, _, path in paths]).T, "k.", label="start")
     if contacts := scene_part(results, "contacts", Contacts):
         mechanism_drawing.obstacles(axes, contacts)
@@ -204,7 +209,8 @@ def _port(results: Results, port: UserPort) -> Figure:
     axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="in all")
     for name, energy in port.blocks_J.items():
         if np.abs(energy).max() > DRAWN * np.abs(port.generated_J).max():
-            axes.plot(port.time_s, 1e3 * energy, lw=1.0, label=fill(SOURCES.get(name, name), 28))
+            source = plain(fill(SOURCES.get(name, name), 28))
+            axes.plot(port.time_s, 1e3 * energy, lw=1.0, label=source)
     axes.axhline(0, color="0.4", lw=0.8)
     figure_axes.legend_below(figure)
     return figure
@@ -227,7 +233,7 @@ def _energies(results: Results, generated: dict[str, float]) -> Figure:
     figure, axes = titled(results, title, label, "")
     framed(figure, left=2.3)
     values = [value * per for value in generated.values()]
-    bars = axes.barh([fill(name, 28) for name in generated], values, height=0.5)
+    bars = axes.barh([plain(fill(name, 28)) for name in generated], values, height=0.5)
     axes.bar_label(bars, [short(value) for value in values], padding=3)
     axes.margins(x=0.35, y=0.2)
     axes.axvline(0, color="0.4", lw=0.8)

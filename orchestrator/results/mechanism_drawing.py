@@ -14,6 +14,7 @@ from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop
 from hapticlink.orchestrator.results import workspace
+from hapticlink.orchestrator.results.figure_axes import plain
 from hapticlink.orchestrator.results.mechanism_geometry import (
     BODIES,
     attached,
@@ -90,7 +91,7 @@ def figure(scene: Scene, q: Sequence[float]) -> Figure:
     axes = drawn.add_subplot()
     assert scene.linkage is not None
     draw(axes, scene.linkage, q, None, scene.device, scene.contacts)
-    axes.set_title(fill(f"{scene.title} at the start", 70), fontsize="medium")
+    axes.set_title(plain(fill(f"{scene.title} at the start", 70)), fontsize="medium")
     axes.grid(alpha=0.3)
     drawn.legend(fontsize="x-small", ncols=3, loc="outside lower center")
     return drawn
@@ -281,7 +282,7 @@ class _Drawing:
     ) -> None:
         halo: dict[str, Any] = {"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7}
         self.axes.annotate(
-            text, tuple(place), xytext=offset, textcoords="offset points", fontsize="small",
+            plain(text), tuple(place), xytext=offset, textcoords="offset points", fontsize="small",
             color=color, zorder=8, bbox=halo, **how,
         )  # fmt: skip
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -15,17 +15,80 @@ from hapticlink.orchestrator.results.tables import Results, load
 
 
 @dataclass(frozen=True)
-class _Told:
-    """What run.json has of every run, also of one that goes on or was killed."""
+class _Scene:
+    title: str
 
-    scene: dict[str, Any]
+
+@dataclass(frozen=True)
+class _Clock:
+    shortest: float
+    longest: float
+
+
+@dataclass(frozen=True)
+class _End:
+    reason: str
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class _Fault:
+    message: str
+
+
+@dataclass(frozen=True)
+class _Age:
+    min: float
+    max: float
+
+
+@dataclass(frozen=True)
+class _Energy:
+    generated: float
+    peak: float
+
+
+@dataclass(frozen=True)
+class _Errors:
+    sum: float
+
+
+@dataclass(frozen=True)
+class _Iterations:
+    steps: int
+    unconverged: int
+
+
+@dataclass(frozen=True)
+class _Timings:
+    run: float | None = None
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What pages and comparisons read of run.json; with a default, what a run has that has ended,
+    but not one that goes on or was killed."""
+
+    scene: _Scene
     rates: list[str]
     fmus: dict[str, dict[str, Any]]
-    clocks: dict[str, dict[str, float]]
+    clocks: dict[str, _Clock]
     versions: dict[str, str]
     options: list[str]
+    connections: list[str]
     holds: dict[str, str]
-    end: dict[str, Any]
+    stop_when: str
+    end: _End
+    fault: _Fault | None = None
+    warnings: Sequence[str] = ()
+    not_recorded: Sequence[str] = ()
+    delays: dict[str, _Age] = field(default_factory=dict)
+    energies: dict[str, _Energy] | Literal["none"] = "none"
+    energies_within_a_rate: dict[str, _Energy] = field(default_factory=dict)
+    step_errors: dict[str, _Errors] = field(default_factory=dict)
+    iterations: _Iterations | None = None
+    timings: _Timings = _Timings()
+    real_time: dict[str, Any] | None = None
 
 
 def load_whole(folder: Path | str) -> Results:
@@ -54,7 +117,9 @@ def scene_part(results: Results, name: str, kind: Any) -> Any:
 def _first(error: ValidationError) -> str:
     """The first finding, in a line."""
     first = error.errors(include_url=False, include_input=False)[0]
-    return f"{'.'.join(map(str, first['loc'])) or 'its content'}: {first['msg'].lower()}"
+    table = first["type"] == "dataclass_type"
+    why = "input should be a valid dictionary" if table else first["msg"].lower()
+    return f"{'.'.join(map(str, first['loc'])) or 'its content'}: {why}"
 
 
 def named(folders: Sequence[Path | str]) -> dict[str, Results]:

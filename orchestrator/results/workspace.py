@@ -11,6 +11,7 @@ import numpy as np
 
 from hapticlink.components.device.workspace import Field, Range, links, margin, workspace
 from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator.results.figure_axes import plain
 from hapticlink.orchestrator.results.summary import outside
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def draw(device: Device, start: Pose, title: str) -> Figure:
     labels += [text for _, _, text in shades]
     figure.legend(handles, labels, fontsize="small", ncols=3, loc="outside lower center")
     axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    axes.set_title(fill(title, 70), fontsize="medium")
+    axes.set_title(plain(fill(title, 70)), fontsize="medium")
     axes.grid(alpha=0.3)
     return figure
 

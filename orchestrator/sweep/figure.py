@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.results.figure_axes import plain
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.sweep.grid import number
@@ -78,7 +79,7 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
     if best:
         lost = sum(not _shown(r, metric) for r in rows)
         found = title(best, best[metric], NAMES.get(metric, metric), keys, lost, len(rows))
-        axes.set_title(fill(found, 80), fontsize="medium")
+        axes.set_title(plain(fill(found, 80)), fontsize="medium")
     return figure
 
 
@@ -99,7 +100,7 @@ def _axes(wide: bool) -> tuple[Figure, Any]:
 
 
 def _label(row: Row, keys: Iterable[str]) -> str:
-    return ", ".join(str(row.get(k, "as in the scene")) for k in keys)
+    return plain(", ".join(str(row.get(k, "as in the scene")) for k in keys))
 
 
 def _shown(row: Row, metric: str) -> bool:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from hapticlink.orchestrator.results.figure_axes import plain
 from hapticlink.orchestrator.tune.tuned import Tuned
 
 COLOURS = {"constraint": "tab:blue", "contact": "tab:orange"}
@@ -21,7 +22,8 @@ def draw(tuned: Tuned) -> Figure:
     left, right = figure.subplots(1, 2)
     _felt(left, tuned)
     _margins(right, tuned)
-    figure.suptitle(fill(f"{tuned.title}: {tuned.finding}", 100), fontsize="medium")
+    title = plain(fill(f"{tuned.title}: {tuned.finding}", 100))
+    figure.suptitle(title, fontsize="medium")
     return figure
 
 

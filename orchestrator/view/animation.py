@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hapticlink.components.linkage.poses import poses
 from hapticlink.orchestrator.results import mechanism_drawing, summary
 from hapticlink.orchestrator.results.episodes import KINDS, episodes
-from hapticlink.orchestrator.results.figure_axes import short
+from hapticlink.orchestrator.results.figure_axes import plain, short
 from hapticlink.orchestrator.results.mechanism_drawing import MM, RED
 from hapticlink.orchestrator.view.recorded import Recorded
 
@@ -82,10 +82,12 @@ class _Panel:
         mechanism_drawing.pose(axes, self.run.linkage, at)
         self._hand(axes, row, float(np.ptp(limits[0])))
         axes.set(xlim=limits[0], ylim=limits[1], xticks=[], yticks=[], aspect="equal")
-        axes.set_title(self.name, fontsize="medium", fontweight="bold", y=1.0, pad=22)
+        axes.set_title(plain(self.name), fontsize="medium", fontweight="bold", y=1.0, pad=22)
         for text, y, color in zip(self._said(k, row), (1.02, 0.02), ("0.3", None), strict=True):
             color = color or self._now(k)[1]
-            axes.text(0.5, y, text, color=color, ha="center", transform=axes.transAxes, zorder=9)
+            axes.text(
+                0.5, y, plain(text), color=color, ha="center", transform=axes.transAxes, zorder=9
+            )
 
     def _device(self, axes: Axes, row: int) -> None:
         arms = self.run.picture.arms([] if self._handle is None else self._handle[row].tolist())

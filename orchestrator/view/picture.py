@@ -45,7 +45,7 @@ class Picture:
 
     def _of(self, user: str, found: dict[str, Any]) -> dict[str, Any]:
         shown = {k: v for k, v in found.items() if k != "P_c"}
-        if user in self._arms:
+        if user in self._arms and "handle" in found:
             shown["arms"] = self.arms(found["handle"], user)
         if "P_c" in found:
             shown["directions"] = directions(found["P_c"])

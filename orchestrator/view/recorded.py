@@ -31,6 +31,8 @@ from hapticlink.orchestrator.results.whole_run import load_whole, scene_part
 from hapticlink.orchestrator.view.frames import PORT, of_user, shown
 from hapticlink.orchestrator.view.picture import Picture
 
+PLACES = ("q", "x", "handle")
+"""What a frame cannot be drawn without, of each user."""
 NEEDED = ("virtual_mechanism.q", "virtual_mechanism.x")
 MOST = 4000
 """Frames of a run; of longer ones every second, third, ... sample is shown."""
@@ -39,8 +41,9 @@ DIGITS = 7
 
 
 class Recorded:
-    """A run of a linkage as frames: `times` (s), `frames`, `every` (samples to a frame), and
-    `missing`, the signals that the drawing would show and that are not recorded.
+    """A run of a linkage as frames: `times` (s), `frames`, `every` (samples to a frame),
+    `missing`, the signals that the drawing would show and that are not recorded, and `left_out`,
+    the number of frames whose poses are not finite.
 
     Raises InputFault for a folder without a run of a linkage, or without its poses."""
 
@@ -65,6 +68,11 @@ class Recorded:
         times = max((t["time"] for t in tables), key=len)
         self.every = -(-len(times) // MOST)
         self.times: Vector = times[:: self.every]
+        places = [v for k, v in self.values().items() if k.rpartition(".")[2] in PLACES]
+        drawn = np.all([np.isfinite(v).all(axis=1) for v in places], axis=0)
+        if not drawn.any():
+            raise InputFault(f"{folder}: the run has no pose that is finite")
+        self.times, self.left_out = self.times[drawn], int((~drawn).sum())
         device = self.device if "handle" in self.signals else None
         self.users = further_users(results)
         others = scene_part(results, "devices", Mapping[str, Device]) if self.users else {}
@@ -87,14 +95,17 @@ class Recorded:
         return found
 
     def frames(self) -> list[dict[str, Any]]:
-        """The frames as the live page gets them, without their time."""
+        """The frames as the live page gets them, without their time and what is not finite."""
         values = self.values()
         port = user_port(self.results)
         energy = np.interp(self.times, port.time_s, port.generated_J) if port else None
         made = []
         for i in range(len(self.times)):
-            frame = self.picture.drawn(_by_user({k: v[i].tolist() for k, v in values.items()}))
-            made.append(frame | ({} if energy is None else {"energy": {PORT: float(energy[i])}}))
+            found = {k: v[i].tolist() for k, v in values.items() if np.isfinite(v[i]).all()}
+            frame = self.picture.drawn(_by_user(found))
+            if energy is not None and np.isfinite(energy[i]):
+                frame["energy"] = {PORT: float(energy[i])}
+            made.append(frame)
         return made
 
     def told(self) -> dict[str, Any]:
@@ -110,6 +121,7 @@ class Recorded:
             "times": [_rounded(float(t)) for t in self.times],
             "every": self.every,
             "missing": self.missing,
+            "left_out": self.left_out,
             "energies": [PORT],
             "users": ["", *self.users],
             "frames": {key: _changes([frame.get(key) for frame in frames]) for key in keys},

@@ -102,7 +102,7 @@ int manifold_push(Hold *h, const double *y) {
     double trace = 0.0;
     for (int64_t i = 0; i < n; i++) trace += y[i * (n + 1)];
     const int64_t before = h->rank;
-    h->rank = (int64_t)rint(trace);
+    h->rank = (int64_t)rint(trace > 0.0 ? (trace < n ? trace : n) : 0.0);
     return h->rank != before;
 }
 

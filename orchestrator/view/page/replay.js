@@ -122,6 +122,7 @@ function begin() {
   $("layout").hidden = recordings.length < 2;
   $("note").textContent = recordings.flatMap((r) => [
     r.missing.length ? `${r.short}: not recorded, and so not shown: ${r.missing.join(", ")}.` : "",
+    r.left_out ? `${r.short}: ${r.left_out} frames are not shown, since their poses are not finite.` : "",
     r.every > 1 ? `${r.short}: every ${r.every}th sample is shown.` : "",
   ]).filter(Boolean).join(" ");
 }

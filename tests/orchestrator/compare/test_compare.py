@@ -6,6 +6,7 @@ import base64
 import filecmp
 import json
 import re
+import shutil
 import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,7 +16,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.commands import main
-from hapticlink.orchestrator.compare import numbers, page, settings
+from hapticlink.orchestrator.compare import numbers, overlay, page, settings
 from hapticlink.orchestrator.compare.again import scene_file
 from hapticlink.orchestrator.results.whole_run import named
 
@@ -76,6 +77,7 @@ def test_the_command_draws_and_prints_json(
         (("compare", "slow"), "two runs or more"),
         (("compare", "slow", "slow"), "slow: is named twice"),
         (("report", "nowhere"), "nowhere: not the folder of a run"),
+        (("report", "slow", "--out", "."), "--out .: is a folder; name a file"),
     ],
 )
 def test_bad_input(
@@ -137,6 +139,56 @@ def test_text_of_a_scene_is_text_in_the_page(tmp_path: Path) -> None:
     html = page.page(named([tmp_path]))
     assert "<script" not in html
     assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; more" in html
+
+
+def test_dollar_signs_of_a_scene_are_no_formula(tmp_path: Path) -> None:
+    """Matplotlib fails at what two of them enclose if that is no formula, as here."""
+    title = r"costs $1 \\g $& more $$ or _less"
+    hl.run("closed-loop", {"duration": 0.05, "title": title}, out=tmp_path / "$a$_{", figures=True)
+    hl.run("closed-loop", {"duration": 0.05}, out=tmp_path / "_b", figures=False)
+    runs = named([tmp_path / "$a$_{", tmp_path / "_b"])
+    page.page(runs)
+    legend = overlay.figures(runs)["distance"].axes[0].get_legend()
+    assert legend
+    assert [text.get_text() for text in legend.get_texts()] == [r"\$a\$_{", "_b"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (("scene", "title"), 3),
+        (("connections", 0), None),
+        (("end", "reason"), None),
+        (("clocks", "haptics"), {}),
+        (("delays", "hand.F -> controller.F_hand"), {}),
+        (("step_errors", "haptic_device"), {"sum": "much"}),
+        (("fault",), "broken"),
+    ],
+)
+def test_a_run_json_that_was_changed_is_bad_input(
+    root: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    keys: tuple[str | int, ...],
+    value: object,
+) -> None:
+    folder = shutil.copytree(root / "fast", tmp_path / "run")
+    run = json.loads((folder / "run.json").read_text())
+    place = run
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    (folder / "run.json").write_text(json.dumps(run))
+    assert called("report", str(folder), "--out", str(tmp_path / "page.html")) == 2
+    assert "run.json: " in capsys.readouterr().err
+
+
+def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -> None:
+    """As a process that is killed can leave them."""
+    folder = shutil.copytree(root / "fast", tmp_path / "run")
+    table = folder / "haptics.csv"
+    table.write_text(table.read_text().partition("\n")[0] + "\n")
+    assert "How well" in page.page(named([folder]))
 
 
 def test_a_run_without_a_linkage_and_one_that_failed_have_a_page(tmp_path: Path) -> None:

@@ -161,6 +161,24 @@ def test_holds_of_matrices_in_c_are_those_in_python(
         assert compiled.value(tick + 7, 1.5).tobytes() == expected.tobytes()
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("name", MATRICES)
+def test_what_is_no_projector_has_a_rank_within_its_rows(name: str) -> None:
+    """Of traces that are negative, or beyond the largest integer of C, or overflow."""
+    generator, rows = np.random.default_rng(4), 3
+    size, made = rows * rows, lambda _: Projector(lambda: HOLDS[name](HoldContext(9, seconds)), 9)
+    values, held = np.zeros(size), np.zeros(size)
+    loop = structures.Loop(values=values.ctypes.data, numerator=NUMERATOR, denominator=DENOMINATOR)
+    python, own = map(made, range(2))
+    compiled = CompiledHold(load(), ctypes.addressof(loop), own, range(size), held)
+    for tick, scale in enumerate([1.0, 1e20, -1e20, 1e308, -1e308, 5e-324, 0.0, 7.0]):
+        sample = scale * np.where(np.eye(rows) > 0, 1.0, generator.uniform(-1, 1, (rows, rows)))
+        for hold in (python, compiled):
+            hold.push(9 * tick, sample.ravel(), 9 * tick)
+        expected = np.array(python.value(9 * tick), copy=True)
+        assert compiled.value(9 * tick).tobytes() == expected.tobytes()
+
+
 LARGE = """
 import ctypes, threading
 import numpy as np

@@ -164,3 +164,20 @@ def test_a_run_of_two_users_has_the_handles_and_arms_of_both(tmp_path: Path) -> 
     assert len(left["arms"]) == len(frame["arms"]) == 12
     assert left["arms"] != frame["arms"]
     assert len(left["directions"]) == left["n"][0] == 1
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_what_is_not_finite_is_left_out_and_told(folder: Path, tmp_path: Path) -> None:
+    run = shutil.copytree(folder, tmp_path / "run")
+    table = hl.load(run).tables["haptics"]
+    changed = table.rows.copy()
+    changed[20, table.columns.index("virtual_mechanism.q[1]")] = np.nan
+    changed[30, table.columns.index("hand.F[1]")] = np.inf
+    header = (run / "haptics.csv").read_text().partition("\n")[0]
+    np.savetxt(run / "haptics.csv", changed, "%.17g", ",", header=header, comments="")
+    found = Recorded(str(run))
+    assert len(found.times) == len(changed) - 1
+    told = told_by(replay.html([found]))["runs"][0]
+    assert told["left_out"] == 1
+    frames = found.frames()
+    assert [i for i, frame in enumerate(frames) if "F_hand" not in frame] == [29]
