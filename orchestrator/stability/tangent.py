@@ -8,10 +8,10 @@ column each, and their errors D follow
 
 J is found by central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
 difference of its slopes to both sides. For a doStep and a get of an FMU that carries its graph, J
-is exact (graph_slopes.py) and E its difference from these; entries that have a slope in one way
-only, or another one to each side, keep those by differences. Slopes at the same numbers, with the
-same age of samples, are the same, so that around a state of rest each operation is differentiated
-once.
+is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
+have a slope in one way only, or another one to each side, keep those by differences. Slopes at the
+same numbers, with the same age of samples, are the same, so that around a state of rest each
+operation is differentiated once.
 """
 
 from __future__ import annotations
@@ -312,7 +312,9 @@ def decided(
     """Slopes and their errors from exact ones, and where they are by differences all the same."""
     most = KINK * max(SMALL, np.abs(slope).max(initial=0.0))
     differ = ~(np.abs(slope - exact) <= most) | (np.abs(error) > most)
-    return np.where(differ, slope, exact), np.where(differ, error, slope - exact), differ
+    gap = slope - exact
+    wider = ~differ & (np.abs(gap) > np.abs(error))
+    return np.where(differ, slope, exact), np.where(wider, gap, error), differ
 
 
 def _ages(value: Any, tick: int) -> Any:

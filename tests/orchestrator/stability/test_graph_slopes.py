@@ -28,6 +28,7 @@ CASES = {
     "wall": ("virtual-wall", {}, {}),
     "substeps": ("virtual-wall", {"mechanism.substeps": 3}, {}),
     "pendulum": ("pendulum", {}, {}),
+    "neutral modes": ("scotch-yoke", {}, {"virtual_mechanism": {"closure_error"}}),
     "encoders": (
         "closed-loop-direct",
         {**HELD, "graphics.rate": 128, "sensing": "encoders"},
@@ -72,8 +73,8 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
     differences = hl.stability(scene, options)
     assert set(differences.linearised.values()) == {"differences"}
     both = found.uncertainty + differences.uncertainty
-    assert abs(found.radius - differences.radius) < both
-    assert found.uncertainty < 1.1 * differences.uncertainty  # both have a floor
+    assert abs(found.radius - differences.radius) <= both
+    assert found.verdict == differences.verdict
 
 
 def test_semi_implicit_euler_of_a_pendulum_has_the_eigenvalues_of_its_map() -> None:
