@@ -23,6 +23,7 @@ from hapticlink.components.component import (
 )
 from hapticlink.components.device import observer, pantograph
 from hapticlink.components.ports import Power
+from hapticlink.components.quantisation import quantised
 
 _FIXED = (
     ("proximal_length", "m", "length of the link next to each motor"),
@@ -75,11 +76,6 @@ def _plant(block: Block) -> ca.Function:
     wrench += pantograph.stop_wrench(pose, v, block.p) - c
     derivative = ca.vertcat(v, ca.solve(M, wrench))
     return ca.Function("ode", [state, drive, block.p.vector, block.t], [derivative])
-
-
-def _quantised(angles: ca.SX, resolution: ca.SX) -> ca.SX:
-    """The angles (rad) rounded to whole encoder counts."""
-    return resolution * ca.floor(angles / resolution + 0.5)
 
 
 def haptic_device(device: specs.Device) -> Component:
@@ -177,7 +173,7 @@ def haptic_device(device: specs.Device) -> Component:
 
         def measure(true_pose: ca.SX, guess: ca.SX) -> ca.SX:
             angles = pantograph.base_angles(true_pose, p)
-            counted = _quantised(angles, p["encoder_resolution"])
+            counted = quantised(angles, p["encoder_resolution"], 0.5)
             return pantograph.pose_from_angles(counted, guess, p)
 
         x1, x2 = x["x_observer"], x["v_observer"]

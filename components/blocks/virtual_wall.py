@@ -20,6 +20,7 @@ import casadi as ca
 
 from hapticlink.components.component import STEP_SIZE, Block, Component, Variable
 from hapticlink.components.control import passivity as observer
+from hapticlink.components.quantisation import quantised
 from hapticlink.components.specs.control import Passivity
 
 
@@ -77,7 +78,7 @@ def virtual_wall(
         outputs += observer.OUTPUTS
     block = Block(inputs=inputs, parameters=parameters, states=states, outputs=outputs)
     u, p = block.u, block.p
-    x = _reading(u["x"], p["quantum"]) if quantum is not None else u["x"]
+    x = quantised(u["x"], p["quantum"]) if quantum is not None else u["x"]
     F = -p["stiffness"] * (x - p["position"])
     if differenced:
         v = (x - block.x["x_last"]) / p[STEP_SIZE]
@@ -117,9 +118,3 @@ def virtual_wall(
         output={"F": F, **output},
         documentation=__doc__ or "",
     )
-
-
-def _reading(x: ca.SX, quantum: ca.SX) -> ca.SX:
-    """x rounded down to a whole number of quanta; x itself where the quantum is 0."""
-    coarse = quantum > 0.0
-    return ca.if_else(coarse, quantum * ca.floor(x / ca.if_else(coarse, quantum, 1.0)), x)

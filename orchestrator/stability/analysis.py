@@ -21,6 +21,7 @@ from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough,
 from hapticlink.orchestrator.stability.linearise import Linear
 from hapticlink.orchestrator.stability.modes import Mode, leading, modes, verdict
 from hapticlink.orchestrator.stability.oscillation import traced
+from hapticlink.orchestrator.stability.tangent import KINK
 from hapticlink.orchestrator.stability.varying import (
     VaryingStability,
     varies,
@@ -30,8 +31,6 @@ from hapticlink.orchestrator.system.built import built
 
 SHOWN = 6
 """Modes that are reported."""
-KINK = 1e-3
-"""Difference of the slopes to both sides, relative, above which a map has none."""
 LOST = 1e-6
 """Modes with a smaller |z| have vanished within a period."""
 
@@ -41,7 +40,8 @@ class Stability:
     """The result of an analysis. period: the hyperperiod (s). radius: the spectral radius over it,
     without neutral modes, and its uncertainty. growth: ln(radius)/period (1/s). modes: the leading
     ones. neutral: those with z = 1. frozen: lines of text. kinks: coordinates in which the map has
-    no slope. equilibrium: by coordinate. participants: by mode, names and shares."""
+    no slope. linearised: by FMU, whether its slopes are those of its graph or differences.
+    equilibrium: by coordinate."""
 
     title: str
     period: float
@@ -53,6 +53,7 @@ class Stability:
     equilibrium: dict[str, float]
     frozen: tuple[str, ...]
     kinks: tuple[str, ...]
+    linearised: dict[str, str]
 
     @property
     def growth(self) -> float:
@@ -77,6 +78,7 @@ class Stability:
             "neutral_modes": [self._mode(mode) for mode in self.neutral],
             "frozen": list(self.frozen),
             "not_differentiable": list(self.kinks),
+            "linearised": self.linearised,
             "equilibrium": self.equilibrium,
         }
 
@@ -154,4 +156,5 @@ def _result(title: str, map_: LiftedMap, at: Linear, lines: list[str]) -> Stabil
         equilibrium={n: float(at.point[i]) for n, i in zip(names, at.taken, strict=True)},
         frozen=tuple(lines),
         kinks=kinks,
+        linearised=map_.ways(),
     )

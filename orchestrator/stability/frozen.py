@@ -15,10 +15,8 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.stability.state_vector import Coordinate
 from hapticlink.orchestrator.system.system import Fmu, System
 
-NEXT_TO_NOTHING = 1e-12
+NEXT_TO_NOTHING = 1e-18
 """Of friction (N, N.m), which sets a stiffness by a quotient and so must not be 0."""
-COUNT = 1e-14
-"""Resolution (rad) of an encoder without quantisation."""
 DISCRETE = ("n_constrained", "deflection", "contact_deflection")
 """States of our blocks that are a count, or the deflection of friction that is taken out."""
 
@@ -44,7 +42,7 @@ def _removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:
         if scalar.causality != "parameter":
             continue
         if (block, scalar.name) == ("haptic_device", "encoder_resolution"):
-            yield scalar, COUNT, "quantisation of the encoders"
+            yield scalar, 0.0, "quantisation of the encoders"
         elif (block, scalar.name) == ("virtual_wall", "quantum"):
             yield scalar, 0.0, "quantisation of the encoder"
         elif block in ("controller", "virtual_wall") and scalar.name == "passivity_limit":

@@ -124,6 +124,7 @@ class LiftedMap:
         ends = np.cumsum([len(part) for part in state.parts(self._template)])[:-1]
         M = dict(zip(state.owners, np.split(V, ends), strict=True))
         D = {owner: np.zeros_like(rows) for owner, rows in M.items()}
+        self._tangent.begin()
         for tick, event in self._moments:
             for instruction, call in self._instructions(event):
                 self._tangent.carry(tick, instruction, call, M, D, same)
@@ -131,6 +132,10 @@ class LiftedMap:
             interrupt.check()
         whole, errors = (np.vstack([X[owner] for owner in state.owners]) for X in (M, D))
         return self._numbers(), whole, errors
+
+    def ways(self) -> dict[str, str]:
+        """By FMU, how the slopes of the last linearisation were found."""
+        return self._tangent.ways()
 
     def count(self, kind: type[Operation], fmu: str) -> int:
         """The number of operations of a kind on an FMU within a period."""

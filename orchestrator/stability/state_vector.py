@@ -104,7 +104,7 @@ class StateVector:
 
     def parts(self, template: Template) -> list[Vector]:
         """The numbers of a saved state, by owner."""
-        parts = [_doubles(template.fmus[name])[taken] for name, taken in self._taken.items()]
+        parts = [doubles(template.fmus[name])[taken] for name, taken in self._taken.items()]
         parts.append(template.signals)
         for name, kept in zip(self._holds, template.holds, strict=True):
             found: list[Vector] = [np.zeros(0)]
@@ -122,9 +122,9 @@ class StateVector:
         at = 0
         fmus = {}
         for name, taken in self._taken.items():
-            head, doubles = template.fmus[name], _doubles(template.fmus[name]).copy()
-            doubles[taken] = numbers[at : at + len(taken)]
-            fmus[name] = head[: len(head) - doubles.nbytes] + doubles.tobytes()
+            head, values = template.fmus[name], doubles(template.fmus[name]).copy()
+            values[taken] = numbers[at : at + len(taken)]
+            fmus[name] = head[: len(head) - values.nbytes] + values.tobytes()
             at += len(taken)
         signals = numbers[at : at + len(template.signals)].copy()
         at += len(signals)
@@ -197,7 +197,7 @@ def _entries(fmu: Fmu) -> Iterator[tuple[int, str, bool]]:
         yield i - len(fmu.description.states), name, False
 
 
-def _doubles(state: bytes) -> Vector:
+def doubles(state: bytes) -> Vector:
     """The doubles that a serialised state ends with, as many as fit."""
     return np.frombuffer(state, offset=len(state) % 8)
 

@@ -7,8 +7,11 @@ column each, and their errors D follow
     M <- J M,   D <- J D + E M
 
 J is found by central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
-difference of its slopes to both sides. Slopes at the same numbers, with the same age of samples,
-are the same, so that around a state of rest each operation is differentiated once.
+difference of its slopes to both sides. For a doStep and a get of an FMU that carries its graph, J
+is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
+have a slope in one way only, or another one to each side, keep those by differences. Slopes at the
+same numbers, with the same age of samples, are the same, so that around a state of rest each
+operation is differentiated once.
 """
 
 from __future__ import annotations
@@ -37,11 +40,14 @@ from hapticlink.orchestrator.run.parallel_steps import Finish
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.frozen import discrete
+from hapticlink.orchestrator.stability.graph_slopes import graph_slopes
 from hapticlink.orchestrator.stability.state_vector import (
     SIGNALS,
     Coordinate,
     StateVector,
+    Template,
     Vector,
+    doubles,
     keepers,
 )
 
@@ -49,6 +55,11 @@ Matrix = NDArray[np.float64]
 Columns = dict[str, Matrix]
 """Perturbations by owner, a column each."""
 STEP = 1e-6
+KINK = 1e-3
+"""Difference of slopes, relative to the largest of a column, above which there is none."""
+SMALL = 1e-3
+"""Columns of smaller slopes, in which the rounding of differences would pass for a kink, count as
+of this size."""
 SAME = 1e-8
 """Largest difference of numbers, relative to max(1, |z|), at which slopes are the same."""
 
@@ -63,13 +74,25 @@ class Reach:
     writes: NDArray[np.intp]
 
 
+@dataclass(frozen=True)
+class Slopes:
+    """J and E of an operation where it reads the numbers `at`; `apart` are the variables with
+    slopes by differences beside those of the graph, None where all are by differences."""
+
+    at: Vector
+    J: Matrix
+    E: Matrix
+    apart: frozenset[str] | None
+
+
 class Tangent:
     """The slopes of the operations of a simulation; `closures` are those of its mechanism."""
 
     def __init__(self, simulation: Simulation, closures: Closures | None) -> None:
         self._simulation, self.closures = simulation, closures
         self._reach: dict[Instruction, Reach | None] = {}
-        self._known: dict[Any, list[tuple[Vector, Matrix, Matrix]]] = {}
+        self._known: dict[Any, list[Slopes]] = {}
+        self._apart: dict[str, frozenset[str] | None] = {}
         self._named: dict[Any, list[Coordinate]] = {}
 
     def forget(self, fmus: Container[str]) -> None:
@@ -77,6 +100,21 @@ class Tangent:
         for key in list(self._known):
             if isinstance(key[0], Repeat) or getattr(key[0], "fmu", None) in fmus:
                 del self._known[key]
+
+    def begin(self) -> None:
+        """A period begins, of which `ways` tells."""
+        self._apart.clear()
+
+    def ways(self) -> dict[str, str]:
+        """By FMU, how its slopes were found since `begin`."""
+        found = {}
+        for fmu in self._simulation.system.fmus:
+            if (apart := self._apart.get(fmu.name)) is None:
+                found[fmu.name] = "differences"
+            else:
+                others = ", ".join(sorted(apart))
+                found[fmu.name] = f"graph; by differences: {others}" if others else "graph"
+        return found
 
     def carry(
         self,
@@ -97,7 +135,12 @@ class Tangent:
         if reach is None:
             call(tick)
             return
-        J, E, sizes = self._slopes(tick, operation, call, reach, same)
+        found, sizes = self._slopes(tick, operation, call, reach, same)
+        for fmu in reach.state.owners if isinstance(operation, Step | Get | Repeat) else ():
+            apart = self._apart.get(fmu, frozenset())
+            if apart is not None:
+                self._apart[fmu] = None if found.apart is None else apart | found.apart
+        J, E = found.J, found.E
         owners = [o for o in reach.state.owners if o != SIGNALS]
         before = [np.vstack([*(X[o] for o in owners), X[SIGNALS][reach.reads]]) for X in (M, D)]
         m, d = before
@@ -121,8 +164,8 @@ class Tangent:
 
     def _slopes(
         self, tick: int, operation: Instruction, call: Call, reach: Reach, same: float
-    ) -> tuple[Matrix, Matrix, list[int]]:
-        """J and E of an operation that is carried out, and the numbers of each owner after it."""
+    ) -> tuple[Slopes, list[int]]:
+        """Slopes of an operation that is carried out, and the numbers of each owner after it."""
         state = reach.state
         template = state.save()
         z, (read, _) = state.numbers(template), self._places(reach, template)
@@ -134,32 +177,56 @@ class Tangent:
         key = operation, len(z), len(image), _ages(template.holds, tick)
         known = self._known.setdefault(key, [])
         wide = same * np.maximum(1.0, np.abs(z[read]))
-        for at, J, E in known:
-            if isinstance(operation, Set) or (np.abs(z[read] - at) <= wide).all():
-                return J, E, sizes
+        for slopes in known:
+            if isinstance(operation, Set) or (np.abs(z[read] - slopes.at) <= wide).all():
+                return slopes, sizes
+        exact = self._exact(operation, template, after)
+        apart = np.zeros(len(written), bool)
         J, E = np.zeros((2, len(written), len(read)))
         inert = [False] * len(read)
         if known:  # what nothing reads, as outputs, has the slopes that it has anywhere
             coordinates = self._coordinates(key, state, template)
             inert = [coordinates[i].inert for i in read]
-            J[:, inert], E[:, inert] = known[0][1][:, inert], known[0][2][:, inert]
+            J[:, inert], E[:, inert] = known[0].J[:, inert], known[0].E[:, inert]
         inverse = {int(place): i for i, place in enumerate(read)}
         for places, weights in self._directions(key, state, template, read[~np.array(inert)], z):
             d = STEP * max(1.0, float(np.abs(z[places]).max()))
-            slopes = []
+            sides = []
             for way in (d, -d):
                 shifted = z.copy()
                 shifted[places] += way * weights
                 state.restore(state.put(template, shifted))
                 call(tick)
                 width = weights @ (shifted[places] - z[places])
-                slopes.append((state.numbers(state.save())[written] - image[written]) / width)
+                sides.append((state.numbers(state.save())[written] - image[written]) / width)
             columns = [inverse[int(place)] for place in places]
-            J[:, columns] += np.outer((slopes[0] + slopes[1]) / 2, weights)
-            E[:, columns] += np.outer((slopes[0] - slopes[1]) / 2, weights)
+            slope, error = (sides[0] + sides[1]) / 2, (sides[0] - sides[1]) / 2
+            if exact is not None:
+                along = exact[:, columns] @ weights
+                slope, error, differ = decided(along, slope, error)
+                apart |= differ
+            J[:, columns] += np.outer(slope, weights)
+            E[:, columns] += np.outer(error, weights)
         state.restore(after)
-        known.insert(0, (z[read], J, E))
-        return J, E, sizes
+        coordinates = self._coordinates(key, state, template)
+        names = frozenset(coordinates[i].variable for i in written[apart])
+        known.insert(0, Slopes(z[read], J, E, None if exact is None else names))
+        return known[0], sizes
+
+    def _exact(self, operation: Instruction, before: Template, after: Template) -> Matrix | None:
+        """J of a doStep or a get of an FMU that carries its graph."""
+        if not isinstance(operation, Step | Get):
+            return None
+        fmu = operation.fmu
+        description = self._simulation.system.fmu[fmu].description
+        graph = graph_slopes(description)
+        if graph is None:
+            return None
+        if isinstance(operation, Step):
+            return graph.step(doubles(before.fmus[fmu]), doubles(after.fmus[fmu]))
+        J, outputs = graph.get(doubles(before.fmus[fmu])), description.outputs
+        ranks = np.argsort(np.argsort([s.reference for s in outputs]))
+        return np.vstack([J, J[graph.n_u + ranks]])
 
     def _coordinates(self, key: Any, state: StateVector, template: Any) -> list[Coordinate]:
         if key not in self._named:
@@ -237,6 +304,17 @@ class Tangent:
                 return reach(fmus, set(keepers(simulation)), every, every)
             case _:
                 return None
+
+
+def decided(
+    exact: Vector, slope: Vector, error: Vector
+) -> tuple[Vector, Vector, NDArray[np.bool_]]:
+    """Slopes and their errors from exact ones, and where they are by differences all the same."""
+    most = KINK * max(SMALL, np.abs(slope).max(initial=0.0))
+    differ = ~(np.abs(slope - exact) <= most) | (np.abs(error) > most)
+    gap = slope - exact
+    wider = ~differ & (np.abs(gap) > np.abs(error))
+    return np.where(differ, slope, exact), np.where(wider, gap, error), differ
 
 
 def _ages(value: Any, tick: int) -> Any:

@@ -1,0 +1,107 @@
+"""The exact slopes of a doStep and of a get of our Python FMUs, from the graph that they carry.
+
+With trial states x_0 = x, x_{k+1} = f(x_k, u, p, t_k, h), k < n substeps (fmus/one_pass.py),
+
+    dx_{k+1}/d(x, u) = f_x dx_k/d(x, u) + (0, f_u)
+
+The outputs y of a plant are those at the end of the step, y = g(x_n, u, p, t + H), those of a
+sampled block those at its beginning, y = g(x, u, p, t). f_x, f_u, g_x and g_u are the Jacobians of
+the functions that the FMU runs, by CasADi's algorithmic differentiation.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from functools import lru_cache
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.fmi.description import Description
+
+Matrix = NDArray[np.float64]
+Vector = NDArray[np.float64]
+FUNCTIONS, ABOUT = "resources/functions.casadi.json", "resources/component.json"
+KEPT = 32
+"""Graphs that a process keeps, as many as FMUs."""
+
+
+def graph_slopes(found: Description) -> GraphSlopes | None:
+    """Those of an FMU; None for FMUs of others, and those without CasADi's functions, such as
+    native ones."""
+    return _read(found.path, found.guid) if found.block else None
+
+
+@lru_cache(KEPT)
+def _read(path: Path, guid: str) -> GraphSlopes | None:
+    with zipfile.ZipFile(path) as archive:
+        if FUNCTIONS not in archive.namelist():
+            return None
+        texts, about = (json.loads(archive.read(name)) for name in (FUNCTIONS, ABOUT))
+    functions = {name: ca.Function.deserialize(text) for name, text in texts.items()}
+    return GraphSlopes(functions, about["timing"] == "sampled", about["substeps"])
+
+
+class GraphSlopes:
+    """The slopes of an FMU with these `functions`, of what it keeps: inputs u, outputs y, states x.
+    `before` and `after` are its serialised states, which end with (time, u, p, y, x)."""
+
+    def __init__(self, functions: dict[str, ca.Function], sampled: bool, substeps: int) -> None:
+        advance, output = functions["advance"], functions["output"]
+        x, u, p, t, h, end, _ = advance.sx_in()
+        y, shared = output(x, u, p, t)
+        after, y_end, _ = advance(x, u, p, t, h, end, shared)
+        self._sampled, self._others = sampled, substeps - 1
+        self._n = [s.numel() for s in (t, u, p, y, x)]
+        self._advance = _jacobian([x, u, p, t, h, end], [after, y_end])
+        self._output = None if sampled else _jacobian([x, u, p, t], [y])
+        if self._others:
+            self._substep = _jacobian([x, u, p, t, h], [functions["substep"](x, u, p, t, h)])
+
+    @property
+    def n_u(self) -> int:
+        return self._n[1]
+
+    def step(self, before: Vector, after: Vector) -> Matrix:
+        """d(u, y, x after)/d(u, y, x before) of the doStep from one to the other."""
+        (time,), u, p, y, x = self._parts(before)
+        end = float(self._parts(after)[0][0])
+        n = self._others + 1
+        size, J = (end - time) / n, np.eye(len(x), len(x) + len(u))  # dx/d(x, u)
+        of_u = np.eye(len(u), len(x) + len(u), len(x))
+        dy = np.zeros((len(y), len(x) + len(u)))
+        for k in range(n):
+            if whole := k == (0 if self._sampled else n - 1):
+                x, _, slopes = self._advance(x, u, p, time + k * size, size, end)
+            else:
+                x, slopes = self._substep(x, u, p, time + k * size, size)
+            moved = np.asarray(slopes) @ np.vstack([J, of_u])
+            J = moved[: len(J)]
+            dy = moved[len(J) :] if whole else dy
+        return self._arranged(dy, J)
+
+    def get(self, before: Vector) -> Matrix:
+        """d(u, y, x)/d(u, y, x) of reading all outputs, which a plant evaluates anew."""
+        (time,), u, p, y, x = self._parts(before)
+        if self._output is None:
+            return np.eye(len(u) + len(y) + len(x))
+        slopes = np.asarray(self._output(x, u, p, time)[1])
+        return self._arranged(slopes, np.eye(len(x), len(x) + len(u)))
+
+    def _parts(self, state: Vector) -> list[Vector]:
+        return np.split(state[-sum(self._n) :], np.cumsum(self._n)[:-1])
+
+    def _arranged(self, y: Matrix, x: Matrix) -> Matrix:
+        """Slopes of (u, y, x) by (u, y, x), from those of y and x by (x, u)."""
+        n, m = len(x), y.shape[1] - len(x)
+        rows = np.vstack([np.eye(m, n + m, n), y, x])
+        return np.hstack([rows[:, n:], np.zeros((len(rows), len(y))), rows[:, :n]])
+
+
+def _jacobian(arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
+    """The results, and their Jacobian by the first two arguments, x and u."""
+    slopes = ca.jacobian(ca.vertcat(*results), ca.vertcat(*arguments[:2]))
+    return ca.Function("slopes", arguments, [*results, ca.densify(slopes)])
