@@ -86,8 +86,8 @@ def stability(
         )
         tell(said, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json)
         return 0
+    user = api.passivity(scene, given, at=at) if port else None  # refuses many forces at once
     found = api.stability(scene, given, at=at)
-    user = api.passivity(scene, given) if port else None
     folder = folders.ensure(out or default_folder("runs", scene, chosen))
     record = found.record() | ({"port": user.record()} if user else {})
     write_json(folder / "stability.json", record)

@@ -58,12 +58,14 @@ class HandPort:
 @dataclass(frozen=True)
 class MechanismPort:
     """The port of the virtual mechanism: its inputs with the factor by which each adds to the
-    entries of the wrench on it, and the indices of the signals of its pose and velocity."""
+    entries of the wrench on it, the indices of the signals of its pose and velocity, and the ports
+    whose outputs others read besides, which stay as at the equilibrium."""
 
     fmu: str
     wrench: tuple[tuple[tuple[str, float], ...], ...]
     moved: tuple[int, ...]
     moving: tuple[int, ...]
+    kept: tuple[str, ...] = ()
 
 
 def hand_port(system: System) -> HandPort:
@@ -98,7 +100,10 @@ def mechanism_port(system: System, hand: HandPort) -> MechanismPort | None:
         )
         for place in point[0]
     )
-    return MechanismPort(fmu, wrench, *point)
+    own = {place for places in point for place in places}
+    read = [c for c in system.connections if c.source == fmu]
+    kept = {c.source_port for c in read if own.isdisjoint(signals.sources(c))}
+    return MechanismPort(fmu, wrench, *point, tuple(sorted(kept)))
 
 
 @dataclass(frozen=True)
@@ -130,6 +135,18 @@ class Response:
         return float(np.abs(np.linalg.eigvals(self.A)).max(initial=0.0))
 
 
+def require_size(map_: LiftedMap, hand: HandPort, mechanism: MechanismPort | None) -> None:
+    """Raises InputFault for a hyperperiod with too many forces, which no frequency could take."""
+    count = len(hand.moved) * map_.count(Set, hand.handle)
+    if mechanism:
+        count += len(mechanism.moved) * map_.count(Step, mechanism.fmu)
+    if count > LARGEST:
+        raise InputFault(
+            f"user's port: {count} forces in a hyperperiod, at most {LARGEST}: take a graphics "
+            "rate that divides the haptic one"
+        )
+
+
 def response(
     map_: LiftedMap,
     at: Linear,
@@ -142,12 +159,6 @@ def response(
     `alone`: of the handle's FMU with its other inputs held."""
     N = map_.count(Set, hand.handle)
     n = map_.count(Step, mechanism.fmu) if mechanism else 0
-    m, p = len(hand.moved), len(mechanism.moved) if mechanism else 0
-    if m * N + p * n > LARGEST:
-        raise InputFault(
-            f"user's port: {m * N + p * n} forces in a hyperperiod, at most {LARGEST}: take a "
-            "graphics rate that divides the haptic one"
-        )
     cut = _Cut(map_, at, hand, mechanism, N, n, alone)
     _, M, _ = map_.slopes(at.point, cut.start, after=cut)
     return cut.response(M)

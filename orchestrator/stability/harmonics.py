@@ -22,6 +22,8 @@ STILL = 1e-9
 RIGID = 1e-6
 """That of a direction in which the rendering does not let the handle move."""
 
+HELD = 1e-5
+"""Mobility of the device, relative to that at a quarter of the rate, that is rounding of slopes."""
 SHARP = 0.1
 """Half width w P of a resonance that a grid of frequencies can miss."""
 SEARCH = 16
@@ -78,6 +80,12 @@ class Scale:
         _, sizes, directions = np.linalg.svd(np.vstack([parts.real, parts.imag]))
         self.moving: Matrix = self.free @ directions[sizes > RIGID * sizes[0]].T
 
+    def moved(self, device: Response, angle: float) -> bool:
+        """Whether the device moves at an angle: at half the rate a held force that changes its sign
+        every period may not, so that its impedance has no value there."""
+        Y, usual = (self.at(device, at, 0.0, self.free).Y for at in (angle, np.pi / 2))
+        return bool(np.linalg.norm(Y, -2) > HELD * np.linalg.norm(usual, 2))
+
     def resonances(self, found: Response) -> Matrix:
         """Angles w P in (0, pi), ever closer to the poles of F = Z v near the unit circle, beside
         which an impedance can peak: z of the modes with the handle held still,
@@ -98,7 +106,7 @@ class Scale:
         poles = eigvals(held, mass)
         poles = poles[np.isfinite(poles) & (np.abs(poles) > 0.5) & (np.abs(poles) < 2.0)]
         angles, widths = np.abs(np.angle(poles)), np.abs(np.log(np.abs(poles)))
-        sharp = (widths < SHARP) & (widths > STILL)
+        sharp = (widths < SHARP) & (widths > STILL) & (angles < np.pi - SHARP)
         near = [
             at + side * width * 2.0 ** np.arange(-1, np.log2(SHARP / width))
             for at, width in zip(angles[sharp], widths[sharp], strict=True)
@@ -129,8 +137,11 @@ class Scale:
 
 
 def with_worst(angles: Matrix, lacks: Callable[[float], float]) -> Matrix:
-    """The angles, and beside the one at which `lacks` is largest the one where it peaks."""
+    """The angles, and beside the one at which `lacks` is largest the one where it peaks, unless it
+    is the last one."""
     worst = int(np.argmax([lacks(angle) for angle in angles]))
+    if worst == len(angles) - 1:
+        return angles
     bounds = angles[max(worst - 1, 0)], angles[min(worst + 1, len(angles) - 1)]
     options = {"maxiter": SEARCH, "xatol": 1e-9}
     found = minimize_scalar(lambda a: -lacks(a), bounds=bounds, method="bounded", options=options)

@@ -46,6 +46,7 @@ from hapticlink.orchestrator.stability.cut import (
     MechanismPort,
     hand_port,
     mechanism_port,
+    require_size,
     response,
 )
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
@@ -107,9 +108,11 @@ class Passivity:
             yield from self.two_port.lines()
 
 
-def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
+def passivity(scene: str | Path | Scene, options: Options = (), *, at: float = 0.0) -> Passivity:
     """The passivity of the user's port of a scene, around its equilibrium, and the absolute
-    stability of the rendering between the hand and the virtual mechanism behind a device.
+    stability of the rendering between the hand and the virtual mechanism behind a device. The
+    scene is run up to the time `at` (s) before, as for `stability`. Of several users it is the
+    first one's port, with the others in the hands of the scene.
 
     Raises InputFault as `stability` does, and for a scene whose hand pushes no device, or with a
     hyperperiod of more than 600 forces.
@@ -119,11 +122,12 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
         with built(read) as whole:
             system, _ = frozen.without(whole)
             hand = hand_port(system)
-            with opened(long_enough(read, system), 0.0, Closures(read)) as map_:
-                at = equilibrium(map_, read.duration)
+            with opened(long_enough(read, system, at), at, Closures(read)) as map_:
                 mechanism = mechanism_port(system, hand)
+                require_size(map_, hand, mechanism)
+                rest = equilibrium(map_, read.duration)
                 T = 1 / float(read.haptics.rate)
-                return of(read.title, map_, at, hand, mechanism, T)
+                return of(read.title, map_, rest, hand, mechanism, T)
 
 
 def of(
@@ -165,11 +169,13 @@ def of(
             found.append(lacking_here if abs(lacking_here) > none else 0.0)
         return found
 
-    angles = np.union1d(_angles(N), scale.resonances(whole))
+    grid = np.array([angle for angle in _angles(N) if scale.moved(device, angle)])
+    angles = np.union1d(grid, scale.resonances(whole))
     angles = with_worst(angles, lambda angle: max(lacks(angle)))
     for angle in angles:
         port, alone = impedances(angle)
-        own = min(own, -least(alone))
+        has = -least(alone)
+        own = min(own, has if abs(has) > ROUNDING * np.abs(alone).max() else 0.0)
         curve += [(hertz(angle, h, N, P), found) for h, found in enumerate(lacks(angle))]
         if mixes(port):
             most = lacking(port.impedance - alone, [port.r] * (len(port.Y) // port.r))
@@ -187,7 +193,11 @@ def of(
         angles = np.union1d(angles, scale.resonances(cut))
         angles = with_worst(angles, lambda angle: two_port.most_lacking(cut_at(angle)))
         both = two_port.judged(
-            [(angle, cut_at(angle)) for angle in angles], P, scale.turns, cut.radius
+            [(angle, cut_at(angle)) for angle in angles],
+            P,
+            scale.turns,
+            cut.radius,
+            mechanism.kept,
         )
     return Passivity(
         title,

@@ -26,8 +26,9 @@ class TwoPort:
     rendering mixes no frequencies. turning: `needed` for rotations (N.m.s/rad), 0 without any.
     hand, mechanism: what each port needs by itself, whatever the other has. frequency: where
     `at_least` is needed (Hz). below: the frequency (Hz) up to which nothing is. radius: spectral
-    radius with the hand gone and the mechanism held. curve: frequencies (Hz) and the damping that
-    is necessary there."""
+    radius with the hand gone and the mechanism held. kept: ports of the mechanism that others read
+    besides its pose and velocity, as at the equilibrium here. curve: frequencies (Hz) and the
+    damping that is necessary there."""
 
     needed: float
     at_least: float
@@ -37,6 +38,7 @@ class TwoPort:
     frequency: float
     below: float
     radius: float
+    kept: tuple[str, ...]
     curve: tuple[tuple[float, float], ...]
 
     @property
@@ -63,6 +65,7 @@ class TwoPort:
             "least_passive_frequency": self.frequency,
             "passive_below": self.below,
             "radius_with_hand_gone_and_mechanism_held": self.radius,
+            "outputs_as_at_the_equilibrium": list(self.kept),
             "damping_necessary_by_frequency": [list(pair) for pair in self.curve],
         }
 
@@ -74,6 +77,8 @@ class TwoPort:
                 "  unstable by itself, with the hand gone and the mechanism held (spectral radius "
                 f"{self.radius:.6g})"
             )
+        if self.kept:
+            yield f"  of the mechanism as at the equilibrium: {', '.join(self.kept)}"
         if self.needed > 0.0:
             necessary = "" if self.needed == self.at_least else f"{self.at_least:.4g} to "
             yield (
@@ -86,7 +91,11 @@ class TwoPort:
 
 
 def judged(
-    ports: Sequence[tuple[float, Hybrid]], period: float, turns: float, radius: float
+    ports: Sequence[tuple[float, Hybrid]],
+    period: float,
+    turns: float,
+    radius: float,
+    kept: tuple[str, ...] = (),
 ) -> TwoPort:
     """The verdict on ports at angles; `turns` converts a damping to one of rotations."""
     curve: list[tuple[float, float]] = []
@@ -116,6 +125,7 @@ def judged(
         frequency,
         min(lacks, default=max(f for f, _ in curve)),
         radius,
+        kept,
         tuple(sorted(curve)),
     )
 

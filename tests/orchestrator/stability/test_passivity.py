@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.stability import wall_limits
+from hapticlink.orchestrator.stability.cut import hand_port, mechanism_port
+from hapticlink.orchestrator.system.built import built
 
 T = 1 / 512
 WALL: dict[str, Any] = {
@@ -52,3 +55,44 @@ def test_a_mechanism_alone_gives_energy_to_no_hand() -> None:
 def test_a_scene_without_a_hand_on_a_device_has_no_port() -> None:
     with pytest.raises(hl.InputFault, match="no port of a user"):
         hl.passivity("pendulum")
+
+
+def test_of_two_users_it_tells_what_is_left_as_at_the_equilibrium() -> None:
+    """The cut of the first user's mechanism holds the second one's point, and what is sent of the
+    forces there: the result names these outputs."""
+    scene = open_scene.load("two-users", {"directions_from": "mechanism"})
+    with built(scene) as system:
+        port = mechanism_port(system, hand_port(system))
+    assert port is not None
+    assert {"F_env", "left.x", "left.v", "left.F_env"} <= set(port.kept)
+    assert not {"x", "v"} & set(port.kept)
+
+
+def test_too_many_forces_are_refused_before_anything_is_searched() -> None:
+    """256 ticks and 15 frames, three entries each of the handle at every tick and of the
+    mechanism; a path that never rests would be the later fault."""
+    with pytest.raises(hl.InputFault, match="forces in a hyperperiod, at most 600"):
+        hl.passivity("two-users")
+
+
+def test_a_target_that_comes_to_rest_later_is_judged_from_there() -> None:
+    """A hand's target moves until 1 s: refused at the start, judged from 1.5 s on."""
+    path = [[0.0, 0.0, 0.0, 0.0], [1.0, 0.004, 0.0, 0.0]]
+    arm = {"type": "spring", "stiffness": [300.0, 0.0, 0.0], "damping": [5.0, 0.0, 0.0]}
+    options = {k: v for k, v in WALL.items() if k != "hand.wrench"}
+    options |= {"hand": arm | {"target": path}, "fmu.wall.start.stiffness": 3000.0}
+    with pytest.raises(hl.InputFault, match="give `at`"):
+        hl.passivity("virtual-wall", options)
+    found = hl.passivity("virtual-wall", options, at=1.5)
+    assert found.needed == pytest.approx(3000 * T / 2 + 1, rel=1e-3)
+
+
+def test_at_half_the_rate_rounding_is_no_damping() -> None:
+    """A force that changes its sign every period does not move the device, which has no impedance
+    there: its own damping was found to be -1.5e8 N.s/m, that of rounding."""
+    hold = {"stiffness": [100.0, 100.0, 0.1], "damping": [5.0, 5.0, 0.005]}
+    hand = {"type": "spring", "target": [[0.0, 0.035, 0.025, -0.785]]} | hold
+    found = hl.passivity("closed-loop", {"graphics.rate": 512, "hand": hand})
+    assert abs(found.own) < 1.0
+    assert found.needed < 10.0
+    assert max(f for f, _ in found.curve) < 256.0
