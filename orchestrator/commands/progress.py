@@ -28,6 +28,19 @@ def progress(
 
 
 @contextmanager
+def waiting(what: str, hidden: bool = False) -> Iterator[None]:
+    """Says what is being done, for as long as it takes, where nothing can be counted."""
+    if hidden or not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+    from rich.markup import escape
+
+    with Console(stderr=True).status(escape(printable(what))):
+        yield
+
+
+@contextmanager
 def _bar(title: str, hidden: bool) -> Iterator[Callable[[float, float, str], None] | None]:
     if hidden or not sys.stderr.isatty():
         yield None

@@ -19,7 +19,7 @@ from hapticlink.orchestrator.commands.options import (
     options,
     tell,
 )
-from hapticlink.orchestrator.commands.progress import counted
+from hapticlink.orchestrator.commands.progress import counted, waiting
 from hapticlink.orchestrator.commands.sweep import Jobs, Vary
 
 At = Annotated[float, Parameter(help="Time (s) from which on no target, drive or wrench changes.")]
@@ -86,8 +86,9 @@ def stability(
         )
         tell(said, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json)
         return 0
-    user = api.passivity(scene, given, at=at) if port else None  # refuses many forces at once
-    found = api.stability(scene, given, at=at)
+    with waiting(f"{name}: equilibrium and linearisation, which can take minutes", quiet):
+        user = api.passivity(scene, given, at=at) if port else None  # refuses many forces at once
+        found = api.stability(scene, given, at=at)
     folder = folders.ensure(out or default_folder("runs", scene, chosen))
     record = found.record() | ({"port": user.record()} if user else {})
     write_json(folder / "stability.json", record)

@@ -180,7 +180,8 @@ def _distance(results: Results) -> Figure:
 def _contact(results: Results, table: Table) -> Figure:
     force = np.linalg.norm(table[CONTACT][:, :2], axis=1)
     share = 100 * float((force > 0).mean())
-    title = f"Contacts push with at most {short(force.max())} N, in {short(share)} % of the samples"
+    pushed = f"at most {short(force.max())} N, in {short(share)} % of the samples"
+    title = f"Contacts push with {pushed}" if share else "Nothing is touched"
     figure, axes = titled(results, title, "time (s)", "|F_env| of the contacts (N)")
     axes.plot(table["time"], force)
     return figure

@@ -66,10 +66,12 @@ def test_by_one_option_and_what_does_not_meet_is_listed(
 ) -> None:
     out, file = tmp_path / "run", spring(tmp_path)
     command = ["run", "closed-loop", "--set", "duration=0.2", "--swap", f"controller={file}"]
+    command += ["--set", "fmu.controller.start.own=[1.0, 2.0, 3.0]"]  # acts after the swap
     assert status(*command, "--out", out) == 0
     told = capsys.readouterr().out
     run = json.loads((out / "run.json").read_text())
     assert run["replaced"]["controller"]["unfed"] == ["own"]
+    assert run["scene"]["fmu"][0]["start"] == {"own": [1.0, 2.0, 3.0]}
     lost = run["replaced"]["controller"]["lost"]
     assert "haptic_device.M -> controller.M" in lost
     assert "controller.F_drift -> virtual_mechanism.F_drift" in lost
