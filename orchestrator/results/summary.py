@@ -114,6 +114,7 @@ def lines(results: Results) -> Iterator[str]:
     for fmu, errors in run.get("step_errors", {}).items():
         yield from long_steps(fmu, errors, run["fmus"][fmu].get("block"))
     yield from friction_speed.coarse(results)
+    yield from _late_passivity(run)
     yield from _stopped(results)
     yield from _contacts(results)
     for clock, steps in run["controlled_steps"].items():
@@ -131,6 +132,24 @@ def lines(results: Results) -> Iterator[str]:
         misfits = [f"{name} ({why['reason']})" for name, why in group]
         more = f" and {len(misfits) - 1} more" if len(misfits) > 1 else ""
         yield f"hold {hold} does not fit {misfits[0]}{more}: zoh there"
+
+
+def _late_passivity(run: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each force of a passivity controller that acts later than at its sample."""
+    guarded = {"controller"} if (run["scene"]["controller"] or {}).get("passivity") else set()
+    for fmu in run["scene"].get("fmu", ()):
+        if fmu.get("block") == "virtual_wall" and fmu.get("settings", {}).get("passivity"):
+            guarded.add(fmu["name"])
+    for name, age in run["delays"].items():
+        source, _, signal = name.partition(" -> ")[0].partition(".")
+        if age["max"] > 0.0 and (
+            (source in guarded or (source.startswith("controller_") and "controller" in guarded))
+            and signal in ("F_motor", "F")
+        ):
+            yield (
+                f"warning: {name} acts {short(1e3 * age['max'])} ms late: the passivity controller "
+                "pairs it with the motion since its sample, and does not bound its energy"
+            )
 
 
 def _stopped(results: Results) -> Iterator[str]:

@@ -151,3 +151,17 @@ def test_a_free_handle_forgets_what_was_absorbed_and_keeps_a_deficit() -> None:
 def test_what_cannot_be_damped_is_refused(key: str, value: float) -> None:
     with pytest.raises(hl.InputFault, match=f"passivity.*{key}"):
         hl.scene("closed-loop", {f"controller.passivity.{key}": value})
+
+
+def test_a_run_warns_where_the_guarded_force_is_late() -> None:
+    """What a latency adds is not bounded: of a wall by `delays`, of the motors by the order of
+    Jacobi. None without."""
+    late = "passivity controller pairs it with the motion"
+    for delay, told in ((0.0, False), (T, True)):
+        options = {"duration": 0.1, "fmu.wall.settings.passivity": MASS, "delays.'wall.F'": delay}
+        run = hl.run("virtual-wall", options, figures=False)
+        assert any(late in line for line in run.run["warnings"]) == told
+    for coupling, told in (("gauss-seidel", False), ("jacobi", True)):
+        options = {"duration": 0.05, "controller.passivity": True, "coupling": coupling}
+        run = hl.run("closed-loop", options, figures=False)
+        assert any(late in line for line in run.run["warnings"]) == told
