@@ -129,9 +129,10 @@ def lines(results: Results) -> Iterator[str]:
         yield f"{why}: the loop is not passive"
     refused = sorted(run["holds_that_did_not_fit"].items(), key=lambda item: item[1]["hold"])
     for hold, group in groupby(refused, key=lambda item: item[1]["hold"]):
-        misfits = [f"{name} ({why['reason']})" for name, why in group]
-        more = f" and {len(misfits) - 1} more" if len(misfits) > 1 else ""
-        yield f"hold {hold} does not fit {misfits[0]}{more}: zoh there"
+        found = list(group)
+        kept = ", ".join(name.partition(" -> ")[2] for name, _ in found)
+        reasons = dict.fromkeys(why["reason"].partition(":")[0] for _, why in found)
+        yield f"zoh instead of the default hold {hold} for {kept}: {'; '.join(reasons)}"
 
 
 def _late_passivity(run: Mapping[str, Any]) -> Iterator[str]:

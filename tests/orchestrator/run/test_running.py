@@ -86,7 +86,7 @@ def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:
         "one: 7 steps were discarded and repeated with smaller ones",
         "2 of 5 iterated steps did not converge",
         "a.y -> b.u: 2 of 9 samples were lost, 1 overtaken",
-        "hold passive does not fit a.y -> b.u (no power) and 1 more: zoh there",
+        "zoh instead of the default hold passive for b.u, b.u: no power",
     ]
 
 
