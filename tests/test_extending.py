@@ -34,7 +34,11 @@ def ended(folder: Path) -> dict[str, Ended]:
 
 @pytest.fixture
 def run(folder: Path, ended: dict[str, Ended]) -> Run:
-    return lambda name: tables.load(folder / "runs" / name)
+    def loaded(name: str) -> Results:
+        (found,) = (folder / "runs").glob(f"{name}*")  # options, if any, are part of the name
+        return tables.load(found)
+
+    return loaded
 
 
 def test_every_command_ends_well(ended: dict[str, Ended]) -> None:

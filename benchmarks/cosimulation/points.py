@@ -9,10 +9,10 @@ from itertools import product
 from benchmarks.continuous import CONTINUOUS, DETECTED, GRID
 from hapticlink.components.integrators import METHODS
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.study import cases
+from hapticlink.orchestrator.study import design
 
 LOOP, CONTACT = "closed-loop", "obstacles"
-STUDY = cases.REFERENCE
+STUDY = design.REFERENCE
 """The rate (Hz) of the runs that the study of mismatched rates takes as continuous."""
 NONE = "none"
 """In the place of a graphics rate and its hold: the mechanism's own matrices, nothing is held."""

@@ -29,7 +29,7 @@ SCENES: list[tuple[str, Mapping[str, Any]]] = [
     ("local-model", {}),
     ("two-hands", {"mechanism.directions": True}),
     ("two-users", {"mechanism.directions": True}),
-    ("two-hands", {"fmu": [WALL]}),
+    ("two-hands", {"fmu": [WALL], "connection": [{"from": "hand.F", "to": "wall.v"}]}),
     ("two-hands", {"linkage.joint.0.ports": ("effort", "position", "velocity")}),
 ]
 """Scenes that have every port among them; n = 4 joint coordinates and one loop, m = 2, in each."""

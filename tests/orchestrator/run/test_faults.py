@@ -407,13 +407,13 @@ FILLS = """
 @pytest.mark.skipif(shutil.which("unshare") is None, reason="no disk of one's own")
 @pytest.mark.parametrize("step", [50, 320])
 def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path: Path, step: int) -> None:
-    """A disk of 256 kB that fills up before any row is written, and with the last."""
+    """A disk of 768 kB that fills up before any row is written, and with the last."""
     disk = tmp_path / "disk"
     disk.mkdir()
     body = "self.y = 1 / 3 + time" + FILLS.format(step=step, filler=str(disk / "filler"))
     python_fmu(tmp_path, "Fine", body)
     path = scene(tmp_path, ONE.format("Fine.fmu"), duration=5)
-    mount, told = f"mount -t tmpfs -o size=256k tmpfs {disk}", "No space left on device"
+    mount, told = f"mount -t tmpfs -o size=768k tmpfs {disk}", "No space left on device"
     if subprocess.run(["unshare", "-rm", "sh", "-c", mount], check=False).returncode:
         pytest.skip("no disk of one's own")
     out = disk / "out"

@@ -228,7 +228,7 @@ def test_a_hold_that_a_connection_asks_for_is_told_there(tmp_path: Path) -> None
         assert f"line 14: connection[0].hold: {hold!r} does not fit b.y -> a.u: " in said
         assert said.count("b.y -> a.u") == 1
         assert f"write a {table}" in said
-        assert "docs/holds.md" in said
+        assert "docs/passivity.md" in said
 
 
 def test_a_default_hold_that_fits_nowhere_is_told_once_with_a_scene_where_it_does(
@@ -263,12 +263,12 @@ def test_native_where_no_block_is_ours() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "place"), [([], (8, None)), (["hold=foh"], (None, "--set hold=foh"))]
+    ("options", "place"), [([], (11, None)), (["hold=foh"], (None, "--set hold=foh"))]
 )
 def test_a_changed_copy_still_knows_where_it_was_written(
     tmp_path: Path, options: list[str], place: tuple[int | None, str | None]
 ) -> None:
-    """`closed-loop` sets no spring, so that `pspm` fits nowhere; its `hold` is on line 8."""
+    """`closed-loop` sets no spring, so that `pspm` fits nowhere; its `hold` is on line 11."""
     changed = replace(open_scene.load("closed-loop", options), hold="pspm")
     with pytest.raises(SceneFault) as refused:
         simulate(changed, tmp_path)
