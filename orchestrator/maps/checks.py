@@ -84,8 +84,9 @@ def long_enough(growth: float) -> float:
 
 def growth_of_run(scene: Scene, seconds: float) -> float:
     """The growth rate (1/s) of the mechanism's velocities between the second and the last quarter
-    of a run of `seconds`; that of a run that diverges is infinite, that of one at rest minus
-    infinite."""
+    of a run of `seconds`, or between the first and the last if that is larger, since growth may
+    have ended in a limit cycle before; that of a run that diverges is infinite, that of one at rest
+    minus infinite."""
     with temporary_folders.room() as room:
         experiment = simulate(open_scene.load(scene, [f"duration={seconds:.6g}"]), room)
         if experiment.outcome.reason not in ("duration", "stop_when"):
@@ -97,7 +98,11 @@ def growth_of_run(scene: Scene, seconds: float) -> float:
         speed = np.abs(table[signal]).max(axis=1)
         if not speed.any():
             raise InputFault("a run from rest shows no growth: give the scene a start off its rest")
-        _, early, _, late = np.array_split(speed, 4)
+        first, early, _, late = np.array_split(speed, 4)
         if late.max() <= GONE * speed.max():
             return -np.inf
-        return float(np.log(late.max() / early.max()) / (seconds / 2))
+        rates = (
+            np.log(late.max() / since.max()) / (part * seconds)
+            for since, part in ((early, 0.5), (first, 0.75))
+        )
+        return float(max(rates))

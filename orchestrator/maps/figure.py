@@ -80,7 +80,8 @@ def _finding(made: Map) -> str:
         if others and always:
             between = [value for value in others if always[0] < value < always[-1]]
             if not between:
-                said += f", all with {axis(key)} from {always[0]:g} to {always[-1]:g}"
+                last = f" to {always[-1]:g}" if len(always) > 1 else ""
+                said += f", all with {axis(key)} {always[0]:g}{last}"
                 break
     checks = [row for row in made.of("check") if "agree" in row]
     if checks:

@@ -236,7 +236,9 @@ COMMANDS.register("greet", greet)
         folder, "hapticlink run sampled-spring --set hold=mine", "hapticlink greet", path=site
     )
     assert (run.status, run.said and greeted.status, greeted.said) == (0, 3, "good day\n")
-    told = json.loads((folder / "runs" / "sampled-spring,hold=mine" / "run.json").read_text())["plugins"]
+    told = json.loads((folder / "runs" / "sampled-spring,hold=mine" / "run.json").read_text())[
+        "plugins"
+    ]
     assert told["my_parts.holds"]["version"] == "1.2"
     (site / "my_parts" / "holds.py").write_text("1 / 0")
     (ended,) = hapticlink(folder, "hapticlink run sampled-spring", path=site)
