@@ -11,6 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.cosimulation.front import Measured, front
 from benchmarks.cosimulation.measure import APART
@@ -63,6 +64,10 @@ def _panel(ax: Axes, scene: str, points: Sequence[Measured]) -> None:
     ax.axhline(APART, color="0.6", lw=0.8, ls=":")
     ax.set_xscale("log")
     ax.set_yscale("log")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
     ax.set_title(scene, fontsize=10)
     ax.set_xlabel("run time per simulated second, ms, with quartiles (x: unstable)")
     ax.grid(alpha=0.3, which="major")
