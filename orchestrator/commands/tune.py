@@ -26,11 +26,16 @@ def tune(
     hertz: Hertz = 2.0,
     neighbours: Neighbours = True,
 ) -> int:
-    """Find gains with which contact and joint constraint feel equally stiff, as stiff as a margin
-    of stability allows for the scene's rates and holds.
+    """Find gains up to a margin of stability for the scene's rates and holds, at its start pose and
+    at a contact, if there is one; both shall feel equally stiff.
 
     Prints gains, felt stiffnesses and margins. Writes tune.json, tune.png and tuned.toml, a scene
-    that extends SCENE with the gains, to OUT (default tuned/<scene>).
+    that extends SCENE with the gains, to OUT (default tuned/SCENE). What has been confirmed by
+    runs, and what has not: results/tune/README.md.
+
+    For example:
+
+        hapticlink tune closed-loop --set sensing=encoders --set graphics.rate=32
     """
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.figure_axes import save

@@ -17,6 +17,7 @@ from cyclopts import Parameter, validators
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.say import say
+from hapticlink.orchestrator.commands import completion
 from hapticlink.orchestrator.commands.options import Out, Set, Swap, default_folder, options
 from hapticlink.orchestrator.view.link import Link
 
@@ -48,7 +49,10 @@ WAIT = 0.1
 def view(
     scene: Annotated[
         str,
-        Parameter(help="Name of a shipped scene, path of a scene file or SSP, or folder of a run."),
+        Parameter(
+            help="Name of a shipped scene, path of a scene file or SSP, or folder of a run.",
+            completer=completion.scenes,
+        ),
     ],
     second: Second = None,
     /,
