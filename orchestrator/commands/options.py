@@ -76,12 +76,12 @@ def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:
     """The default output folder for a scene's name or path: `<root>/<scene>`, and with options
     `<root>/<scene>,key=value,...`, so that a run does not replace one of other options.
 
-    Spaces, quotes and brackets are left out; where options hold other characters that are not for
+    Quotes, brackets and spaces behind commas are left out; where options hold other characters that are not for
     file names, or many, the name ends with the start of their sha256.
     """
     known = scene.endswith((".toml", ".ssp"))
     name = Path(scene).stem if known else Path(scene).name
-    given = re.sub(r"[\s'\"\[\]]", "", ",".join(options))
+    given = re.sub(r"['\"\[\]]|(?<=,) +", "", ",".join(options))
     if given:
         plain = re.sub(r"[^\w.=,+-]", "_", given)[:LONGEST]
         mark = "" if plain == given else f"-{hashlib.sha256(given.encode()).hexdigest()[:8]}"

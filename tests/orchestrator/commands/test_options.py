@@ -28,6 +28,8 @@ def test_options_of_other_characters_have_folders_of_their_own() -> None:
     one, other = (options.default_folder("runs", "bar", [f"title={c}"]) for c in "/\\")
     assert one != other
     assert one.parent == Path("runs")
+    apart, joined = (options.default_folder("runs", "bar", [f"title={t}"]) for t in ("a b", "ab"))
+    assert apart != joined
     long = options.default_folder("runs", "bar", ["title=" + "x" * 1000])
     assert len(long.name) < 200
 
