@@ -76,8 +76,8 @@ def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:
     """The default output folder for a scene's name or path: `<root>/<scene>`, and with options
     `<root>/<scene>,key=value,...`, so that a run does not replace one of other options.
 
-    Quotes, brackets and spaces behind commas are left out; where options hold other characters that are not for
-    file names, or many, the name ends with the start of their sha256.
+    Quotes, brackets and spaces behind commas are left out; where options hold other characters that
+    are not for file names, or many, the name ends with the start of their sha256.
     """
     known = scene.endswith((".toml", ".ssp"))
     name = Path(scene).stem if known else Path(scene).name
