@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -66,6 +66,7 @@ def run(
         hapticlink run my-scene.toml --no-figures --json > result.json
     """
     from hapticlink.orchestrator import api
+    from hapticlink.orchestrator.results import summary
 
     given = options(set, swap)
     if explain:
@@ -80,19 +81,23 @@ def run(
         made = ended.run
     if made.fault:
         say(f"hapticlink: {made.fault}", file=sys.stderr)
+    warned = made.run.get("warnings")
+    if warned is None:  # no row is in the folder, or too many to be read back
+        warned = list(summary.lines(made))
     if quiet or json:
-        for line in made.run["warnings"]:
+        for line in warned:
             say(f"hapticlink: {line}", file=sys.stderr)
-    tell(_lines(made, default_folder("runs", scene).name, folder), made.run, quiet, json)
+    name = default_folder("runs", scene).name
+    tell(_lines(made, warned, name, folder), made.run, quiet, json)
     return Fault.exit_status if made.fault else 0
 
 
-def _lines(made: Run, name: str, folder: Path) -> Iterator[str]:
+def _lines(made: Run, warned: Sequence[str], name: str, folder: Path) -> Iterator[str]:
     from hapticlink.orchestrator.results import summary
     from hapticlink.orchestrator.results.tables import TABLES
 
     yield f"{name}: {summary.ending(made)}"
-    for line in (*summary.numbers(made), *summary.lines(made)):
+    for line in (*summary.numbers(made), *warned):
         yield f"  {line}"
     wall_time = made.run["timings"]["run"]
     if wall_time:  # none where a signal came before the first event

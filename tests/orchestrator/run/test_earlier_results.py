@@ -92,6 +92,19 @@ def test_results_of_a_run_without_rows_are_not_those_of_another(tmp_path: Path) 
     assert tables.load(tmp_path / "out").run["end"]["reason"] == "duration"
 
 
+def test_json_of_a_run_without_rows_tells_its_fault(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its folder keeps those of the earlier run, and with them an earlier run.json."""
+    c_fmu(tmp_path)
+    path, out = scene(tmp_path, ONE), tmp_path / "out"
+    assert status("run", path, "--out", out, "--quiet") == 0
+    nan_at_the_start(tmp_path)
+    assert status("run", path, "--out", out, "--json") == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["fault"]["message"] == "one: output y is nan at t = 0 s"
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 def test_a_disk_without_room_for_a_row_keeps_the_earlier_ones(tmp_path: Path) -> None:
     """No file may grow beyond 16 kB: the FMU is unpacked, the first row is written, and run.json,
