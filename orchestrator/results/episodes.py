@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.components.specs.device import Device
-from hapticlink.orchestrator.results.force_figure import torques
+from hapticlink.orchestrator.results.force_figure import torques, touching
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.orchestrator.results.tracking import BRANCH, constrained, of_block
 from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.results.whole_run import scene_part
 
-MARGIN, CONTACT = "haptic_device.workspace_margin", "virtual_mechanism.F_env"
+MARGIN = "haptic_device.workspace_margin"
 FELT = 1e-3
 """Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
 KINDS = {
@@ -74,7 +74,7 @@ def _states(results: Results) -> Iterator[tuple[str, Vector, NDArray[np.bool_], 
         for value in values[values != usual]:
             said = f"{value:.0f} constrained directions, not {usual:.0f}"
             yield "constraints", table["time"], table[name] == value, said
-    if contact := of_block(results, CONTACT, 3):
-        yield "contacts", contact["time"], (contact[CONTACT] != 0).any(axis=1), ""
+    if contact := touching(results):
+        yield "contacts", *contact, ""
     if margin := of_block(results, MARGIN):
         yield "outside", margin["time"], margin[MARGIN] < 0, ""

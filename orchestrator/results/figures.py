@@ -12,6 +12,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
@@ -21,7 +22,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.results import figure_axes, mechanism_drawing
 from hapticlink.orchestrator.results.episodes import KINDS, episodes
 from hapticlink.orchestrator.results.figure_axes import framed, last_time, plain, short, titled
-from hapticlink.orchestrator.results.force_figure import forces
+from hapticlink.orchestrator.results.force_figure import ENVIRONMENT, WRENCHES, forces, touching
 from hapticlink.orchestrator.results.real_time_figure import real_time
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
@@ -44,10 +45,10 @@ SOURCES = {
     "shaping": "shaping of the device's inertia",
     "drift": "virtual coupling, F_drift",
     "topology": "topology controller, F_T",
-    "environment": "contacts, F_env",
+    "environment": WRENCHES[ENVIRONMENT],
 }
 """The blocks of `port_blocks.py` as a reader knows them."""
-CONTACT, COORDINATES = "virtual_mechanism.F_env", "virtual_mechanism.q"
+COORDINATES = "virtual_mechanism.q"
 
 
 def figures(results: Results) -> dict[str, Figure]:
@@ -69,8 +70,8 @@ def figures(results: Results) -> dict[str, Figure]:
             drawn["distance"] = _distance(results)
     if found := forces(results, scene_part(results, "device", Device)):
         drawn["forces"] = found
-    if contact := of_block(results, CONTACT, 3):
-        drawn["contact"] = _contact(results, contact)
+    if contact := touching(results):
+        drawn["contact"] = _contact(results, *contact)
     if counted := constrained(results):
         drawn["constraints"] = _constraints(results, *counted)
     if port := user_port(results):
@@ -177,13 +178,17 @@ def _distance(results: Results) -> Figure:
     return figure
 
 
-def _contact(results: Results, table: Table) -> Figure:
-    force = np.linalg.norm(table[CONTACT][:, :2], axis=1)
-    share = 100 * float((force > 0).mean())
-    pushed = f"at most {short(force.max())} N, in {short(share)} % of the samples"
-    title = f"Contacts push with {pushed}" if share else "Nothing is touched"
-    figure, axes = titled(results, title, "time (s)", "|F_env| of the contacts (N)")
-    axes.plot(table["time"], force)
+def _contact(results: Results, time: Vector, pushing: NDArray[np.bool_]) -> Figure:
+    table = of_block(results, ENVIRONMENT, 3)
+    assert table is not None  # it tells when contacts push
+    force = np.linalg.norm(table[ENVIRONMENT][:, :2], axis=1)
+    share = 100 * float(pushing.mean())
+    most = short(force[pushing].max(initial=0.0))
+    title = f"Contacts push in {short(share)} % of the samples, with |F_env| of at most {most} N"
+    figure, axes = titled(
+        results, title if share else "Nothing is touched", "time (s)", "|F_env| (N)"
+    )
+    axes.plot(time, force)
     return figure
 
 

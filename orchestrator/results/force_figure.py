@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.figure_axes import legend_above_curves, short, titled
@@ -18,9 +19,10 @@ WRENCHES = {
     "hand.F": "hand, F_hand",
     "controller.F_drift": "virtual coupling, F_drift",
     "controller.F_constraint": "topology controller, F_T",
-    "virtual_mechanism.F_env": "contacts, F_env",
+    "virtual_mechanism.F_env": "contacts and other hands, F_env",
 }
 """By signal, what it is called; each is (N, N, N.m)."""
+ENVIRONMENT, GAP = "virtual_mechanism.F_env", "virtual_mechanism.contact_gap"
 MOTOR, HANDLE = "controller.F_motor", "haptic_device.x"
 
 
@@ -32,6 +34,15 @@ def wrenches(results: Results) -> dict[str, tuple[Vector, Vector, Vector]]:
             F = table[signal]
             found[name] = table["time"], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
     return found
+
+
+def touching(results: Results) -> tuple[Vector, NDArray[np.bool_]] | None:
+    """Times (s), and whether contacts push then; None without contacts. F_env alone does not tell:
+    it has other hands and efforts on joints, too."""
+    force, gap = of_block(results, ENVIRONMENT, 3), of_block(results, GAP)
+    if not (force and gap):
+        return None
+    return force["time"], (force[ENVIRONMENT] != 0).any(axis=1) & (gap[GAP] < 0)
 
 
 def torques(results: Results, device: Device | None) -> tuple[Vector, Vector] | None:

@@ -54,3 +54,10 @@ def test_contacts_and_the_number_of_constrained_directions() -> None:
     at = np.searchsorted(r.time("virtual_environment.n_constraints"), first.begin)
     assert count[at] != np.bincount(count.astype(int)).argmax()
     assert str(int(count[at])) in first.said
+
+
+def test_the_force_of_another_hand_is_no_contact() -> None:
+    r = hl.run("two-users", {"duration": 0.2})
+    assert (r["virtual_mechanism.F_env"] != 0).any()
+    assert of("contacts", episodes(r)) == []
+    assert "contact" not in r.figures()
