@@ -45,6 +45,8 @@ NOT_RUN = {
         "takes minutes; tests/orchestrator/test_tune.py",
     "hapticlink tune enclosure --set sensing=encoders --margin 2 --hertz 2 --out tuned/enclosure":
         "takes minutes; tests/orchestrator/test_tune.py",
+    "hapticlink --install-completion":
+        "writes to the files of the user's shell; tests/orchestrator/commands/test_options.py",
     "hapticlink study": "thousands of runs; tests/orchestrator/study/test_study.py",
     "hapticlink reproduce": "its runs: tests/reference/test_closed_loop.py",
     "hapticlink bench mechanism": "needs other codes",

@@ -1,6 +1,9 @@
 """Default folders, --json, --quiet, completion, `new` and `doctor`, from outside."""
 
 import json
+import os
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -91,6 +94,25 @@ def test_completion_knows_scenes_and_keys(
     assert len(set(keys)) == len(keys)
     assert status("__complete", "run", "closed-loop", "--set", "haptics.") == 0
     assert "haptics.rate=" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+def test_bash_completes_the_name_of_a_scene(tmp_path: Path) -> None:
+    """The script as it is installed, called as bash calls it where TAB is pressed."""
+    called = [sys.executable, "-m", "hapticlink.orchestrator", "--install-completion"]
+    (tmp_path / "hapticlink").write_text(f'#!/bin/sh\nexec {shlex.join(called[:3])} "$@"\n')
+    (tmp_path / "hapticlink").chmod(0o755)
+    path = f"{tmp_path}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "HOME": str(tmp_path), "PATH": path}
+    subprocess.run([*called, "--shell", "bash"], env=environment, check=True, capture_output=True)
+    pressed = """. ~/.bashrc
+    COMP_WORDS=(hapticlink run clo) COMP_CWORD=2 COMP_LINE="hapticlink run clo" COMP_POINT=18
+    _hapticlink; echo "${COMPREPLY[@]}" """
+    told = subprocess.run(
+        ["bash", "--norc", "-c", pressed],
+        env=environment, check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert "closed-loop" in told.stdout.split()
 
 
 def test_the_doctor_builds_and_runs(capsys: pytest.CaptureFixture[str]) -> None:
