@@ -109,7 +109,7 @@ def page(ours: Report, empty: Report, seconds: int, load: float, command: str) -
         "",
         "![Share of ticks whose step time and lateness exceed a time](real_time.png)",
         "",
-        f"Made by `{command}`, on {platform.system()} {platform.release()} with {os.cpu_count()} "
+        f"Made by `{command}`, on {platform.system()} with {os.cpu_count()} "
         f"cores and a load average of {load:.1f} before. Milliseconds; the deadline of a tick is "
         f"the next one, {short(1e3 * ours['period'])} ms after it was due. Rows are recorded, the "
         f"graphics side runs in a thread: {samples['late']} of its {samples['taken']} samples were "

@@ -135,7 +135,7 @@ def page(session: Measured, found: dict[str, Any], seconds: int, load: float, co
         f"{ticks} deadlines; a pull of the mouse is felt after {short(felt)} ms, and a step is on "
         f"the screen after {short(shown)} ms (medians).",
         "",
-        f"Made by `{command}`, on {platform.system()} {platform.release()} with {os.cpu_count()} "
+        f"Made by `{command}`, on {platform.system()} with {os.cpu_count()} "
         f"cores, shared with a headless Chromium that draws in software, and a load average of "
         f"{load:.1f} before. Latencies in milliseconds: mouse to force, from the mouse event to "
         f"the step of the hand that takes the pull ({taken} of {len(found['sent'])} pulls: newer "
