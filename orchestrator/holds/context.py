@@ -6,13 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+from hapticlink.orchestrator.base.arrays import Vector
 
 if TYPE_CHECKING:
     from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,11 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, total
 from hapticlink.orchestrator.holds.hold import Hold
-
-Vector = NDArray[np.float64]
 
 
 def repayment(excess: Vector, motion: Vector, largest: Vector) -> Vector:

@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.restorable import Restorable
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

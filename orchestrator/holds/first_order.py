@@ -6,25 +6,15 @@ until the second sample.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.history import History
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.history import OfSamples
+from hapticlink.orchestrator.holds.hold import Vector
 
 
-class FirstOrder(Hold):
+class FirstOrder(OfSamples):
     degree = 1
     order = 2
     interpolates = True
 
-    def __init__(self, context: HoldContext) -> None:
-        self._samples = History(2)
-
-    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
-        self._samples.push(stamp, sample)
-
-    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
         stamp, newest = self._samples[-1]
         return newest + self._samples.slope() * (tick - stamp + ahead)

@@ -8,28 +8,17 @@ hold. With one sample it is the first-order hold from the derivative.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.history import History
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.history import OfSamples
+from hapticlink.orchestrator.holds.hold import Vector
 
 
-class Hermite(Hold):
+class Hermite(OfSamples):
     needs = "derivative"
     degree = 3
     order = 4
     interpolates = True
 
-    def __init__(self, context: HoldContext) -> None:
-        self._size, self._seconds = context.size, context.seconds
-        self._samples = History(2)
-
-    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
-        self._samples.push(stamp, sample)
-
-    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
         n = self._size
         stamp, newest = self._samples[-1]
         if len(self._samples) < 2:

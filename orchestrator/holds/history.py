@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.hold import Hold, Vector
 
 
 class History:
@@ -34,3 +35,16 @@ class History:
             return np.zeros_like(self[index][1])
         (before, first), (stamp, sample) = self[index - 1], self[index]
         return (sample - first) / (stamp - before)
+
+
+class OfSamples(Hold):
+    """Base of holds whose value follows from the newest `depth` samples alone."""
+
+    depth: ClassVar[int] = 2
+
+    def __init__(self, context: HoldContext) -> None:
+        self._size, self._seconds = context.size, context.seconds
+        self._samples = History(self.depth)
+
+    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
+        self._samples.push(stamp, sample)

@@ -5,14 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.restorable import Restorable
-
-Vector = NDArray[np.float64]
-
 
 Needs = Literal["derivative", "integral", "power", "spring"]
 

@@ -6,23 +6,13 @@ constant over the period, and no delay at low frequency. Zero-order until the se
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.history import History
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.history import OfSamples
+from hapticlink.orchestrator.holds.hold import Vector
 
 
-class Lead(Hold):
+class Lead(OfSamples):
     order = 2
 
-    def __init__(self, context: HoldContext) -> None:
-        self._samples = History(2)
-
-    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
-        self._samples.push(stamp, sample)
-
-    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
         newest = self._samples[-1][1]
         return newest + (newest - self._samples[0][1]) / 2

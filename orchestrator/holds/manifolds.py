@@ -20,12 +20,10 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.symmetric import eigen
-
-Vector = NDArray[np.float64]
 
 
 class Projector(Hold):

@@ -10,12 +10,10 @@ period of the hold itself; order 1. Without a new sample the value does not chan
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.hold import Hold
-
-Vector = NDArray[np.float64]
 
 
 class Mean(Hold):

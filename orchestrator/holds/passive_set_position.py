@@ -58,13 +58,9 @@ near end is read on.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.hold import Hold
-
-Vector = NDArray[np.float64]
 
 
 class PassiveSetPosition(Hold):

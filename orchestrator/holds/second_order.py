@@ -8,26 +8,17 @@ omega H = 2.61. With two samples it is the first-order hold, with one the zero-o
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.history import History
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.history import OfSamples
+from hapticlink.orchestrator.holds.hold import Vector
 
 
-class SecondOrder(Hold):
+class SecondOrder(OfSamples):
+    depth = 3
     degree = 2
     order = 3
     interpolates = True
 
-    def __init__(self, context: HoldContext) -> None:
-        self._samples = History(3)
-
-    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
-        self._samples.push(stamp, sample)
-
-    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
         samples = self._samples
         stamp, newest = samples[-1]
         s, slope = tick - stamp + ahead, samples.slope()

@@ -9,24 +9,15 @@ pose as an output as well: a sample is the velocity followed by the pose (its un
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.history import History
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.history import OfSamples
+from hapticlink.orchestrator.holds.hold import Vector
 
 
-class Slope(Hold):
+class Slope(OfSamples):
     needs = "integral"
 
-    def __init__(self, context: HoldContext) -> None:
-        self._size, self._seconds = context.size, context.seconds
-        self._samples = History(2)
-
-    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
-        self._samples.push(stamp, sample)
-
-    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
         if len(self._samples) < 2:
             return np.zeros(self._size)
         (before, first), (stamp, newest) = self._samples[0], self._samples[1]

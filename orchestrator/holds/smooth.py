@@ -12,13 +12,11 @@ Order 1. The first sample is held until the second arrives.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.history import History
 from hapticlink.orchestrator.holds.hold import Hold
-
-Vector = NDArray[np.float64]
 
 
 class Smooth(Hold):

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability import wall_limits
 
-Matrix = NDArray[np.float64]
 START = "fmu.{}.start.{}"
 
 

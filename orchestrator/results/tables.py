@@ -13,13 +13,12 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.results import rows
 
-Vector = NDArray[np.float64]
 TABLES = (".csv", rows.SUFFIX)
 """Endings of the names of tables."""
 

@@ -7,12 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
-
-Vector = NDArray[np.float64]
 
 
 class SignalVector:

@@ -9,10 +9,9 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
+
 Residual = Callable[[Vector], Vector]
 
 

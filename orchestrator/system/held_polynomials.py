@@ -12,14 +12,12 @@ from functools import cache
 from math import factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.capabilities import takes_input_derivatives
 from hapticlink.orchestrator.fmi.kinds import MATRICES
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.system.system import Connection, System
-
-Vector = NDArray[np.float64]
 
 
 def degree(system: System, connection: Connection) -> int:

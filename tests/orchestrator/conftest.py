@@ -8,7 +8,6 @@ from pathlib import Path
 
 import casadi as ca
 import pytest
-from pythonfmu.builder import FmuBuilder
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
@@ -89,35 +88,6 @@ def stamped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Timeline, str
             for n, d in described.items()
         )
         return System(units, connected(units, ROWS, timeline)[0], timeline, coupling)
-
-    return make
-
-
-SLAVE = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class {name}(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.y = 0.0
-        self.register_variable(Real("y", causality=Fmi2Causality.output))
-
-    def do_step(self, time, size):
-        time += size
-        self.y = time
-        {body}
-        return True
-"""
-
-
-@pytest.fixture
-def slave(tmp_path: Path) -> Callable[..., Fmu]:
-    """(name, body of do_step) -> a Python FMU at the haptic rate, not one of ours."""
-
-    def make(name: str, body: str = "pass") -> Fmu:
-        script = tmp_path / f"{name}.py"
-        script.write_text(SLAVE.format(name=name, body=body))
-        return Fmu(name, describe(FmuBuilder.build_FMU(script, dest=tmp_path)), "haptics")
 
     return make
 

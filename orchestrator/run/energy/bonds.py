@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.ports import paired
 from hapticlink.orchestrator.system.system import Connection, System
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

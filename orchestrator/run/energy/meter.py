@@ -22,7 +22,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from hapticlink.orchestrator.base.arrays import Vector
+
 Read = Callable[[], Vector]
 Rows = TypeVar("Rows", NDArray[np.float64], NDArray[np.int64])
 ROWS = 1024

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.scene import find
 
 
 def test_build_gives_the_file_of_each_block(bar: Path, tmp_path: Path) -> None:
@@ -43,8 +42,3 @@ def test_an_exported_scene_explains_itself_as_the_scene_does(bar: Path, tmp_path
 def test_an_ssp_takes_no_place_of_a_folder(bar: Path, tmp_path: Path) -> None:
     with pytest.raises(hl.InputFault, match=r"is a folder; name a file in it, .*scene\.ssp"):
         hl.export(bar, out=tmp_path)
-
-
-def test_the_shipped_scenes_have_titles() -> None:
-    assert hl.shipped()["closed-loop"] == hl.scene("closed-loop").title
-    assert list(hl.shipped()) == list(find.shipped())

@@ -56,14 +56,6 @@ def test_aligned_frames_end_on_the_first_tick_at_or_after(
     assert frames[-1] > end
 
 
-@pytest.mark.parametrize("rate", [60, 30, 24, 10])
-def test_frames_of_512_hz_and_a_graphics_rate(rate: int) -> None:
-    frames = aligned(Fraction(1, rate), Fraction(1, 512), 1536)
-    assert (
-        frames[:60] == tuple(math.ceil(Fraction(512 * i, rate)) for i in range(60))[: len(frames)]
-    )
-
-
 @given(st.integers(0, 2**32), st.integers(1, 2000))
 def test_variable_periods_stay_in_their_bounds_and_follow_the_seed(seed: int, end: int) -> None:
     base = Fraction(1, 512)

@@ -1,7 +1,6 @@
 """The commands from outside: files, messages and exit statuses."""
 
 import io
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -31,11 +30,6 @@ def test_a_mechanism_alone_runs_at_the_haptic_rate(
     assert found.run["fault"] is None
     assert imread(tmp_path / "out" / "trajectories.png").min() < 0.5  # ink on it
     assert "done at 0.25 s" in capsys.readouterr().out
-
-
-def test_build_writes_one_fmu_a_block(bar: Path, tmp_path: Path) -> None:
-    assert status("build", str(bar), "--out", str(tmp_path / "fmus")) == 0
-    assert [p.name for p in (tmp_path / "fmus").iterdir()] == ["virtual_mechanism.fmu"]
 
 
 def test_a_process_that_has_run_an_fmu_builds_whole_ones(bar: Path, tmp_path: Path) -> None:
@@ -93,20 +87,6 @@ def test_bad_input_is_status_2(
 ) -> None:
     assert status(*arguments) == 2
     assert message in " ".join("".join(capsys.readouterr()).split())
-
-
-def test_a_run_that_fails_is_status_1_and_keeps_results(
-    bar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    # A start at 1e308 m: the pose is finite, and overflows after some steps.
-    velocity = "linkage.start_velocity.slide=1e308"
-    start = "linkage.start.slide=1.7e308"
-    out = tmp_path / "out"
-    assert status("run", str(bar), "--out", str(out), "--set", velocity, "--set", start) == 1
-    assert "virtual_mechanism:" in capsys.readouterr().err
-    run = json.loads((out / "run.json").read_text())
-    assert run["fault"]["kind"] == "FmuFault"
-    assert (out / "haptics.csv").is_file()
 
 
 EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.archive", "scipy")

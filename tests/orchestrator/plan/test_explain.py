@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hapticlink.orchestrator.base.faults import Fault
-from hapticlink.orchestrator.base.ticks import aligned, periodic
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
@@ -70,14 +68,6 @@ def test_what_does_not_come_round_is_told_to_its_end(
     haptics = tables.load(tmp_path).haptics["time"]
     assert float(ends[-1]) == pytest.approx(haptics[-1], abs=1e-8)  # a last tick only reads
     assert len(set(ends)) >= len(haptics) - 1
-
-
-def test_first_frame_ends_at_the_phase() -> None:
-    base, period, first = Fraction(1, 1000), Fraction(1, 50), Fraction(7, 1000)
-    assert list(periodic(period, base, 60, first))[:4] == [0, 7, 27, 47]
-    assert aligned(Fraction(1, 30), base, 100, Fraction(1, 60))[:4] == (0, 17, 50, 84)
-    whole = Fraction(1, 30)
-    assert list(aligned(whole, base, 100)) == list(aligned(whole, base, 100, whole))
 
 
 @pytest.mark.parametrize("align", ["exact", "tick"])

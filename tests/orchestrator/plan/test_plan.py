@@ -5,11 +5,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Get, Push, Record, Set, Step
 from hapticlink.orchestrator.plan.plan import Plan
@@ -18,8 +16,7 @@ from hapticlink.orchestrator.plan.schemes import SCHEMES
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline as timeline_of
-from tests.orchestrator.systems import connected
-from tests.orchestrator.timelines import CAUSAL, fixed, scenes, single, varying
+from tests.orchestrator.timelines import CAUSAL, fixed, scenes, varying
 
 Make = Callable[[Timeline, str], System]
 shared = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
@@ -154,19 +151,3 @@ def test_gauss_seidel_delays_nothing_and_jacobi_the_sampled_by_one_period(stampe
         assert ages["device.stamp -> controller.d"].max == 0.0
         # 30 Hz: the oldest frame in use is one tick of 1/7680 s short of 1/30 s plus.
         assert ages["graphics.stamp -> controller.g"].max < 1 / 30
-
-
-def test_an_event_of_one_kind_shares_its_block(stamped: Make) -> None:
-    plan = Plan(stamped(fixed(Fraction(512), Fraction(30), 1536), "gauss-seidel"))
-    blocks = {id(plan.block(event)) for _, event in plan}
-    assert len(blocks) <= 8
-
-
-def test_a_ring_of_sampled_blocks_is_named(stamped: Make) -> None:
-    units = stamped(fixed(Fraction(512), Fraction(30), 4), "gauss-seidel").fmus[:3]
-    rows = [("controller.seen_d", "hand.d"), ("hand.seen_d", "controller.d")]
-    ring = System(units, connected(units, rows, single(512, 4))[0], single(512, 4), "gauss-seidel")
-    with pytest.raises(InputFault, match="ring: controller -> hand -> controller"):
-        list(delays(Plan(ring)))
-    as_jacobi = System(units, ring.connections, ring.timeline, "jacobi")
-    assert delays(Plan(as_jacobi))["hand.seen_d -> controller.d"].max == 1 / 512

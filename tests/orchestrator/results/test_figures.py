@@ -5,11 +5,9 @@ from typing import Any
 
 import pytest
 
-from hapticlink.orchestrator import api
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import figure_axes, figures, summary, tables
+from hapticlink.orchestrator.results import figure_axes, figures, tables
 from hapticlink.orchestrator.sweep import title
-from tests.orchestrator.foreign_fmus import python_fmu_of, scene
 
 
 @pytest.mark.parametrize(
@@ -93,39 +91,3 @@ def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
     )
     assert title.axis("graphics.rate") == "graphics.rate (Hz)"
     assert title.axis("hold") == "hold"
-
-
-OTHERS = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class {name}(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.y = {value}
-        for name in {names}:
-            self.register_variable(Real(
-                name, causality=Fmi2Causality.output, getter=lambda: self.y))
-
-    def do_step(self, time, size):
-        return True
-"""
-NAMES = {
-    "virtual_mechanism": ["x", "q[1]", "q[2]", "n_constraints", "closure_error[1]", "F_env[1]"],
-    "virtual_environment": ["branch_ok[1]"],
-    "haptic_device": ["x_true[1]", "x_true[2]", "x[1]", "workspace_margin"],
-    "controller": ["F_motor[1]", "F_drift[1]", "F_drift[2]"],
-    "hand": ["F"],
-}
-
-
-def test_fmus_of_others_may_have_the_names_of_blocks(tmp_path: Path) -> None:
-    """Nothing is drawn or said of them, whatever their ports are called."""
-    table = ""
-    for name, names in NAMES.items():
-        text = OTHERS.format(name=name, names=names, value=-1.0 if "device" in name else 1e9)
-        python_fmu_of(tmp_path, text, f"{name}_{tmp_path.name}")
-        table += f'[[fmu]]\nname = "{name}"\npath = "{name}.fmu"\n'
-    made = api.run(scene(tmp_path, table), out=tmp_path / "out")
-    assert made.fault is None
-    assert set(made.run["files"]) == {"run.json", "haptics.csv", "plan.txt"}
-    assert [*summary.numbers(made), *summary.lines(made)] == []

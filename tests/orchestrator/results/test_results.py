@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
-from hapticlink.orchestrator.results.tables import load, read_table
+from hapticlink.orchestrator.results.tables import read_table
 
 
 def recorder_of(path: Path, columns: list[str], view: Any) -> Recorder:
@@ -96,11 +95,6 @@ def test_nan_is_written_as_such(tmp_path: Path) -> None:
     with recorder_of(tmp_path / "n.csv", ["y"], np.array([math.nan])) as recorder:
         recorder.row(0.0)
     assert math.isnan(read_table(tmp_path / "n.csv")["y"][0])
-
-
-def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputFault, match="not the folder of a run"):
-        load(tmp_path)
 
 
 def test_the_end_of_a_run_is_written_over_what_is_there(tmp_path: Path) -> None:

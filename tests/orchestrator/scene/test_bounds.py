@@ -67,7 +67,10 @@ def test_values_that_no_scene_can_hold(option: str, message: str) -> None:
     assert len(said) < 1000
 
 
-@pytest.mark.parametrize("value", ["1e308", "'1e99999999'", "nan", "'1/0'", "1e400", "0"])
+@pytest.mark.parametrize(
+    "value",
+    ["1e308", "'1e99999999'", "'1e-99999999'", "'1e+09999'", "nan", "'1/0'", "1e400", "0"],
+)
 @pytest.mark.parametrize("key", ["haptics.rate", "graphics.rate", "duration", "graphics.phase"])
 def test_rates_and_times_out_of_any_range(key: str, value: str) -> None:
     assert f"--set {key}={value}: {key}: " in refused("closed-loop", f"{key}={value}")

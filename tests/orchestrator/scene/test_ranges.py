@@ -67,32 +67,6 @@ def test_what_once_ran_is_refused(
     assert f"--set {option}{expected}\n" in capsys.readouterr().err
 
 
-def test_a_number_out_of_range_is_told_with_its_line() -> None:
-    text = GOOD.replace("[device]\n", "[device]\nobserver.omega_n = -5\n")
-    with pytest.raises(SceneFault) as refused:
-        load.read(text)
-    (finding,) = refused.value.findings
-    assert str(finding) == (
-        "line 21: device.observer.omega_n: -5 is out of range: give a number > 0 (rad/s)"
-    )
-
-
-@pytest.mark.parametrize(
-    "rate", ["'1e99999999'", "'1e-99999999'", "'1/0'", f"'{'9' * 99}'", "1e99999999", "'1e+09999'"]
-)
-def test_numbers_that_take_too_long_to_write_out_are_refused(rate: str) -> None:
-    with pytest.raises(SceneFault, match=r"haptics\.rate: .* \(Hz\)"):
-        load.read(GOOD, [f"haptics.rate={rate}"])
-
-
-def test_a_whole_number_of_thousands_of_digits_is_refused() -> None:
-    long = "1" + "0" * 5000
-    with pytest.raises(SceneFault, match="should be a valid number"):
-        load.read(GOOD, [f"duration={long}"])
-    with pytest.raises(SceneFault, match="not TOML: Exceeds the limit"):
-        load.read(GOOD.replace("duration = 1.0", f"duration = {long}"))
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -176,14 +176,6 @@ def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
     assert scene.linkage == open_scene.load("closed-loop").linkage
 
 
-def test_scenes_that_extend_each_other_are_refused(tmp_path):
-    one, two = tmp_path / "one.toml", tmp_path / "two.toml"
-    one.write_text(f'extends = "{two}"\n')
-    two.write_text(f'extends = "{one}"\n')
-    with pytest.raises(InputFault, match="circle"):
-        open_scene.load(str(one))
-
-
 def test_too_short_a_vector_and_a_misspelt_key_are_both_told() -> None:
     text = GOOD.replace("  0.0,\n  0.0,\n", "  0.0,\n").replace("rate = 30", "rat = 30")
     found = findings(text)

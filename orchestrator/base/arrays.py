@@ -1,0 +1,7 @@
+"""Types of arrays of numbers, by what they are; NumPy's types tell no shape."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
