@@ -57,14 +57,13 @@ ALL = (
     *((i, s) for i in METHODS if i not in PROJECTED for s in ("none", "baumgarte", "projection")),
     *((i, "projection") for i in PROJECTED),
     ("rk4", "partitioning"),
-    ("rk4", "embedding"),
 )
 FEW = (("semi-implicit-euler", "baumgarte"), ("heun", "projection"), ("rk4", "projection"))
 
 
 def setting(integrator: str, closing: str) -> Mechanism:
-    """closing: a stabilisation of the multipliers, or a formulation that needs none."""
-    named = "formulation" if closing in ("partitioning", "embedding") else "stabilization"
+    """closing: a stabilisation of the multipliers, or the formulation that needs none."""
+    named = "formulation" if closing == "partitioning" else "stabilization"
     return Mechanism(integrator=integrator, **{named: closing})  # type: ignore[arg-type]
 
 

@@ -23,7 +23,6 @@ ROOMS = {
         "linkage",
         "forces",
         "dynamics",
-        "formulations",
         "contact",
         "control",
         "device",

@@ -35,6 +35,7 @@ from hapticlink.components.dynamics import (
     further_points,
     joint_ports,
     local_model,
+    partitioning,
     starting_friction,
 )
 from hapticlink.components.dynamics.articulated_body import TreeInertia
@@ -43,6 +44,7 @@ from hapticlink.components.dynamics.closed_loop_solver import Inertia
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
 from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.partitioning import Partitioning
 from hapticlink.components.dynamics.passive_midpoint import (
     Applied,
     PassiveStep,
@@ -60,10 +62,6 @@ from hapticlink.components.dynamics.variables import (
     states,
 )
 from hapticlink.components.forces import drives, friction, gravity
-from hapticlink.components.formulations import independent_coordinates
-from hapticlink.components.formulations.embedding import Embedding
-from hapticlink.components.formulations.independent_coordinates import Formulation
-from hapticlink.components.formulations.partitioning import Partitioning
 from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
@@ -98,7 +96,7 @@ def virtual_mechanism(
     ValueError for an unknown method, for a formulation that does not fit the other settings and for
     friction too stiff for step_s.
     """
-    independent_coordinates.require_fitting(mechanism, held=frame_s is not None)
+    partitioning.require_fitting(mechanism, held=frame_s is not None)
     require_fitting(mechanism, linkage, held=frame_s is not None)
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
@@ -331,21 +329,13 @@ def _step(
     if linkage.closed and mechanism.stabilization == "baumgarte":
         alpha, beta = block.p["alpha"], block.p["beta"]
         closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
-    independent: Formulation | None = None
-    if linkage.closed and mechanism.formulation == "embedding":
-        pushing = ca.Function("efforts", [x, u, p, t], [efforts, rates], {"cse": True})
-        start = independent_coordinates.start_pose(model, block.p)
-        independent = Embedding(model, block.p, start, pushing)
-    else:
-        qdd = space.solver.follow(efforts, closing, refined=integrator.extrapolates)
-        ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], {"cse": True})
-        if linkage.closed and mechanism.formulation == "partitioning":
-            start = independent_coordinates.start_pose(model, block.p)
-            independent = Partitioning(model, block.p, start, ode)
-    if independent:
+    qdd = space.solver.follow(efforts, closing, refined=integrator.extrapolates)
+    ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], {"cse": True})
+    if linkage.closed and mechanism.formulation == "partitioning":
+        independent = Partitioning(model, block.p, ode)
         if isinstance(integrator, LocatedEvents):
             integrator = integrator.completed(independent.complete)
-        return independent_coordinates.step(integrator, independent, x, given, p, t, block.h)
+        return independent.step(integrator, x, given, p, t, block.h)
     after = integrators.step(integrator, ode, x, given, p, t, block.h, range(n))
     return _projected(after, model, mechanism, space.terms.inertia, p)
 

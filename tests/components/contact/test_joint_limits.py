@@ -122,7 +122,7 @@ def kinetic(y):
     return 0.5 * y[4:] @ appendix_a.D(y[:4], M, L, J, F) @ y[4:]
 
 
-@pytest.mark.parametrize("formulation", ["multipliers", "partitioning", "embedding"])
+@pytest.mark.parametrize("formulation", ["multipliers", "partitioning"])
 @pytest.mark.parametrize("joint", ["elbow1", "cut"])
 def test_limits_in_a_loop_against_appendix_a(joint, formulation):
     """On a joint of the tree, and on the cut joint that closes the loop."""

@@ -142,7 +142,7 @@ def gradient(q, center):
     return np.array([height(q + 1e-30j * e, center).imag / 1e-30 for e in np.eye(4)])
 
 
-@pytest.mark.parametrize("formulation", ["multipliers", "partitioning", "embedding"])
+@pytest.mark.parametrize("formulation", ["multipliers", "partitioning"])
 def test_a_linkage_with_a_loop_that_is_thrown_on_a_disc(formulation):
     """Against the report's Appendix A by hand."""
     linkage = shaped()

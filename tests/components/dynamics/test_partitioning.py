@@ -1,18 +1,12 @@
-"""Loops by coordinate partitioning and by constraint embedding, against multipliers and SciPy."""
+"""Loops by coordinate partitioning, against multipliers and SciPy."""
 
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
-from hapticlink.components.component import Signals
-from hapticlink.components.dynamics.variables import parameters, start_parameters
-from hapticlink.components.formulations.dyad_search import find_dyads
-from hapticlink.components.formulations.independent_coordinates import start_pose
-from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import (
     Body,
     Joint,
@@ -25,8 +19,7 @@ from tests.blocks import Running
 from tests.components import appendix_a
 from tests.mechanisms import TABLE_6_1, WRENCH, five_bar
 
-FORMULATIONS = ("multipliers", "partitioning", "embedding")
-INDEPENDENT = FORMULATIONS[1:]
+FORMULATIONS = ("multipliers", "partitioning")
 M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
 
 
@@ -81,35 +74,33 @@ def experiment():
     return solve_ivp(f, (0, 3), begin, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
 
 
-@pytest.mark.parametrize("formulation", INDEPENDENT)
-def test_five_bar_against_scipy(formulation, experiment):
-    settings = {"formulation": formulation, "integrator": "dormand-prince-8"}
+def test_five_bar_against_scipy(experiment):
+    settings = {"formulation": "partitioning", "integrator": "dormand-prince-8"}
     block, worst = moved(five_bar(), 3.0, wrench=WRENCH, **settings)
     np.testing.assert_allclose(block.x, experiment, atol=1e-9)
     assert worst < 1e-15
 
 
-@pytest.mark.parametrize("formulation", INDEPENDENT)
 @pytest.mark.parametrize("cut", ["middle", "ground"])
-def test_crank_rocker_through_its_turns(formulation, cut):
+def test_crank_rocker_through_its_turns(cut):
     """1 s at 12 rad/s: two turns; angles are counted on, not wrapped."""
     settings = {"integrator": "dormand-prince-8"}
     block, _ = moved(four_bar(cut), 1.0, **settings)
-    other, worst = moved(four_bar(cut), 1.0, formulation=formulation, **settings)
+    other, worst = moved(four_bar(cut), 1.0, formulation="partitioning", **settings)
     assert abs(other.state["q"][0]) > 2 * np.pi
     np.testing.assert_allclose(other.x, block.x, atol=1e-10)
     assert worst < 1e-15
 
 
-@pytest.mark.parametrize("formulation", INDEPENDENT)
 @pytest.mark.parametrize("integrator", ["semi-implicit-euler", "linearly-implicit"])
-def test_every_kind_of_method_takes_independent_coordinates(formulation, integrator):
+def test_every_kind_of_method_takes_independent_coordinates(integrator):
     """First and second order towards the same motion."""
     exact, _ = moved(four_bar(), 0.125, integrator="dormand-prince-8")
     order = {"semi-implicit-euler": 1, "linearly-implicit": 2}[integrator]
     errors = []
     for h in (1 / 512, 1 / 1024):
-        block, worst = moved(four_bar(), 0.125, h, integrator=integrator, formulation=formulation)
+        settings = {"integrator": integrator, "formulation": "partitioning"}
+        block, worst = moved(four_bar(), 0.125, h, **settings)
         assert worst < 1e-15
         errors.append(np.abs(block.x - exact.x).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2)
@@ -132,15 +123,12 @@ def test_other_branch_from_the_start_pose(formulation):
 
 def test_outputs_do_not_depend_on_the_formulation():
     """The multipliers too: they are those of the pose, whoever moved it there."""
-    given = [
+    first, second = (
         virtual_mechanism(five_bar(), Mechanism(formulation=f), step_s=1 / 512)
         for f in FORMULATIONS
-    ]
-    assert len({c.outputs for c in given}) == 1
-    start = Running(given[0])
-    for component in given[1:]:
-        block = Running(component)
-        np.testing.assert_array_equal(block.y["lambda"], start.y["lambda"])
+    )
+    assert first.outputs == second.outputs
+    np.testing.assert_array_equal(Running(second).y["lambda"], Running(first).y["lambda"])
 
 
 def slider_crank():
@@ -159,57 +147,23 @@ def slider_crank():
     )
 
 
-@pytest.mark.parametrize("formulation", INDEPENDENT)
-def test_slider_crank_through_its_dead_centres(formulation):
+def test_slider_crank_through_its_dead_centres():
     settings = {"integrator": "dormand-prince-8"}
     block, _ = moved(slider_crank(), 1.0, **settings)
-    other, worst = moved(slider_crank(), 1.0, formulation=formulation, **settings)
+    other, worst = moved(slider_crank(), 1.0, formulation="partitioning", **settings)
     assert abs(other.state["q"][0]) > 2 * np.pi
     np.testing.assert_allclose(other.x, block.x, atol=1e-10)
     assert worst < 1e-15
 
 
-def test_a_loop_that_is_no_dyad_is_refused_with_the_reason():
-    """Two slides, as an elliptic trammel has them, leave no pivot beside the cut."""
-    linkage = Linkage(
-        body=(rod("along", 0.1), rod("across", 0.1)),
-        joint=(
-            Joint(name="x", type="prismatic", child="along", axis=0.0),
-            Joint(name="y", type="prismatic", child="across", axis=1.5),
-        ),
-        loop=(Loop(bodies=("along", "across"), at=((0.0, 0.0), (0.0, 0.0))),),
-        operational_point=OperationalPoint(body="along"),
-    )
-    with pytest.raises(ValueError, match=r"loop `loop1` .*joint `x` is prismatic.*partition"):
-        virtual_mechanism(linkage, Mechanism(formulation="embedding"), step_s=1 / 512)
-
-
-def test_a_redundant_loop_is_refused_by_embedding_alone():
+def test_a_redundant_loop():
     """A second closure at the same pivot has no coordinate left to set."""
     linkage = four_bar()
     again = Loop(bodies=("rocker", "coupler"), at=((0.4, 0.0), (0.5, 0.0)))
     twice = replace(linkage, loop=(*linkage.loop, again))
-    with pytest.raises(ValueError, match=r"loop `loop2` .*joint `rocker`: loop `loop1` sets it"):
-        moved(twice, 0.01, formulation="embedding")
     block, _ = moved(twice, 0.25, formulation="partitioning", integrator="dormand-prince-8")
     once, _ = moved(linkage, 0.25, integrator="dormand-prince-8")
     np.testing.assert_allclose(block.x, once.x, atol=1e-11)
-
-
-def dyads(linkage):
-    p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
-    n = len(linkage.joint)
-    model = LinkageModel(linkage, p, ca.SX.sym("q", n), ca.SX.sym("qd", n))
-    found = find_dyads(model, np.concatenate(start_pose(model, p)))
-    return [tuple(j.name for j in dyad.joints) for dyad in found]
-
-
-def test_of_several_dyads_one_that_never_folds():
-    """By Grashof, joints at the shortest link go all the way round: on the five-bar, whose
-    shoulders share a pivot, shoulders and elbow 2; on the crank-rocker the crank's."""
-    assert dyads(five_bar()) == [("elbow1", "elbow2")]
-    assert dyads(four_bar()) == [("elbow", "rocker")]
-    assert dyads(four_bar("ground")) == [("elbow", "rocker")]
 
 
 @pytest.mark.parametrize(

@@ -1,1 +1,0 @@
-"""Coordinates in which a closed loop can be integrated."""
