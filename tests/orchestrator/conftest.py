@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import casadi as ca
@@ -15,6 +15,7 @@ from hapticlink.orchestrator import open_scene as open_scene  # by whose import 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator.systems import connected
 
@@ -36,6 +37,25 @@ def status(*arguments: object) -> int:
         main([str(a) for a in arguments])
     assert isinstance(ended.value.code, int)
     return ended.value.code
+
+
+def sets(options: Iterable[str]) -> list[str]:
+    """Options as a command takes them."""
+    return [text for option in options for text in ("--set", option)]
+
+
+try:
+    load()
+    LOOPS = ["python", "compiled"]
+except Unavailable:
+    LOOPS = ["python"]
+
+
+@pytest.fixture(params=LOOPS)
+def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The event loop of the test's runs."""
+    monkeypatch.setenv(CHOICE, request.param)
+    return str(request.param)
 
 
 def clock(name: str, timing: str, inputs: Sequence[str]) -> Component:

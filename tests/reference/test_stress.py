@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from benchmarks import stress
-from hapticlink.orchestrator.commands import main
+from tests.orchestrator.conftest import status
 
 CASES = stress.cases()
 
@@ -23,18 +23,14 @@ def test_names_are_unique_and_every_outcome_is_expected_of_some():
 
 def test_an_instability_is_told_from_a_good_end(tmp_path):
     """By the command's status, and in run.json by the reason of the end and its fault."""
-    for rate, status, reason in (("10", 1, "diverged"), ("60", 0, "duration")):
+    for rate, code, reason in (("10", 1, "diverged"), ("60", 0, "duration")):
         options = [f"--set=graphics.rate={rate}", "--set=duration=1", "--no-figures"]
-        gains = (
-            "--set=controller.teleoperation.damping=[70,70,0.375]" if status else "--set=hold=foh"
-        )
+        gains = "--set=controller.teleoperation.damping=[70,70,0.375]" if code else "--set=hold=foh"
         out = tmp_path / rate
-        with pytest.raises(SystemExit) as ended:
-            main(["run", "closed-loop-direct", *options, gains, "--out", str(out)])
-        assert ended.value.code == status
+        assert status("run", "closed-loop-direct", *options, gains, "--out", out) == code
         told = json.loads((out / "run.json").read_text())
         assert told["end"]["reason"] == reason
-        assert bool(told["fault"]) == bool(status)
+        assert bool(told["fault"]) == bool(code)
 
 
 @pytest.mark.parametrize(

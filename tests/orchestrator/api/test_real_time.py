@@ -10,23 +10,14 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from tests.orchestrator.foreign_fmus import python_fmu, scene
 from tests.orchestrator.wall_clock import MS, WallClock
 
-try:
-    load()
-    LOOPS = ["python", "compiled"]
-except Unavailable:
-    LOOPS = ["python"]
 Turn = Callable[[hl.RealTime], object]
 
 
-@pytest.fixture(params=LOOPS, autouse=True)
-def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv(CHOICE, request.param)
-    return str(request.param)
+pytestmark = pytest.mark.usefixtures("loop")
 
 
 def ran(name: str, turn: Turn, *options: str, clock: WallClock | None = None) -> hl.Run:

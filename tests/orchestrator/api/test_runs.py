@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 import hapticlink as hl
 from hapticlink.orchestrator.results import figures
-from tests.orchestrator.conftest import status
+from tests.orchestrator.conftest import sets, status
 
 SHORT = {"duration": 0.1, "graphics.rate": 40}
 FAR = {"linkage.start_velocity.slide": 1e308, "linkage.start.slide": 1.7e308}
@@ -35,7 +35,7 @@ def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
     assert memory.folder is None
     assert not list(own_temporary_folder.iterdir())
     folder = hl.run("closed-loop", SHORT, out=tmp_path / "api")
-    options = [part for key, value in SHORT.items() for part in ("--set", f"{key}={value}")]
+    options = sets(f"{key}={value}" for key, value in SHORT.items())
     assert status("run", "closed-loop", *options, "--out", tmp_path / "command") == 0
     command = hl.load(tmp_path / "command")
     assert same(memory, folder)
@@ -137,7 +137,9 @@ def test_a_fault_of_the_run_is_told_with_its_results(bar: Path, tmp_path: Path) 
 def test_a_fault_before_the_first_step_has_no_samples() -> None:
     far = {"linkage.operational_point": {"body": "link2", "at": [0.9, 0.0]}}
     lost = hl.run("closed-loop", far)
-    assert "outside the device's workspace" in str(lost.fault)
+    said = "haptic_device: the start pose (x m, y m, theta rad) = (0.66"
+    assert str(lost.fault).startswith(said)
+    assert "outside the device's workspace by 0.7" in str(lost.fault)
     assert [len(part) for part in lost.tracking()] == [0, 0, 0]
     assert lost.figures() == {}
     (row,) = hl.sweep("closed-loop", {"duration": [0.1]}, far, jobs=1).rows

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.base.faults import Fault
-from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
+from tests.orchestrator.conftest import status
 
 
 def test_explain_tells_blocks_and_the_samples_behind_inputs(
@@ -19,8 +19,7 @@ def test_explain_tells_blocks_and_the_samples_behind_inputs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     arguments = ["run", "closed-loop", "--explain", "--set", "graphics.rate=128"]
-    with pytest.raises(SystemExit, match="0"):
-        main([*arguments, "--set", "hold=foh"])
+    assert status(*arguments, "--set", "hold=foh") == 0
     told = capsys.readouterr().out
     assert not list(tmp_path.iterdir())
     assert "ticks of 1/512 s, gauss-seidel" in told
@@ -40,8 +39,7 @@ def test_a_run_keeps_what_explain_prints(
     options = ["--set", "duration=0.2", "--set", "graphics.rate={min=20, max=60, seed=2}"]
     told = []
     for how in (["--explain"], ["--out", str(tmp_path)]):
-        with pytest.raises(SystemExit, match="0"):
-            main(["run", "closed-loop", *how, *options])
+        assert status("run", "closed-loop", *how, *options) == 0
         told.append(capsys.readouterr().out)
     assert (tmp_path / "plan.txt").read_text() == told[0]
     assert "plan.txt" in told[1]
@@ -55,12 +53,10 @@ def test_what_does_not_come_round_is_told_to_its_end(
 ) -> None:
     options = ["--set", "duration=1.5", "--set", "haptics.rate=500", "--set", option]
     scene = "closed-loop-direct" if option.startswith("delays") else "closed-loop"
-    with pytest.raises(SystemExit, match="0"):
-        main(["run", scene, "--explain", *options])
+    assert status("run", scene, "--explain", *options) == 0
     told = capsys.readouterr().out.splitlines()
     assert told[-1] == "cut after 600 events; a run writes them all to plan.txt"
-    with pytest.raises(SystemExit, match="0"):
-        main(["run", scene, "--out", str(tmp_path), *options])
+    assert status("run", scene, "--out", str(tmp_path), *options) == 0
     kept = (tmp_path / "plan.txt").read_text().splitlines()
     table = next(i for i, line in enumerate(told) if line.startswith("tick, "))
     assert kept[kept.index(told[table]) :][: len(told) - table - 1] == told[table:-1]

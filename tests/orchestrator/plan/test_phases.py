@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
-from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.sweep.job import jobs
 from hapticlink.orchestrator.system.timeline import timeline
+from tests.orchestrator.conftest import sets, status
 
 
 @given(st.sampled_from([(1, 4), (1, 2), (3, 4), (1, 1)]), st.sampled_from(["haptics", "graphics"]))
@@ -38,9 +38,7 @@ def test_explain_and_run_json_tell_phases(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = ["phases.virtual_mechanism=0.0005", "duration=0.1"]
-    flags = [text for option in options for text in ("--set", option)]
-    with pytest.raises(SystemExit, match="0"):
-        main(["run", "closed-loop", "--explain", *flags])
+    assert status("run", "closed-loop", "--explain", *sets(options)) == 0
     told = capsys.readouterr().out
     # 1/512 s, 1/30 s and 1/2000 s meet on ticks of 1/192000 s.
     assert "ticks of 1/192000 s" in told
@@ -65,8 +63,7 @@ def test_explain_goes_on_until_all_phases_have_begun_and_come_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = ["graphics.rate=128", "phases.virtual_mechanism='1/1024'"]
-    with pytest.raises(SystemExit, match="0"):
-        main(["run", "closed-loop", "--explain", *(t for o in options for t in ("--set", o))])
+    assert status("run", "closed-loop", "--explain", *sets(options)) == 0
     told = capsys.readouterr().out
     rows = re.findall(r"^ +(\d+)  .* virtual_mechanism: F_drift@\d+ F_hand@(\d+)", told, re.M)
     # Ticks of 1/1024 s: graphics comes every 8; steps start at 0 and after half a haptic period.
@@ -93,9 +90,7 @@ def test_clocks_that_a_phase_parts_hold_the_newest_sample_unless_named(tmp_path:
 def test_rates_and_phases_survive_an_ssp(tmp_path: Path) -> None:
     options = ["duration=0.2", "graphics.phase=0.01", "phases.virtual_mechanism='1/1024'"]
     options += ["phases.controller=0.0005"]
-    flags = [text for option in options for text in ("--set", option)]
-    with pytest.raises(SystemExit, match="0"):
-        main(["export", "closed-loop", "--out", str(tmp_path), *flags])
+    assert status("export", "closed-loop", "--out", str(tmp_path), *sets(options)) == 0
     first = simulate("closed-loop", tmp_path / "a", options)
     again = simulate(str(tmp_path / "closed-loop.ssp"), tmp_path / "b")
     assert again.outcome.fault is None

@@ -92,23 +92,6 @@ def test_order_is_that_of_the_interpolation(
     assert observed == pytest.approx(order, abs=0.1)
 
 
-def test_hermite_falls_back_to_linear_without_a_derivative(fmus: Fmus) -> None:
-    made = system(fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="hermite")
-    assert {c.source_port: c.hold for c in made.connections} == {
-        "F": "hermite",
-        "x": "hermite",
-        "v": "hermite",
-    }
-    by_force = replace(
-        fmus["two"], scalars=tuple(s for s in fmus["two"].scalars if "der" not in s.name)
-    )
-    less = system(
-        {"one": fmus["one"], "two": by_force}, ROWS, "iterated", Fraction(1, 100), UNTIL,
-        between="hermite",
-    )  # fmt: skip
-    assert next(c.hold for c in less.connections if c.source_port == "F") == "foh"
-
-
 def test_both_methods_find_the_same(fmus: Fmus, tmp_path: Path) -> None:
     tables = []
     for method in ("aitken", "newton"):

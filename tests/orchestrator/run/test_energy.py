@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
@@ -149,12 +148,3 @@ def test_a_hold_that_cannot_work_is_refused_with_a_reason(
 ) -> None:
     with pytest.raises(SceneFault, match=why):
         simulate("closed-loop", tmp_path, [option])
-
-
-def test_a_default_falls_back_where_it_does_not_fit(tmp_path: Path) -> None:
-    options = ["hold=foh-derivative", "duration=0.2"]
-    run = simulate("closed-loop-direct", tmp_path, options).results.run
-    assert run["holds"]["virtual_mechanism.x -> controller.x_S"] == "foh-derivative"
-    assert run["holds"]["virtual_mechanism.P_c -> controller.P_c"] == "zoh"
-    assert run["held_as"]["virtual_mechanism.P_c -> controller.P_c"] == "projector"
-    assert Fraction(run["base"].removesuffix(" s")) == Fraction(1, 7680)

@@ -12,7 +12,6 @@ import pytest
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.results import summary
-from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.foreign_fmus import python_fmu, scene
 
 SCENE, SHORT = "closed-loop", ("duration=0.5",)
@@ -43,19 +42,16 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Experiment, dict[st
 LIST = '["hand", "virtual_mechanism.x", "virtual_environment.P_c[1,2]"]'
 
 
-@pytest.mark.parametrize("loop", ["compiled", "python"])
 @pytest.mark.parametrize("every", [1, 7])
 @pytest.mark.parametrize("signals", ["all", "connected", "none", LIST])
 def test_recorded_columns_are_those_of_the_whole_table(
     whole: tuple[Experiment, dict[str, Any]],
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     signals: str,
     every: int,
     loop: str,
 ) -> None:
     """Each column in each row to the byte, and all else that a run tells."""
-    monkeypatch.setenv(CHOICE, loop)
     found = ran(tmp_path, f"record.signals={signals}", f"record.every={every}")
     for rate, table in columns(tmp_path).items():
         kept = {c[0]: [c[0], *c[1::every]] for c in whole[1][rate]}
@@ -79,11 +75,9 @@ def test_only_what_is_used_is_fetched(tmp_path: Path) -> None:
     assert "iota" not in kept["virtual_environment"]
 
 
-@pytest.mark.parametrize("loop", ["compiled", "python"])
-def test_calls_of_an_event(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: str) -> None:
+def test_calls_of_an_event(tmp_path: Path, loop: str) -> None:
     """One get, set and step of each FMU at each communication point; a checked step adds two half
     steps and two gets, with the state saved and restored."""
-    monkeypatch.setenv(CHOICE, loop)
     outcome = ran(tmp_path).outcome
     calls, ticks = outcome.calls, 256
     assert calls["hand"] == {"get": ticks + 1, "step": ticks + 1}
@@ -112,13 +106,9 @@ to = "eats.u"
 """
 
 
-@pytest.mark.parametrize("loop", ["compiled", "python"])
-def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: str
-) -> None:
+def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(tmp_path: Path, loop: str) -> None:
     """FMI has inputs keep their values, but FMUs of others need not, so that these are set though
     they have not changed."""
-    monkeypatch.setenv(CHOICE, loop)
     python_fmu(tmp_path, "Steady", "self.y = 1.0")
     python_fmu(tmp_path, "Eats", "self.y += self.u; self.u = 0.0")
     path = scene(tmp_path, FOREIGN)
@@ -145,12 +135,8 @@ hold = "zoh"
 """
 
 
-@pytest.mark.parametrize("loop", ["compiled", "python"])
-def test_unchanged_inputs_are_not_set_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loop: str
-) -> None:
+def test_unchanged_inputs_are_not_set_again(tmp_path: Path, loop: str) -> None:
     """A block of this project gets a held value once: at 0 s, and as each of 4 steps has ended."""
-    monkeypatch.setenv(CHOICE, loop)
     python_fmu(tmp_path, "Source")
     found = simulate(str(scene(tmp_path, HELD)), tmp_path / "out")
     assert found.outcome.fault is None

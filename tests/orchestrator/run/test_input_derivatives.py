@@ -16,7 +16,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.holds import HOLDS
@@ -24,6 +23,7 @@ from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from tests.orchestrator import coupled, oscillator
+from tests.orchestrator.conftest import status
 from tests.orchestrator.holds.test_order_of_accuracy import error, growth
 from tests.orchestrator.native_mass import FLAGS, native
 
@@ -198,8 +198,7 @@ def test_a_run_and_a_plan_say_who_takes_what(
         "two.F -> one.F": "derivatives to order 2",
         "one.x -> two.x1": "derivatives to order 1, renewed in 2 substeps",
     }
-    with pytest.raises(SystemExit, match="0"):
-        main(["run", str(scene(fmus)), "--explain", "--set", options[0]])
+    assert status("run", str(scene(fmus)), "--explain", "--set", options[0]) == 0
     told = capsys.readouterr().out
     assert "  evaluate two.F -> one.F order 2 width 1\n" in told
     assert "  evaluate one.x -> two.x1 ahead 1/2 order 1 width 1/2\n" in told

@@ -20,17 +20,13 @@ from hapticlink.orchestrator.results.figures import figures
 from hapticlink.orchestrator.results.real_time_figure import exceedance
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run import beside, pace
-from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
+from hapticlink.orchestrator.run.compiled.library import CHOICE
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.real_time import RealTimeRun
+from tests.orchestrator.conftest import LOOPS
 from tests.orchestrator.foreign_fmus import python_fmu, scene
 from tests.orchestrator.wall_clock import MS, WallClock
 
-try:
-    load()
-    LOOPS = ["python", "compiled"]
-except Unavailable:
-    LOOPS = ["python"]
 HAPTIC, GRAPHICS = Fraction(1, 512), Fraction(1, 60)
 FAST = ("duration=0.3", "graphics.rate=60")
 Made = tuple[dict[str, Any], dict[str, bytes]]
@@ -41,12 +37,6 @@ def made(folder: Path, clock: WallClock | None, *options: str, scene: str = "clo
     run = simulate(scene, folder, options, real_time=clock and clock.run()).run
     assert run["fault"] is None
     return run, {path.name: path.read_bytes() for path in folder.glob("*.csv")}
-
-
-@pytest.fixture(params=LOOPS)
-def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setenv(CHOICE, request.param)
-    return str(request.param)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import summary, tables
 from tests.orchestrator.conftest import status
 from tests.orchestrator.foreign_fmus import python_fmu, run, scene
@@ -16,7 +15,6 @@ COMMAND = [sys.executable, "-m", "hapticlink.orchestrator"]
 ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
 SHORT = ("--set", "duration=0.2")
 ROCKER = "linkage.start.rocker=2.9"
-FAR = 'linkage.operational_point={ body = "link2", at = [0.9, 0.0] }'
 
 
 def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path: Path) -> None:
@@ -47,14 +45,6 @@ def test_a_folder_that_cannot_be_is_bad_input(
     assert "is a file; name a folder" in capsys.readouterr().err
     assert status(command, bar, "--out", tmp_path / "file" / "below") == 2
     assert "cannot be created" in capsys.readouterr().err
-
-
-def test_a_handle_out_of_reach_is_a_fault_of_the_device(tmp_path: Path) -> None:
-    """0.9 m along link 2 lie beyond links of 0.3 m at most."""
-    fault = simulate("closed-loop", tmp_path, [FAR]).outcome.fault
-    assert str(fault).startswith("haptic_device: the start pose (x m, y m, theta rad) = (0.66")
-    assert "outside the device's workspace by 0.7" in str(fault)
-    assert "move linkage.operational_point" in str(fault)
 
 
 def test_a_start_that_assembly_moves_far_is_told(

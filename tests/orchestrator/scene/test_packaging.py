@@ -10,7 +10,7 @@ import pytest
 from hapticlink.fmus.native import compiler, host_platform
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.conftest import status
+from tests.orchestrator.conftest import sets, status
 
 SHORT = ("duration=0.2", "graphics.rate=60")
 NATIVE = (*SHORT, "packaging=native")
@@ -43,8 +43,7 @@ def test_run_json_says_it(native: Path, tmp_path: Path) -> None:
 
 def test_an_exported_scene_runs_again(native: Path, tmp_path: Path) -> None:
     """The SSP holds the compiled FMUs, and says nothing of how they were made."""
-    options = [part for option in NATIVE for part in ("--set", option)]
-    assert status("export", "closed-loop", *options, "--out", tmp_path) == 0
+    assert status("export", "closed-loop", *sets(NATIVE), "--out", tmp_path) == 0
     path = tmp_path / "closed-loop.ssp"
     with zipfile.ZipFile(path) as archive:
         assert b"packaging" not in archive.read("SystemStructure.ssd")

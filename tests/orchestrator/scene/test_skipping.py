@@ -11,8 +11,6 @@ from hapticlink.orchestrator.results.tables import Table
 from hapticlink.orchestrator.scene import blocks as scene_blocks
 from hapticlink.orchestrator.scene import requirements
 from hapticlink.orchestrator.scene.blocks import blocks
-from hapticlink.orchestrator.system.costs import costs
-from hapticlink.orchestrator.system.timeline import timeline
 
 SHORT = "duration=0.2"
 
@@ -74,12 +72,3 @@ def test_what_is_left_out_is_told_with_its_reason() -> None:
     alone = {n.part: n.needed for n in requirements.needs(open_scene.load("five-bar"))}
     assert not alone["virtual_environment"]
     assert alone["loop closures"]
-
-
-@pytest.mark.parametrize("name", ["five-bar", "obstacles"])
-def test_skipping_saves_operations_and_signals(name: str) -> None:
-    scene = open_scene.load(name)
-    time = timeline(scene)
-    kept, every = (costs(scene, time, skip=skip) for skip in (True, False))
-    assert sum(c.operations for c in kept) < 0.9 * sum(c.operations for c in every)
-    assert sum(c.signals for c in kept) < 0.9 * sum(c.signals for c in every)

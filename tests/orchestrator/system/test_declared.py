@@ -19,7 +19,7 @@ from hapticlink.orchestrator.system.assemble import from_scene
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
-from tests.orchestrator.conftest import status
+from tests.orchestrator.conftest import sets, status
 from tests.orchestrator.foreign_fmus import python_fmu, python_fmu_of, run, scene, with_units
 
 
@@ -285,8 +285,7 @@ def test_a_spring_of_gains_that_do_not_do_is_refused(tmp_path: Path, more: str, 
 
 def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path: Path) -> None:
     options = ("duration=0.2", "hold=pspm", "holds.virtual_mechanism.F_drift=passive")
-    flags = [text for option in options for text in ("--set", option)]
-    assert status("export", "closed-loop-direct", "--out", tmp_path, *flags) == 0
+    assert status("export", "closed-loop-direct", "--out", tmp_path, *sets(options)) == 0
     path, renamed = tmp_path / "closed-loop-direct.ssp", tmp_path / "renamed.ssp"
     with zipfile.ZipFile(path) as old, zipfile.ZipFile(renamed, "w") as new:
         for name in old.namelist():
