@@ -1,10 +1,12 @@
-"""Sequences of operations that all schemes share: publish, feed, step, record."""
+"""Sequences of operations that all schemes share: publish, feed, step, record; and what they need."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from fractions import Fraction
 
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi.capabilities import STATE, restores_state
 from hapticlink.orchestrator.plan.operations import (
     Evaluate,
     Event,
@@ -103,3 +105,16 @@ def record(system: System, event: Event) -> Iterator[Operation]:
     condition = system.ends_when
     if condition and any(f.clock == system.fmu[condition.fmu].clock for f in event.firings):
         yield StopWhen()
+
+
+def require_rollback(system: System, names: Iterable[str], what: str) -> None:
+    """Raises InputFault with the FMUs of `names` that cannot save and restore their state; `what`
+    needs it."""
+    unable = [n for n in names if not restores_state(system.fmu[n].description)]
+    if unable:
+        flags = {STATE[system.fmu[n].description.fmi] for n in unable}
+        raise InputFault(
+            f"{what} takes steps back, and {', '.join(unable)} cannot save and restore its state "
+            f"({' or '.join(sorted(flags))} is not true); take coupling = 'gauss-seidel' or "
+            "'jacobi' with a higher rate"
+        )

@@ -1,15 +1,17 @@
-"""Creates the instances of FMUs, by FMI version, in this process or isolated in their own."""
+"""Loads the FMUs of a system, by FMI version, in this process or isolated in their own."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
+from contextlib import ExitStack
 
-from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.instance import Instance, Vector
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated
 from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.run.python_modules import clashes
-from hapticlink.orchestrator.system.system import Fmu
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
@@ -18,9 +20,17 @@ def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
     return {u.name: "asked for" for u in fmus if u.isolate} | clashes(fmus)
 
 
-def instance(fmu: Fmu, outputs: Vector, policy: Faults, alone: bool) -> Instance:
-    """The instance of `fmu`, not loaded yet, that fills `outputs`."""
-    kind = Isolated if alone else IN_PROCESS[fmu.description.fmi]
-    made = kind(fmu.name, fmu.description, outputs, fmu.starts, policy)
-    made.seldom = fmu.seldom
-    return made
+def opened(
+    system: System, signals: SignalVector, alone: Container[str], stack: ExitStack
+) -> dict[str, Instance]:
+    """The FMUs of a system by name, loaded; `stack` closes them. `alone`: those isolated. Each
+    fills its outputs among the signals."""
+    instances = {}
+    for fmu in system.fmus:
+        interrupt.check()
+        kind = Isolated if fmu.name in alone else IN_PROCESS[fmu.description.fmi]
+        outputs = signals.values[signals.fmu(fmu.name)]
+        made = kind(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
+        made.seldom = fmu.seldom
+        instances[fmu.name] = stack.enter_context(made)
+    return instances

@@ -7,8 +7,6 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.restorable import Restorable
@@ -19,7 +17,7 @@ from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meters import Meters
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
-from hapticlink.orchestrator.run.open_fmus import instance, isolated
+from hapticlink.orchestrator.run.open_fmus import isolated, opened
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.signals import SignalVector, Vector
 from hapticlink.orchestrator.run.step_check import StepCheck
@@ -49,14 +47,8 @@ class Simulation:
         self.late = 0
         self.seconds = system.timeline.seconds
         self._results, self._stack = results, stack
-        values = self.signals.values
         self.isolated = isolated(system.fmus)
-        self.instances: dict[str, Instance] = {}
-        for fmu in system.fmus:
-            interrupt.check()
-            view = values[self.signals.fmu(fmu.name)]
-            made = instance(fmu, view, system.faults, fmu.name in self.isolated)
-            self.instances[fmu.name] = stack.enter_context(made)
+        self.instances = opened(system, self.signals, self.isolated, stack)
         stack.callback(self._dismiss)
         repeated = system.step_control is not None or system.coupling == "iterated"
         self.step_checks = {

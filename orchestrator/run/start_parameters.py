@@ -68,10 +68,5 @@ def _initialized(system: System) -> SignalVector:
     signals = SignalVector(system)
     alone = open_fmus.isolated(system.fmus)
     with ExitStack() as stack:
-        instances = {}
-        for fmu in system.fmus:
-            view = signals.values[signals.fmu(fmu.name)]
-            made = open_fmus.instance(fmu, view, system.faults, fmu.name in alone)
-            instances[fmu.name] = stack.enter_context(made)
-        initialize(system, instances, signals)
+        initialize(system, open_fmus.opened(system, signals, alone, stack), signals)
     return signals

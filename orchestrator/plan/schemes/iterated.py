@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from math import sqrt
 
-from hapticlink.orchestrator.plan import building_blocks, dependency_order, rollback
+from hapticlink.orchestrator.plan import building_blocks, dependency_order
 from hapticlink.orchestrator.plan.operations import (
     Blend,
     Evaluate,
@@ -72,7 +72,7 @@ def groups(system: System, event: Event) -> list[list[Fmu]]:
 
 def _repeat(system: System, event: Event, group: list[Fmu]) -> Iterator[Operation]:
     names = [u.name for u in group]
-    rollback.require(system, names, "coupling = 'iterated'")
+    building_blocks.require_rollback(system, names, "coupling = 'iterated'")
     loop = [c for n in names for c in system.into(n) if c.source in names]
     dticks = building_blocks.dticks(event, group[0])
     body = [op for fmu in group for op in _step(system, event, fmu, loop)]

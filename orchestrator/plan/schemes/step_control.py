@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
-from hapticlink.orchestrator.plan import building_blocks, rollback
+from hapticlink.orchestrator.plan import building_blocks
 from hapticlink.orchestrator.plan.operations import (
     Advance,
     Event,
@@ -51,7 +51,7 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
             )
         if system.step_control.method == "doubling":
             what = "[step_control] method = 'doubling'"
-            rollback.require(system, [u.name for u in plants], what)
+            building_blocks.require_rollback(system, [u.name for u in plants], what)
         else:
             _require_energy(system, between[clock], Part(clock, dticks), scheme)
         operations.append(Advance(clock, dticks))
