@@ -87,7 +87,6 @@ class Timeline:
         return lambda tick: tick * numerator / denominator
 
     def clock(self, name: str) -> Clock:
-        """The clock of that name."""
         return next(c for c in self.clocks if c.name == name)
 
 

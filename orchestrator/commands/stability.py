@@ -107,7 +107,6 @@ def _map(
     jobs: int | None,
     quiet: bool,
 ) -> tuple[Iterator[str], dict[str, Any]]:
-    """The lines and the record of a map."""
     from hapticlink.orchestrator import api
 
     with counted(scene, hidden=quiet) as count:

@@ -115,7 +115,6 @@ def judged(session: Session, at: str, options: Sequence[str]) -> Row:
 
 
 def work(each: Line) -> Row:
-    """The rows of a line."""
     assert each.scene is not None
     plugins.load(each.plugins)
     rows: list[Row] = []

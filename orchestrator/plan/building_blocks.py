@@ -1,4 +1,4 @@
-"""Sequences of operations that all schemes share: publish, feed, step, record; and what they need."""
+"""Sequences of operations that all schemes share: publish, feed, step, record."""
 
 from __future__ import annotations
 

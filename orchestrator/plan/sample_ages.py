@@ -62,7 +62,6 @@ class Ages:
         found[3] += 1
 
     def delays(self) -> dict[str, Delay]:
-        """The delay of each connection by name."""
         seconds = self._seconds
         return {
             name: Delay(seconds(least), seconds(most), seconds(total) / number)
@@ -75,7 +74,6 @@ MOST = 100_000
 
 
 def delays(plan: Plan, events: int = MOST) -> dict[str, Delay]:
-    """The delay of each connection by name over the first `events`, without a run."""
     ages = Ages(plan)
     for tick, event in islice(plan, events):
         if not ages.event(tick, event):

@@ -70,7 +70,6 @@ class Recorder:
 
     @property
     def files(self) -> list[str]:
-        """The names of its files during the run."""
         return [self.target.name, self.block.path.name] if self._file else []
 
     def row(self, time: float) -> None:

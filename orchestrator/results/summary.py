@@ -171,7 +171,6 @@ def _contacts(results: Results) -> Iterator[str]:
 
 
 def _real_time(found: Mapping[str, Any]) -> Iterator[str]:
-    """How a run in real time has kept its schedule."""
     yield finding(found)
     if moved := found["moved"]:
         said = f"warning: the schedule was moved by {short(moved)} s in all"

@@ -57,7 +57,6 @@ def of_any_shape(results: Results, signal: str) -> Table | None:
 
 
 def has_tracking(results: Results) -> bool:
-    """Whether a run has both an operational point and a handle."""
     return all(of_block(results, signal, 3) for signal in (MECHANISM, DEVICE))
 
 

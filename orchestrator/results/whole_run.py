@@ -115,7 +115,6 @@ def scene_part(results: Results, name: str, kind: Any) -> Any:
 
 
 def _first(error: ValidationError) -> str:
-    """The first finding, in a line."""
     first = error.errors(include_url=False, include_input=False)[0]
     table = first["type"] == "dataclass_type"
     why = "input should be a valid dictionary" if table else first["msg"].lower()

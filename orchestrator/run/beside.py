@@ -86,7 +86,6 @@ class Side:
 
     @property
     def busy(self) -> bool:
-        """Whether a step is not done."""
         return bool(self.c.started != self.c.done)
 
     def start(self, instance: Instance, step: Job) -> None:

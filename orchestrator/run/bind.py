@@ -74,7 +74,6 @@ class Binder:
         return [(i, self.bind(i)) for i in with_barriers(taken, waited)]
 
     def bind_all(self, operations: Iterable[Operation], judged: bool = True) -> list[Call]:
-        """The calls of a block."""
         bound = self.instructions(operations, judged)
         return [self._joined(bound)] if self._joined else [call for _, call in bound]
 
@@ -278,7 +277,6 @@ class Binder:
         return loop
 
     def _stop_when(self) -> Call:
-        """Raises Stop as soon as the scene's stop condition holds."""
         simulation = self._simulation
         condition = simulation.system.ends_when
         assert condition is not None

@@ -49,7 +49,6 @@ class Pace:
         self.c.lateness, self.c.steps = self.lateness.ctypes.data, self.steps.ctypes.data
 
     def now(self) -> int:
-        """Time of the clock (ns)."""
         return self.clock()
 
     def _sleep(self, until: int) -> None:
@@ -105,7 +104,6 @@ class Pace:
             gc.unfreeze()
 
     def report(self) -> dict[str, Any]:
-        """What run.json says, in s."""
         c = self.c
         return {
             "reproducible": False,

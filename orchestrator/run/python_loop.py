@@ -51,7 +51,6 @@ class PythonLoop:
         return found
 
     def prepare(self, kinds: Iterable[Event]) -> None:
-        """Bind kinds of events before they occur."""
         for kind in kinds:
             self._bound[kind] = self._binder.bind_all(self._plan.block(kind))
 
@@ -59,7 +58,6 @@ class PythonLoop:
 
     @property
     def _points(self) -> Points:
-        """The events of a run in real time."""
         assert self._paced
         return self._paced
 
@@ -72,7 +70,6 @@ class PythonLoop:
         return self._points.point(clock)
 
     def patience(self, ns: int) -> None:
-        """Have `turn` called after that time each."""
         self._points.patience(ns)
 
     def change_rate(self, clock: str, starts: Sequence[int]) -> None:

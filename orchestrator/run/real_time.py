@@ -66,7 +66,6 @@ class RealTimeRun:
             self._turn(simulation, loop)
 
     def report(self) -> dict[str, Any]:
-        """What run.json says, in s."""
         simulation = self._simulation
         haptics = simulation.system.timeline.clocks[0]
         return self.pace.report() | {

@@ -75,7 +75,6 @@ class SignalVector:
         return self._of_scalar[fmu, variable]
 
     def port(self, unit: Fmu, name: str) -> list[int]:
-        """Indices of an output vector."""
         return [self.scalar(unit.name, s.name) for s in unit.description.port(name, "output")]
 
     def view(self, places: Sequence[int]) -> Vector | None:
@@ -85,7 +84,6 @@ class SignalVector:
         return self.values[places[0] : places[-1] + 1]
 
     def sources(self, connection: Connection) -> list[int]:
-        """Indices of a connection's source outputs."""
         return [self.scalar(connection.source, s.name) for s in connection.outputs]
 
     def places(self, connection: Connection) -> list[int]:

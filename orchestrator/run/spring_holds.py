@@ -38,7 +38,6 @@ class WithFurther(Hold):
 
 
 def tank(of: SetSpring, system: System, signals: SignalVector) -> EnergyTank:
-    """The energy tank of a spring."""
     timeline, unit = system.timeline, system.fmu[of.position.partition(".")[0]]
     places, turned = _places(of.position, system, signals)
     stiffness, velocity = np.array(of.stiffness), None

@@ -119,7 +119,6 @@ def settings_of(scene: Scene, *parts: str) -> dict[str, Any]:
 
 
 def controllers(scene: Scene) -> list[Controller]:
-    """The controllers of all devices."""
     return [*([scene.controller] if scene.controller else []), *scene.users.values()]
 
 
@@ -131,17 +130,14 @@ def fmu_rates(scene: Scene) -> dict[str, AnyRate]:
 
 
 def impedance(scene: Scene) -> bool:
-    """Whether a controller shapes its device's impedance."""
     return any(controller.impedance for controller in controllers(scene))
 
 
 def topology(scene: Scene) -> bool:
-    """Whether a controller has a topology force F_T."""
     return any(controller.topology is not False for controller in controllers(scene))
 
 
 def mobility_from_graphics(scene: Scene) -> bool:
-    """Whether the virtual environment's Lambda_inv is used."""
     return scene.directions_from == "graphics" and impedance(scene)
 
 

@@ -101,5 +101,4 @@ def members(arguments: dict[str, Any]) -> dict[str, Any]:
 
 
 def is_argument(names: Path) -> bool:
-    """Whether a dotted key is `linkage.family` or `linkage.n`."""
     return len(names) == 2 and names[0] == "linkage" and names[1] in ARGUMENTS

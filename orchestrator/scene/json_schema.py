@@ -27,7 +27,6 @@ Json = dict[str, Any]
 
 
 def json_schema() -> Json:
-    """The schema of a scene file."""
     definitions = _Definitions()
     scene = definitions.table(Scene, entry=False)
     return {

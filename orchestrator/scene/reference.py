@@ -22,7 +22,6 @@ _HEAD = "| key | type | unit | range | default | meaning |\n|---|---|---|---|---
 
 
 def page() -> str:
-    """The page, as Markdown."""
     tables: dict[Any, list[str]] = {Scene: ["Top level"]}
     _tables(Scene, "", tables)
     sections = [_section(record, headings) for record, headings in tables.items()]

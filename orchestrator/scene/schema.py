@@ -25,7 +25,6 @@ _WRITTEN: dict[Any, Any] = {Scene: SceneFile, Linkage: FamilyLinkage}
 
 
 def keys(kinds: list[Any]) -> set[str]:
-    """The keys of the records among `kinds`."""
     return {name for kind in _records(kinds) for name in hints(kind)}
 
 
@@ -100,7 +99,6 @@ def default(kind: Any, key: str) -> Any:
 
 @cache
 def hints(kind: Any) -> dict[str, Any]:
-    """The annotations of a record's keys."""
     found = typing.get_type_hints(as_written(kind), include_extras=True)
     return {name.rstrip("_"): hint for name, hint in found.items() if name[0] != "_"}  # `from_`
 

@@ -57,7 +57,6 @@ def measure(experiment: Experiment) -> Row:
 
 
 def failed(reason: str, message: str) -> Row:
-    """The row of a run without an outcome."""
     return {"end": reason, "message": _line(message)}
 
 

@@ -31,7 +31,6 @@ class Rows:
         return found if isinstance(found, dict) else None
 
     def keep(self, key: str, row: Row) -> None:
-        """Store a row."""
         write_json(self._folder / f"{key}.json", row)
 
 
@@ -43,7 +42,6 @@ def columns(rows: Sequence[Row]) -> list[str]:
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:
-    """Writes the rows as a CSV, atomically."""
     text = io.StringIO()
     writer = csv.DictWriter(text, columns(rows), restval="", lineterminator="\n")
     writer.writeheader()

@@ -61,7 +61,6 @@ the hand's or its observer's."""
 
 
 def rows(scene: Scene) -> tuple[Wire, ...]:
-    """Every connection that the loop of the scene may have."""
     return tuple(Wire(from_=source, to=target) for source, target in _rows(scene))
 
 

@@ -124,11 +124,9 @@ class System:
         return fmu if fmu in self.replacements else self.fmu[fmu].description.block
 
     def into(self, name: str) -> tuple[Connection, ...]:
-        """Connections to the inputs of an FMU."""
         return tuple(c for c in self.connections if c.target == name and not c.initial)
 
     def out_of(self, name: str) -> tuple[Connection, ...]:
-        """Connections from the outputs of an FMU."""
         return tuple(c for c in self.connections if c.source == name and not c.initial)
 
 

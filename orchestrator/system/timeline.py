@@ -101,7 +101,6 @@ def clocks(scene: Scene) -> Clocks:
 
 
 def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> tuple[str, Pace]:
-    """The name of an FMU's clock, and its pace."""
     name, pace = _name(rate, scene), _pace(rate, path, scene)
     if fmu not in scene.phases or exact(scene.phases[fmu]) == pace.first:
         return name, pace

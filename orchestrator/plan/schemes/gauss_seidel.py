@@ -31,7 +31,6 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
 
 
 def ordered(system: System) -> list[list[Fmu]]:
-    """The sampled blocks."""
     return [[u for u in system.fmus if u.sampled]]
 
 

@@ -27,5 +27,4 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
 
 
 def ordered(system: System) -> list[list[Fmu]]:
-    """The sampled blocks, and the plants."""
     return [*gauss_seidel.ordered(system), [u for u in system.fmus if not u.sampled]]

@@ -52,7 +52,6 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
 
 
 def ordered(system: System) -> list[list[Fmu]]:
-    """The sampled blocks, and the plants of each rate."""
     plants = [u for u in system.fmus if not u.sampled]
     clocks = dict.fromkeys(u.clock for u in plants)
     of_a_rate = ([u for u in plants if u.clock == clock] for clock in clocks)

@@ -12,7 +12,6 @@ from hapticlink.orchestrator.system.system import System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
-    """The operations of `event`."""
     sampled, continuous = building_blocks.firing(system, event)
     started = building_blocks.starting(event, continuous)
     operations: list[Operation] = [*building_blocks.publish_ended(system, event, continuous)]

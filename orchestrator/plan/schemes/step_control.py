@@ -59,7 +59,6 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
 
 
 def _between(system: System, clock: str) -> list[Connection]:
-    """The connections between plants of a clock."""
     plants = [u.name for u in system.fmus if u.clock == clock and not u.sampled]
     return [c for name in plants for c in system.into(name) if c.source in plants]
 

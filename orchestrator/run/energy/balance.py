@@ -31,7 +31,6 @@ class Balance:
         self._start = 0.0
 
     def start(self) -> None:
-        """Record the mechanism's energy at the start of the run."""
         if self._place is not None:
             self._start = float(self._values[self._place])
 

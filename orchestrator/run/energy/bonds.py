@@ -50,7 +50,6 @@ class Bond:
 
 
 def bond(c: Connection, system: System, signals: SignalVector) -> Bond | None:
-    """The bond of a connection; None where it carries no power."""
     target = system.fmu[c.target].description
     pairs = [(i, s, paired(c, s, system.power)) for i, s in enumerate(c.inputs)]
     found = [(i, s, p) for i, s, p in pairs if p]

@@ -33,7 +33,6 @@ class Meters:
             self.of_target.setdefault(c.target, []).append(c.name)
 
     def start(self) -> None:
-        """Start all accounts at the initialised state."""
         for meter in self.of.values():
             meter.sample(0)
             meter.move(0)

@@ -22,7 +22,6 @@ def check(scene: Scene) -> Iterator[Problem]:
 
 
 def delays(scene: Scene) -> Iterator[Problem]:
-    """A problem for each latency whose max is below its min."""
     for name, late in scene.delays.items():
         if isinstance(late, Latency) and late.max is not None and late.max < late.min:
             message = f"max = {late.max} s is below min = {late.min} s: swap them"

@@ -15,7 +15,6 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
 def check(scene: Scene) -> Iterator[Problem]:
-    """Every problem found, in the order of the file."""
     taken = dict.fromkeys(b.name for b in loop_blocks(scene))
     for i, fmu in enumerate(scene.fmu):
         path: Path = ("fmu", i)

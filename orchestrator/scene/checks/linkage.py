@@ -59,7 +59,6 @@ def _cuts(linkage: Linkage) -> Iterator[Problem]:
 
 
 def _gears(linkage: Linkage) -> Iterator[Problem]:
-    """Problems of the joints of gears."""
     types = {j.name: j.type for j in linkage.joint}
     names = [loop.name for loop in linkage.loop]
     for i, gear in enumerate(linkage.gear):
@@ -120,7 +119,6 @@ def _tree(linkage: Linkage, frames: Mapping[str, int]) -> Iterator[Problem]:
 
 
 def _limits(linkage: Linkage) -> Iterator[Problem]:
-    """Problems of the limits of joints and cut joints."""
     for kind in ("joint", "loop"):
         for i, part in enumerate(getattr(linkage, kind)):
             path: Path = ("linkage", kind, i, "limits")

@@ -14,7 +14,6 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
 def check(scene: Scene) -> Iterator[Problem]:
-    """Every problem found."""
     if exact(scene.duration) * exact(scene.haptics.rate) < 1:
         yield (
             ("duration",),
