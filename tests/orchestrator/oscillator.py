@@ -11,15 +11,12 @@ from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from hapticlink.components.component import Block, Component, Variable
-from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
-from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
@@ -47,82 +44,6 @@ def exact(times: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([expm(A * (t - WARM)) @ START for t in times])
 
 
-def driven(
-    x: ca.SX, v: ca.SX, force: ca.SX, k: float | ca.SX, c: float, h: ca.SX
-) -> tuple[ca.SX, ca.SX]:
-    """x'' = force - k x - c v over h, the force constant; exact for c^2 < 4 k."""
-    a, w = c / 2, ca.sqrt(k - c * c / 4)
-    e, decay, cos, sin = x - force / k, ca.exp(-a * h), ca.cos(w * h), ca.sin(w * h)
-    moved = force / k + decay * (e * cos + (v + a * e) / w * sin)
-    return moved, decay * (v * cos - (k * e + a * v) / w * sin)
-
-
-def together(t: ca.SX) -> dict[str, ca.SX]:
-    """x1, v1, x2, v2 of the whole at t, from its modes x1 + x2 and x1 - x2."""
-    zero, (x1, v1, x2, v2) = ca.SX(0.0), START.tolist()
-    s, vs = driven(ca.SX(x1 + x2), ca.SX(v1 + v2), zero, K, C, t - WARM)
-    d, vd = driven(ca.SX(x1 - x2), ca.SX(v1 - v2), zero, K + 2 * K_C, C + 2 * C_C, t - WARM)
-    return {"x1": (s + d) / 2, "v1": (vs + vd) / 2, "x2": (s - d) / 2, "v2": (vs - vd) / 2}
-
-
-def warmed(block: Block, which: str, moved: tuple[ca.SX, ca.SX]) -> dict[str, ca.SX]:
-    """The step of a mass: exact until WARM, then on its own."""
-    whole = together(block.t + block.h)
-    warm = block.t < WARM * (1 - 1e-9)
-    return {
-        "x": ca.if_else(warm, whole[f"x{which}"], moved[0]),
-        "v": ca.if_else(warm, whole[f"v{which}"], moved[1]),
-    }
-
-
-def one() -> Component:
-    block = Block(
-        inputs=[Variable("F", (), "N")],
-        states=[Variable("x", (), "m"), Variable("v", (), "m/s")],
-        outputs=[
-            Variable("x", (), "m"),
-            Variable("v", (), "m/s", derivative_of="x"),
-            Variable("a", (), "m/s2", derivative_of="v"),
-        ],
-    )
-    x, v, force = block.x["x"], block.x["v"], block.u["F"]
-    moved = driven(x, v, force, K, C, block.h)
-    start = together(ca.SX(0.0))
-    acceleration = force - K * x - C * v
-    return block.component(
-        "one",
-        "takes a force",
-        "continuous",
-        initial={"x": start["x1"], "v": start["v1"]},
-        step=warmed(block, "1", moved),
-        output={"x": x, "v": v, "a": acceleration},
-    )
-
-
-def two() -> Component:
-    block = Block(
-        inputs=[Variable("x1", (), "m"), Variable("v1", (), "m/s")],
-        states=[Variable("x", (), "m"), Variable("v", (), "m/s")],
-        outputs=[
-            Variable("x", (), "m"),
-            Variable("v", (), "m/s", derivative_of="x"),
-            Variable("F", (), "N"),
-        ],
-    )
-    x, v, x1, v1 = block.x["x"], block.x["v"], block.u["x1"], block.u["v1"]
-    pull = K_C * x1 + C_C * v1
-    moved = driven(x, v, pull, K + K_C, C + C_C, block.h)
-    start = together(ca.SX(0.0))
-    return block.component(
-        "two",
-        "takes a motion",
-        "continuous",
-        initial={"x": start["x2"], "v": start["v2"]},
-        step=warmed(block, "2", moved),
-        output={"x": x, "v": v, "F": K_C * (x - x1) + C_C * (v - v1)},
-    )
-
-
 ROWS = [("two.F", "one.F"), ("one.x", "two.x1"), ("one.v", "two.v1")]
 
 POWER = (PowerPort(effort="one.F", displacement="one.x"),)
@@ -135,10 +56,6 @@ SPRINGS = (
         set_velocity="two.v1",
     ),
 )
-
-
-def built(folder: Path) -> dict[str, Description]:
-    return {c.name: describe(build(c, folder)) for c in (one(), two())}
 
 
 def system(

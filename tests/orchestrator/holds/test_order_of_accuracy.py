@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.fmi.description import Description
-from tests.orchestrator.oscillator import WARM, built, exact, simulate, system
+from tests.orchestrator.native_mass import held
+from tests.orchestrator.oscillator import WARM, exact, simulate, system
 
 Fmus = Mapping[str, Description]
 Hold = str | Mapping[str, str]
@@ -22,7 +23,7 @@ Hold = str | Mapping[str, str]
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
-    return built(tmp_path_factory.mktemp("oscillator"))
+    return held(tmp_path_factory.mktemp("oscillator"))
 
 
 OWN = {"two.F": "lead", "one.x": "foh-derivative", "one.v": "foh-derivative"}

@@ -14,8 +14,9 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.records import Iteration, StepControl
-from tests.orchestrator import coupled, oscillator
+from tests.orchestrator import coupled
 from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
+from tests.orchestrator.native_mass import held
 
 try:
     load()
@@ -189,7 +190,7 @@ def test_steps_that_are_taken_back(
 ) -> None:
     """The two-mass oscillator, iterated or in steps of controlled size."""
     coupling, settings = REPEATED[how]
-    fmus = coupled.described((oscillator.one(), coupled.with_derivative()), tmp_path)
+    fmus = held(tmp_path)
     base = Fraction(1, 50000) if "step_control" in settings else None
     found = []
     for choice in ("python", "compiled"):

@@ -25,7 +25,6 @@ from hapticlink.orchestrator.run.fixed_point import Unconverged
 from hapticlink.orchestrator.scene.load import read
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.scene.scene import Scene
-from tests.orchestrator import oscillator
 from tests.orchestrator.coupled import (
     HERMITE,
     POWER,
@@ -34,11 +33,11 @@ from tests.orchestrator.coupled import (
     error,
     gain,
     simulate,
-    stiff,
     stiff_exact,
     system,
-    with_derivative,
 )
+from tests.orchestrator.foreign_fmus import edited
+from tests.orchestrator.native_mass import held, stiff
 
 Fmus = Mapping[str, Description]
 NEWTON = Iteration(method="newton", tolerance=1e-10)
@@ -47,8 +46,7 @@ UNTIL = Fraction("1.06")
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
-    parts = (oscillator.one(), with_derivative())
-    return described(parts, tmp_path_factory.mktemp("oscillator"))
+    return held(tmp_path_factory.mktemp("oscillator"))
 
 
 def largest(fmus: Fmus, folder: Path, rate: int, between: str, substeps: int) -> float:
@@ -146,7 +144,7 @@ STIFF = (100.0, 300.0, 2e4, 200.0)
 
 
 def test_newton_converges_where_the_fixed_point_does_not(tmp_path: Path) -> None:
-    made = described(stiff(*STIFF), tmp_path)
+    made = stiff(tmp_path, *STIFF)
 
     def coupled(coupling: str, rate: int, method: str = "newton") -> tuple[object, float]:
         outcome, table = simulate(
@@ -297,7 +295,8 @@ def test_a_scene_is_iterated_as_it_says(fmus: Fmus, tmp_path: Path) -> None:
 
 def test_hermite_gives_way_where_a_source_has_no_derivative(tmp_path: Path) -> None:
     """No connection of this scene takes `hold`, so it is not `hold` that does not fit."""
-    bare = described((oscillator.one(), oscillator.two()), tmp_path)
+    bare = held(tmp_path)
+    edited(bare["two"].path, lambda text: text.replace('"der(F)"', '"F_rate"'))
     settings = (
         'iteration = { method = "newton", interpolation = "hermite", tolerance = 1e-10 }\n'
         "substeps = { one = 4, two = 4 }"

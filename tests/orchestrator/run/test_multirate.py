@@ -33,7 +33,6 @@ from hapticlink.orchestrator.stability.modes import modes
 from hapticlink.orchestrator.stability.switching import joint_spectral_radius
 from hapticlink.orchestrator.stability.varying import edges_of
 from hapticlink.orchestrator.system.system import Fmu, System
-from tests.orchestrator.oscillator import driven
 from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed
 
@@ -90,6 +89,16 @@ def spring() -> Component:
     force = block.p["K"] * (u["x_l"] - u["x"]) + (u["v_l"] - u["v"])
     output = {"F": force, "F_l": -force}
     return block.component("spring", "a spring", "sampled", initial={}, step={}, output=output)
+
+
+def driven(
+    x: ca.SX, v: ca.SX, force: ca.SX, k: float | ca.SX, c: float, h: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """x'' = force - k x - c v over h, the force constant; exact for c^2 < 4 k."""
+    a, w = c / 2, ca.sqrt(k - c * c / 4)
+    e, decay, cos, sin = x - force / k, ca.exp(-a * h), ca.cos(w * h), ca.sin(w * h)
+    moved = force / k + decay * (e * cos + (v + a * e) / w * sin)
+    return moved, decay * (v * cos - (k * e + a * v) / w * sin)
 
 
 def sprung() -> Component:

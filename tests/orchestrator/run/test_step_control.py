@@ -19,9 +19,9 @@ from hapticlink.orchestrator.run.event_loop import Outcome
 from hapticlink.orchestrator.run.step_control import rounded
 from hapticlink.orchestrator.scene.records import StepControl
 from hapticlink.orchestrator.system.system import System
-from tests.orchestrator import oscillator
 from tests.orchestrator.conftest import clock
 from tests.orchestrator.coupled import POWER, ROWS, described, error, simulate, system
+from tests.orchestrator.native_mass import held
 
 Fmus = Mapping[str, Description]
 BASE = Fraction(1, 50000)
@@ -29,8 +29,7 @@ BASE = Fraction(1, 50000)
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
-    parts = (oscillator.one(), oscillator.two())
-    return described(parts, tmp_path_factory.mktemp("oscillator"))
+    return held(tmp_path_factory.mktemp("oscillator"))
 
 
 def controlled(
