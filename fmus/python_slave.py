@@ -61,10 +61,8 @@ def _surviving(method: typing.Callable) -> typing.Callable:
 
 
 class HapticlinkSlave(Fmi2Slave):
-    _loaded: typing.ClassVar[
-        dict
-    ] = {}  # functions by way of evaluation, read once for all instances
-
+    _loaded: typing.ClassVar[dict] = {}
+    """Functions by way of evaluation, read once for all instances."""
     _released: typing.ClassVar[list] = []
 
     def __init__(self, **kwargs: typing.Any) -> None:
@@ -83,9 +81,8 @@ class HapticlinkSlave(Fmi2Slave):
         self._shared_time = math.nan  # for which z was evaluated; nan: it is out of date
         t, h = _doubles([0.0]), _doubles([0.0])
         x, trial, after = (_doubles([0.0] * n_x) for _ in range(3))
-        new_y = _doubles(
-            [0.0] * n_y
-        )  # a sampled block's outputs, before they are known to be finite
+        # A sampled block's outputs, before they are known to be finite.
+        new_y = _doubles([0.0] * n_y)
         end, z, next_z = _doubles([0.0]), *(_doubles([0.0] * about["n_shared"]) for _ in range(2))
         self._shared, self._next_shared = z, next_z
         values = _doubles(about["starts"] + [0.0] * n_y)

@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.maximal import Bodies
 from hapticlink.components.specs.linkage import Linkage
 
 sys.exudynFast = True  # the build without range checks, as its documentation advises
@@ -25,41 +26,14 @@ METHODS = ("trapezoidal, index 2", "generalised alpha (0.9), index 3")
 SPARSE_FROM = 30  # bodies
 
 
-def _states(linkage: Linkage, q: np.ndarray, qd: np.ndarray) -> dict[str, tuple]:
-    """(origin, angle, its velocity, rate) of every body, from the joint coordinates."""
-    found = {"ground": (np.zeros(2), 0.0, np.zeros(2), 0.0)}
-    waiting = list(zip(linkage.joint, q, qd, strict=True))
-    while waiting:
-        joint, value, rate = next(w for w in waiting if w[0].parent in found)
-        waiting.remove((joint, value, rate))
-        if joint.type != "revolute":
-            raise ValueError(f"joint `{joint.name}`: this converter knows revolute joints only")
-        origin, angle, velocity, omega = found[joint.parent]
-        offset = _turn(angle) @ (joint.at_parent or (0.0, 0.0))
-        pivot, drift = origin + offset, velocity + omega * np.array([-offset[1], offset[0]])
-        angle, omega = angle + value, omega + rate
-        back = _turn(angle) @ (joint.at_child or (0.0, 0.0))
-        found[joint.child] = (
-            pivot - back,
-            angle,
-            drift - omega * np.array([-back[1], back[0]]),
-            omega,
-        )
-    return found
-
-
-def _turn(angle: float) -> np.ndarray:
-    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-
-
 def prepare(
     linkage: Linkage, wrench: np.ndarray, q: np.ndarray, qd: np.ndarray, method: str, h: float
 ) -> Callable[[int], tuple[float, float, float]]:
-    start = _states(linkage, q, qd)
+    z, zd = Bodies(linkage).start(q, qd)
     settings = _settings(method, h, len(linkage.body))
 
     def run(steps: int) -> tuple[float, float, float]:
-        system, mbs, sensor = _build(linkage, wrench, start)
+        system, mbs, sensor = _build(linkage, wrench, z.reshape(-1, 3), zd.reshape(-1, 3))
         settings.timeIntegration.numberOfSteps = steps
         settings.timeIntegration.endTime = steps * h
         solver = exu.MainSolverImplicitSecondOrder()
@@ -75,22 +49,21 @@ def prepare(
     return run
 
 
-def _build(linkage: Linkage, wrench: np.ndarray, start: dict[str, tuple]) -> tuple:
-    """(system container, assembled system, sensor at the operational point)."""
+def _build(linkage: Linkage, wrench: np.ndarray, z: np.ndarray, zd: np.ndarray) -> tuple:
+    """(system container, assembled system, sensor at the operational point); z and zd: poses and
+    velocities of the centres of mass, (k, 3)."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     centers = {b.name: np.array(b.center or (0.0, 0.0)) for b in linkage.body} | {
         "ground": np.zeros(2)
     }
     numbers = {"ground": mbs.AddObject(item.ObjectGround())}
-    for b in linkage.body:
-        origin, angle, velocity, omega = start[b.name]
-        arm = _turn(angle) @ centers[b.name]
+    for b, pose, velocity in zip(linkage.body, z, zd, strict=True):
         node = mbs.AddNode(
             item.NodeRigidBody2D(
-                referenceCoordinates=[*(origin + arm), angle],
+                referenceCoordinates=[*pose],
                 initialCoordinates=[0.0, 0.0, 0.0],
-                initialVelocities=[*(velocity + omega * np.array([-arm[1], arm[0]])), omega],
+                initialVelocities=[*velocity],
             )
         )
         numbers[b.name] = mbs.AddObject(

@@ -3,7 +3,14 @@
     u = M_d [Lambda^-1 (F_h + F_drift + F_env - B_d v - K_d (x - x_ref)) + a_bias]
         + C_d v - F_h + F_T
 
-the report's (4.6) with (4.3) as corrected: F_h counts once, F_T stays outside Lambda^-1. A
+so that with (4.5) the device accelerates as the mechanism would. It is the report's (4.6) with
+(4.3) as corrected: as printed, F_h occurs both in M_d Lambda^-1 F_HD and in (M_d Lambda^-1 - I)
+F_h, so that the hand's wrench would count twice; F_T stays outside Lambda^-1.
+
+    F_drift = K_pc (x_S - x_D) + B_pc (v_S - v_D)
+
+is the virtual coupling, the two position channels of the four-channel controller (section 4.2.3);
+its force channels are connections, the hand's wrench to the mechanism and F_env to the device. A
 passivity controller (control/passivity.py) may take damping off u.
 """
 
@@ -11,7 +18,6 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components import specs
 from hapticlink.components.component import (
     ACCELERATION,
     DAMPING,
@@ -26,14 +32,15 @@ from hapticlink.components.component import (
     Component,
     Variable,
 )
-from hapticlink.components.control import impedance, passivity, teleoperation, topology
+from hapticlink.components.control import passivity, topology
 from hapticlink.components.ports import Spring
+from hapticlink.components.specs.control import Controller, Passivity, Topology
 
 _DRIFT = Spring("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_drift")
 """F_drift between the operational point and the handle."""
 
 
-def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variable]:
+def _signals(spec: Controller, law: Topology | None) -> list[Variable]:
     """The inputs that the chosen parts need."""
     coupled = bool(spec.teleoperation or law)
     needed = {
@@ -64,9 +71,7 @@ def _signals(spec: specs.Controller, law: specs.Topology | None) -> list[Variabl
     return [variable for variable, wanted in needed.items() if wanted]
 
 
-def _gains(
-    spec: specs.Controller, law: specs.Topology | None, length_scale: float
-) -> list[Variable]:
+def _gains(spec: Controller, law: Topology | None, length_scale: float) -> list[Variable]:
     gains = []
     if spec.damping is not None:
         gains += [Variable("B_d", (3,), DAMPING, spec.damping, "desired damping")]
@@ -90,7 +95,7 @@ def _gains(
     return gains
 
 
-def controller(spec: specs.Controller, length_scale: float) -> Component:
+def controller(spec: Controller, length_scale: float) -> Component:
     """The parts of `spec` that are on; the others have no term, no input and no parameter.
 
     Sampled: F_motor, F_drift, F_constraint of t_k from inputs of t_k; without memory but for that
@@ -105,7 +110,7 @@ def controller(spec: specs.Controller, length_scale: float) -> Component:
             "`controller.bias` = 'full' adds to the impedance law, and `controller.impedance` "
             "is false: turn impedance on, or take bias = 'none'"
         )
-    law = specs.Topology() if spec.topology is True else (spec.topology or None)
+    law = Topology() if spec.topology is True else (spec.topology or None)
     outputs = [Variable("F_motor", (3,), WRENCH, description="u, desired wrench of the motors")]
     if spec.teleoperation:
         outputs += [
@@ -122,7 +127,7 @@ def controller(spec: specs.Controller, length_scale: float) -> Component:
                 "F_constraint", (3,), WRENCH, description="F_T, wrench of the topology controller"
             )
         ]
-    guard = specs.Passivity() if spec.passivity is True else (spec.passivity or None)
+    guard = Passivity() if spec.passivity is True else (spec.passivity or None)
     parameters, states = _gains(spec, law, length_scale), []
     if guard:
         parameters += [*passivity.parameters(guard), passivity.PERIOD]
@@ -134,9 +139,7 @@ def controller(spec: specs.Controller, length_scale: float) -> Component:
     output: dict[str, ca.SX] = {}
     force = ca.SX.zeros(3)
     if spec.teleoperation:
-        output["F_drift"] = teleoperation.drift_wrench(
-            u["x_S"] - u["x_D"], u["v_S"] - u["v_D"], p["K_pc"], p["B_pc"]
-        )
+        output["F_drift"] = p["K_pc"] * (u["x_S"] - u["x_D"]) + p["B_pc"] * (u["v_S"] - u["v_D"])
         force += output["F_drift"]
     if spec.contact:
         force += u["F_env"]
@@ -147,14 +150,15 @@ def controller(spec: specs.Controller, length_scale: float) -> Component:
 
     motor = force
     if spec.impedance:
-        a = impedance.desired_acceleration(u["Lambda_inv"], u["F_hand"] + force)
+        a = u["Lambda_inv"] @ (u["F_hand"] + force)
         if spec.bias == "full":
             a += u["a_bias"]
-        motor = impedance.motor_wrench(u["M"], a, u["c"], u["F_hand"])
+        motor = u["M"] @ a + u["c"] - u["F_hand"]
     if law:
         pull = p["k_j"] * (u["x_S"] - u["x_D"]) + p["b_j"] * (u["v_S"] - u["v_D"])
-        wrench = topology.plain_wrench if law.form == "plain" else topology.constraint_wrench
-        output["F_constraint"] = wrench(pull, u["M"], u["P_c"], p["length_scale"])
+        output["F_constraint"] = topology.constraint_wrench(
+            pull, u["M"], u["P_c"], p["length_scale"]
+        )
         motor += output["F_constraint"]
     initial: dict[str, ca.SX] = {}
     step: dict[str, ca.SX] = {}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components import integrators, specs, time_signals
+from hapticlink.components import integrators, time_signals
 from hapticlink.components.component import (
     DAMPING,
     POSE,
@@ -20,22 +20,23 @@ from hapticlink.components.component import (
     Variable,
 )
 from hapticlink.components.paths import signal
+from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, ProfileHand, SpringHand
 
 _F = Variable("F", (3,), WRENCH, description="wrench of the hand on the handle")
 _X = Variable("x", (3,), POSE, description="pose of the handle")
 _V = Variable("v", (3,), TWIST, description="velocity of the handle")
 
 
-def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
+def _wrench(spec: ConstantHand | ProfileHand) -> Component:
     """F = F(t) - B v, with a damper to ground if the spec has one."""
     parameters, inputs = [], []
-    if isinstance(spec, specs.ConstantHand):
+    if isinstance(spec, ConstantHand):
         parameters += [Variable("wrench", (3,), WRENCH, spec.wrench, "wrench on the handle")]
     if spec.damping is not None:
         inputs += [_V]
         parameters += [Variable("damping", (3,), DAMPING, spec.damping, "damping to ground")]
     block, signals = Block(inputs=inputs, parameters=parameters, outputs=[_F]), []
-    if isinstance(spec, specs.ConstantHand):
+    if isinstance(spec, ConstantHand):
         F, kind = block.p["wrench"], "a constant wrench"
     else:
         signals = [signal(spec.table, spec.interpolation, "hand.table")]
@@ -54,7 +55,7 @@ def _wrench(spec: specs.ConstantHand | specs.ProfileHand) -> Component:
     )
 
 
-def _arm(spec: specs.ArmHand) -> Component:
+def _arm(spec: ArmHand) -> Component:
     """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F, with the grip's
     F = K_gr (x_a - x) + B_gr (x_a' - v)."""
     block = Block(
@@ -92,7 +93,7 @@ def _arm(spec: specs.ArmHand) -> Component:
     )
 
 
-def _spring(spec: specs.SpringHand) -> Component:
+def _spring(spec: SpringHand) -> Component:
     """F = K (x_t - x) + B (x_t' - v)."""
     damped = spec.damping is not None
     parameters = [Variable("stiffness", (3,), STIFFNESS, spec.stiffness, "to target path")]
@@ -122,7 +123,7 @@ def _spring(spec: specs.SpringHand) -> Component:
     )
 
 
-def hand(spec: specs.Hand) -> Component:
+def hand(spec: Hand) -> Component:
     """The hand that `spec` describes.
 
     Constant or profile: F = F(t) - B v; x is no input, and v only where there is damping.
@@ -131,6 +132,6 @@ def hand(spec: specs.Hand) -> Component:
     with F = 0. Spring: F = K (x_t - x) + B (x_t' - v), without a mass; a target of one row is the
     tunable parameter `target`, with x_t' = 0, which whoever runs the FMU can move.
     """
-    if isinstance(spec, specs.ArmHand):
+    if isinstance(spec, ArmHand):
         return _arm(spec)
-    return _spring(spec) if isinstance(spec, specs.SpringHand) else _wrench(spec)
+    return _spring(spec) if isinstance(spec, SpringHand) else _wrench(spec)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components import integrators, specs
+from hapticlink.components import integrators
 from hapticlink.components.component import (
     INERTIA,
     POSE,
@@ -24,6 +24,7 @@ from hapticlink.components.component import (
 from hapticlink.components.device import observer, pantograph
 from hapticlink.components.ports import Power
 from hapticlink.components.quantisation import quantised
+from hapticlink.components.specs.device import Device
 
 _FIXED = (
     ("proximal_length", "m", "length of the link next to each motor"),
@@ -51,7 +52,7 @@ _TUNABLE = (
 )
 
 
-def _parameters(device: specs.Device) -> list[Variable]:
+def _parameters(device: Device) -> list[Variable]:
     def of(rows: tuple[tuple[str, str, str], ...], variability: Variability) -> list[Variable]:
         return [Variable(n, (), u, getattr(device, n), d, variability) for n, u, d in rows]
 
@@ -78,7 +79,7 @@ def _plant(block: Block) -> ca.Function:
     return ca.Function("ode", [state, drive, block.p.vector, block.t], [derivative])
 
 
-def haptic_device(device: specs.Device) -> Component:
+def haptic_device(device: Device) -> Component:
     """The FMU `haptic_device`, with the parameters of `device`.
 
     sensing "ideal": x, v and F_hand_observed are the true values. "encoders": x is the pose that

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from hapticlink.components import forces, integrators, time_signals
+from hapticlink.components.blocks.mechanism_steps import DEFLECTIONS, MechanismSteps
 from hapticlink.components.blocks.step_defaults import StepDefaults
 from hapticlink.components.component import (
     WRENCH,
@@ -24,11 +25,10 @@ from hapticlink.components.component import (
     Component,
     Variable,
 )
-from hapticlink.components.contact import contact_forces, joint_limits, located_events
+from hapticlink.components.contact import contact_forces, joint_limits
 from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
 from hapticlink.components.contact.joint_limits import JointLimits
-from hapticlink.components.contact.located_events import LocatedEvents
 from hapticlink.components.contact.unilateral import AllOneSidedForces, OneSidedForces
 from hapticlink.components.dynamics import (
     closure_diagnostics,
@@ -38,20 +38,14 @@ from hapticlink.components.dynamics import (
     partitioning,
     starting_friction,
 )
-from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
-from hapticlink.components.dynamics.closed_loop_solver import Inertia
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
 from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.partitioning import Partitioning
 from hapticlink.components.dynamics.passive_midpoint import (
-    Applied,
-    PassiveStep,
     require_fitting,
     stops_output,
 )
-from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.dynamics.variables import (
     direction_outputs,
     direction_parameters,
@@ -61,16 +55,13 @@ from hapticlink.components.dynamics.variables import (
     motion_outputs,
     states,
 )
-from hapticlink.components.forces import drives, friction, gravity
+from hapticlink.components.forces import drives, friction
 from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 from hapticlink.components.time_signals import TimeSignal
-
-DEFLECTIONS = ("deflection", "contact_deflection")
-"""The states of friction: of joints, and of contacts."""
 
 
 def virtual_mechanism(
@@ -145,11 +136,12 @@ def virtual_mechanism(
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial = {"q": q0, "qd": qd0}
     initial |= _deflections(block, space, applied + pushed, initial, signals)
+    steps = MechanismSteps(block, model, mechanism, applied, touching, signals)
     if parts.passive:
         initial["stops"], output["stops"] = ca.SX(0), block.x["stops"]
-        after = _passive_step(block, model, mechanism, applied, touching, energy, signals)
+        after = steps.passive(energy)
     else:
-        after = _step(block, model, mechanism, applied, touching, space, signals)
+        after = steps.integrated(space)
     n = model.q.numel()
     q1, qd1 = after[:n], after[n : 2 * n]
     if k := model.deflection.numel():
@@ -292,102 +284,3 @@ def _touching(
     if not found:
         return None
     return AllOneSidedForces(found)
-
-
-def _step(
-    block: Block,
-    model: LinkageModel,
-    mechanism: Mechanism,
-    applied: ca.SX,
-    touching: OneSidedForces | None,
-    space: OperationalSpace,
-    signals: list[TimeSignal],
-) -> ca.SX:
-    """(q, qd, deflections) after h: integration of the stabilised equations, followed by projection
-    if chosen; or integration in independent coordinates."""
-    n, linkage = model.q.numel(), model.linkage
-    efforts = space.terms.efforts + applied
-    further = [block.x[name] for name in DEFLECTIONS if name in block.x]
-    x, u, p, t = ca.vertcat(model.q, model.qd, *further), block.u.vector, block.p.vector, block.t
-    given = u
-    if signals:
-        over = ca.SX.sym("over", time_signals.size_over(signals))
-        efforts = ca.substitute(efforts, model.tabled, time_signals.within(signals, over, t))
-        u, given = ca.vertcat(u, over), ca.vertcat(u, time_signals.over(signals, t, block.h))
-    integrator = integrators.METHODS[mechanism.integrator]
-    rates = friction.deflection_rates(model)
-    if touching:
-        laws = None
-        if mechanism.events and integrator.order > 1:
-            laws = ca.SX.sym("laws", len(touching.sides))
-            located = located_events.functions(touching.sides, x, u, p)
-            integrator = LocatedEvents(integrator, mechanism.events, located)
-            u = ca.vertcat(laws, u)
-        efforts += touching.efforts(laws)
-        rates = ca.vertcat(rates, touching.state_rates(laws))
-    closing = -space.terms.w
-    if linkage.closed and mechanism.stabilization == "baumgarte":
-        alpha, beta = block.p["alpha"], block.p["beta"]
-        closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
-    qdd = space.solver.follow(efforts, closing, refined=integrator.extrapolates)
-    ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], {"cse": True})
-    if linkage.closed and mechanism.formulation == "partitioning":
-        independent = Partitioning(model, block.p, ode)
-        if isinstance(integrator, LocatedEvents):
-            integrator = integrator.completed(independent.complete)
-        return independent.step(integrator, x, given, p, t, block.h)
-    after = integrators.step(integrator, ode, x, given, p, t, block.h, range(n))
-    return _projected(after, model, mechanism, space.terms.inertia, p)
-
-
-def _projected(
-    after: ca.SX, model: LinkageModel, mechanism: Mechanism, inertia: Inertia, p: ca.SX
-) -> ca.SX:
-    """`after` on the closures, if the scene chooses projection."""
-    n = model.q.numel()
-    if mechanism.stabilization == "projection":
-        own = inertia if isinstance(inertia, TreeInertia) else TreeInertia(model)
-        project = projection(model, own)
-        after[: 2 * n] = ca.vertcat(*project(after[:n], after[n : 2 * n], p))
-    return after
-
-
-def _passive_step(
-    block: Block,
-    model: LinkageModel,
-    mechanism: Mechanism,
-    pushed: ca.SX,
-    touching: OneSidedForces | None,
-    energy: ca.SX,
-    signals: list[TimeSignal],
-) -> ca.SX:
-    """As `_step`, by the passive midpoint method."""
-    further = [block.x[name] for name in DEFLECTIONS if name in block.x]
-    x, u, p, t = ca.vertcat(model.q, model.qd, *further), block.u.vector, block.p.vector, block.t
-    points = further_points.pushed(model, block.u)
-    places = ca.vertcat(model.x_h, *(point.x for point in points), model.q)
-    drawn = block.u["F_hand"] - block.u["F_drift"]
-    pushes = [drawn, *(point.wrench for point in points), joint_ports.efforts(model, block.u)]
-    rates = friction.deflection_rates(model)
-    weight = gravity.efforts(model)
-    soft = forces.efforts(model, weight=False) + (touching.efforts() if touching else 0)
-    found = [
-        soft,
-        pushed if weight is None else pushed + weight,
-        ca.vertcat(rates, touching.state_rates()) if touching else rates,
-        energy,
-        places,
-        ca.vertcat(*pushes),
-        forces.sources(model),
-    ]
-    given = u
-    if signals:
-        over = ca.SX.sym("over", time_signals.size_over(signals))
-        now = time_signals.within(signals, over, t)
-        found = [ca.substitute(each, model.tabled, now) for each in found]
-        u, given = ca.vertcat(u, over), ca.vertcat(u, time_signals.over(signals, t, block.h))
-    step = PassiveStep(model, Applied(*found), x, u, p, t)
-    after, moved = step(x, given, p, t, block.h)
-    after = _projected(after, model, mechanism, TreeInertia(model), p)
-    after, stops = step.within(x, after, moved, given, p, t, block.h)
-    return ca.vertcat(after, block.x["stops"] + stops)

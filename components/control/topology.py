@@ -27,10 +27,3 @@ def constraint_wrench(pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX) ->
     mobility = S @ ca.inv(M) @ S
     regular = P_c @ mobility @ P_c + ca.SX.eye(3) - P_c
     return S @ ca.solve(regular, P_c @ S @ pull)
-
-
-def plain_wrench(pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX) -> ca.SX:
-    """M_d P pull with P = S^-1 P_c S, for comparison only: it does work on free motion and depends
-    on L."""
-    S = scaling(length_scale)
-    return M @ ca.inv(S) @ P_c @ S @ pull

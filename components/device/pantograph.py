@@ -6,7 +6,7 @@ joint to its crank end, plane A reaching toward +y and plane B toward -y, elbows
 arms 1 to 4 are A left, A right, B left, B right. Every angle is an explicit function of the pose
 (x m, y m, theta rad), so rates and dynamics follow by differentiation; theta is not wrapped.
 
-`p` maps the names of the geometric and inertial keys of [device] (`specs.Device`) to symbols or
+`p` maps the names of the geometric and inertial keys of [device] (specs/device.py) to symbols or
 numbers.
 """
 

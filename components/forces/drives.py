@@ -18,7 +18,8 @@ from hapticlink.components.component import Variable
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate, joints_with
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.paths import signal
-from hapticlink.components.specs.linkage import ConstantDrive, Linkage, PDDrive, ProfileDrive
+from hapticlink.components.specs.drives import ConstantDrive, PDDrive, ProfileDrive
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.time_signals import TimeSignal
 
 

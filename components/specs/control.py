@@ -16,9 +16,6 @@ class Topology:
     """k_j, per kilogram of the device's inertia along the constrained directions."""
     damping: Annotated[float, Quantity("N.s/(m.kg)", ge=0)] = 50.0
     """b_j, per kilogram of the same inertia."""
-    form: Literal["constrained", "plain"] = "constrained"
-    """constrained: F_T of [theory](theory.md); plain: M_d P_c (k_j e + b_j edot), for comparison
-    only, as it does work on free motion and depends on the length scale."""
 
 
 @dataclass(frozen=True, kw_only=True)

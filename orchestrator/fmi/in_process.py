@@ -13,6 +13,7 @@ import os
 import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -20,15 +21,13 @@ import numpy as np
 from fmpy import fmi2
 
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi import kept, messages
+from hapticlink.orchestrator.fmi import kept, messages, python_libraries
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
-from hapticlink.orchestrator.fmi.python_exit import release_at_exit
 from hapticlink.orchestrator.fmi.retry import Retry, Saved
 from hapticlink.orchestrator.fmi.setter import Places, Setter
-from hapticlink.orchestrator.fmi.slave_module import require_slave_module
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
 from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
@@ -41,6 +40,8 @@ WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 class InProcess(Instance):
     """An FMU of FMI 2.0 whose library is loaded into this process. `slave`, `gets`, `fewer` and
     `retry` are for the compiled loop."""
+
+    _library: Callable[..., Any] = fmi2.FMU2Slave
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -60,7 +61,6 @@ class InProcess(Instance):
         try:
             self._folder = kept.unpack(self.description, self._folder)
             self.slave = self._instantiate()
-            self.holds_python = hasattr(self.slave.dll, "finalizePythonInterpreter")
         except Exception as error:  # FMPy raises bare Exception
             said = str(error)
             if said.startswith("Failed to instantiate"):
@@ -72,9 +72,8 @@ class InProcess(Instance):
         self.gets = self.fewer = self._transfers("Get", outputs, self.outputs)
         if self.seldom:
             often = [s for s in outputs if s.name not in self.seldom]
-            self.fewer = self._transfers(
-                "Get", often, self.outputs, places=[*map(outputs.index, often)]
-            )
+            places = [*map(outputs.index, often)]
+            self.fewer = self._transfers("Get", often, self.outputs, {}, places)
         do_step = self._stepper()
 
         def advance(time: float, size: float) -> int:
@@ -91,16 +90,19 @@ class InProcess(Instance):
             self._advance = self.retry.step
 
     def _instantiate(self) -> Any:
-        slave = fmi2.FMU2Slave(
+        slave = self._library(
             guid=self.description.guid,
             modelIdentifier=self.description.identifier,
             unzipDirectory=self._folder,
             instanceName=self.name,
         )
-        release_at_exit(slave.dll)
-        require_slave_module(slave.dll, self._folder)
-        slave.instantiate(callbacks=messages.callbacks(self._key), loggingOn=True)
+        self.holds_python = python_libraries.prepare(slave.dll, self._folder)
+        slave.instantiate(loggingOn=True, **self._logging())
         return slave
+
+    def _logging(self) -> dict[str, Any]:
+        """The arguments of FMPy's `instantiate` that bring messages here."""
+        return {"callbacks": messages.callbacks(self._key)}
 
     def _stepper(self) -> Callable[[float, float], int]:
         """(time, size) -> status of a doStep."""
@@ -135,35 +137,26 @@ class InProcess(Instance):
         if end < time + (1 - SHARE) * size:
             what = f"asks to end the simulation at {end:.6g} s, within its step"
             raise AsksToEnd(self.name, what, time, passing=True)
-        self.ended = True
+        self.place.ended = 1
 
-    def _transfers(
-        self,
-        verb: str,
-        scalars: Sequence[Scalar],
-        values: Vector,
-        exact: Mapping[str, int] = MappingProxyType({}),
-        places: Sequence[int] | None = None,
-    ) -> list[Transfer]:
-        return transfers(self.slave, self.description.fmi, verb, scalars, values, exact, places)
+    def _transfers(self, verb: str, *what: Any) -> list[Transfer]:
+        return transfers(self.slave, self.description.fmi, verb, *what)
 
     # --- initialisation -------------------------------------------------------------------
 
-    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Setter:
-        return self._connected(scalars, places, {})
-
-    def _connected(
-        self, scalars: Sequence[Scalar], places: Sequence[int], exact: Mapping[str, int]
+    def connect(
+        self,
+        scalars: Sequence[Scalar],
+        places: Sequence[int],
+        exact: Mapping[str, int] = MappingProxyType({}),
     ) -> Setter:
-        """As `connect`; exact: integers, by name, to be set instead of the values."""
+        """exact: integers, by name, to be set instead of the values."""
         order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
         where, conversions = [places[i] for i in order], [scalars[i].conversion for i in order]
         setting = self._setting([scalars[i] for i in order], exact)
         self._setters += self.description.block is not None
-        return Setter(where, conversions, *setting, self._set_all, self.place, self._setters)
-
-    def _set_all(self, transfers: Sequence[Transfer]) -> None:
-        self._carry_out(transfers, "sets")
+        set_all = partial(self._carry_out, counted="sets")
+        return Setter(where, conversions, *setting, set_all, self.place, self._setters)
 
     def _carry_out(
         self, transfers: Sequence[Transfer], counted: str, passing: bool = False
@@ -209,7 +202,7 @@ class InProcess(Instance):
         numbers = [(s, v) for s, v in starts if not isinstance(v, str)]
         if numbers:
             places = range(len(numbers))
-            set_from = self._connected([s for s, _ in numbers], places, wide(starts))
+            set_from = self.connect([s for s, _ in numbers], places, wide(starts))
             set_from(np.array([float(v) for _, v in numbers]))
 
     def _set_text(self, scalar: Scalar, text: str) -> None:
@@ -264,7 +257,7 @@ class InProcess(Instance):
         """Ends a step that returned `status`."""
         if status > WARNING:
             raise self.failed(self.do_step, status, passing=status in (DISCARD, ERROR))
-        self.time = self.place.end
+        self.place.time = self.place.end
 
     def after_step(self, status: int) -> None:
         """Ends a step whose doStep, called by the compiled loop, returned `status`."""
@@ -292,8 +285,8 @@ class InProcess(Instance):
     def rollback(self, slot: int = 0) -> None:
         if (status := self._saved[slot].restore()) > WARNING:
             raise self.failed(f"fmi{self.description.fmi}SetFMUstate", status)
-        self.time = self._saved_time[slot]
-        self._status, self.ended = 0, False
+        self.place.time, self.place.ended = self._saved_time[slot], 0
+        self._status = 0
 
     def serialized(self) -> bytes:
         state = self._state("Get", "getFMUState")

@@ -15,9 +15,7 @@ from fmpy import fmi3
 from hapticlink.orchestrator.fmi.in_process import WARNING, InProcess
 from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.messages import keep
-from hapticlink.orchestrator.fmi.python_exit import release_at_exit
 from hapticlink.orchestrator.fmi.setter import Places
-from hapticlink.orchestrator.fmi.slave_module import require_slave_module
 from hapticlink.orchestrator.fmi.start_values import wide
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
@@ -26,21 +24,13 @@ from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 class InProcess3(InProcess):
     """An FMU of FMI 3.0 whose library is loaded into this process."""
 
-    def _instantiate(self) -> Any:
-        slave = fmi3.FMU3Slave(
-            guid=self.description.guid,
-            modelIdentifier=self.description.identifier,
-            unzipDirectory=self._folder,
-            instanceName=self.name,
-        )
-        release_at_exit(slave.dll)
-        require_slave_module(slave.dll, self._folder)
+    _library = fmi3.FMU3Slave
 
+    def _logging(self) -> dict[str, Any]:
         def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:
             keep(self._key, status, message)
 
-        slave.instantiate(loggingOn=True, logMessage=log)
-        return slave
+        return {"logMessage": log}
 
     def _stepper(self) -> Callable[[float, float], int]:
         do_step, component = self.slave.dll["fmi3DoStep"], self.slave.component

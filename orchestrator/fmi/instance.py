@@ -74,31 +74,17 @@ class Instance(ABC):
     @property
     def time(self) -> float:
         """Where the instance stands (s), for messages."""
-        found: float = self.place.time
-        return found
-
-    @time.setter
-    def time(self, time: float) -> None:
-        self.place.time = time
+        return float(self.place.time)
 
     @property
     def ended(self) -> bool:
         """Whether the FMU has requested the end of the simulation; it is only read after that."""
         return bool(self.place.ended)
 
-    @ended.setter
-    def ended(self, ended: bool) -> None:
-        self.place.ended = ended
-
     @property
     def step_time(self) -> float:
         """Time spent in doStep (s)."""
-        found: float = self.place.step_time
-        return found
-
-    @step_time.setter
-    def step_time(self, seconds: float) -> None:
-        self.place.step_time = seconds
+        return float(self.place.step_time)
 
     @property
     def calls(self) -> dict[str, int]:

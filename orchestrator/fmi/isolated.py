@@ -140,13 +140,14 @@ class Isolated(Instance):
     def step(self, time: float, end: float, size: float) -> None:
         if self.ended:
             raise AsksToEnd(self.name, "has asked to end the simulation", time)
-        self.time, self._until = time, end
+        self.place.time, self._until = time, end
         self._send("step", time, end, size)
 
     def finish(self) -> None:
-        outputs, fault, self.ended, self.step_time, self._smaller = self._answer()
+        place = self.place
+        outputs, fault, place.ended, place.step_time, self._smaller = self._answer()
         self._fresh = outputs if fault is None else FmuFault(self.name, *fault)
-        self.time = self._until
+        place.time = self._until
 
     def save(self, slot: int = 0) -> None:
         self._ask("save", slot)
@@ -155,7 +156,7 @@ class Isolated(Instance):
     def rollback(self, slot: int = 0) -> None:
         self._pending = []  # inputs are part of the state
         self._ask("rollback", slot)
-        self.time, self.ended = self._saved_time[slot], False
+        self.place.time, self.place.ended = self._saved_time[slot], 0
 
     def serialized(self) -> bytes:
         state: bytes = self._ask("serialized")

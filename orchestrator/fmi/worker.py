@@ -25,6 +25,12 @@ PR_SET_PDEATHSIG = 1  # linux/prctl.h
 class Worker:
     """One instance and the ways to set its inputs."""
 
+    DIRECT = (
+        *("enter_initialization", "exit_initialization", "jacobian"),
+        *("save", "rollback", "serialized", "deserialize"),
+    )
+    """Calls that are those of the instance."""
+
     def __init__(self) -> None:
         self._instance: Instance | None = None
         self._setters: list[Callable[[Any], None]] = []
@@ -50,19 +56,10 @@ class Worker:
         self._setters.append(made)
         return len(self._setters) - 1
 
-    def jacobian(self, outputs: Any, inputs: Any) -> Any:
-        return self.instance.jacobian(outputs, inputs)
-
     def set_all(self, pending: Any) -> None:
         """`pending`: (key, values as bytes) of setters, in order."""
         for key, values in pending:
             self._setters[key](np.frombuffer(values))
-
-    def enter_initialization(self, stop_time: float) -> None:
-        self.instance.enter_initialization(stop_time)
-
-    def exit_initialization(self) -> None:
-        self.instance.exit_initialization()
 
     def read(self) -> bytes:
         self.instance.read()
@@ -79,18 +76,6 @@ class Worker:
         except FmuFault as failed:  # told when somebody reads
             fault = _told(failed)
         return outputs, fault, instance.ended, instance.step_time, instance.smaller_steps
-
-    def save(self, slot: int) -> None:
-        self.instance.save(slot)
-
-    def rollback(self, slot: int) -> None:
-        self.instance.rollback(slot)
-
-    def serialized(self) -> bytes:
-        return self.instance.serialized()
-
-    def deserialize(self, state: bytes) -> None:
-        self.instance.deserialize(state)
 
     def close(self) -> dict[str, int]:
         """Returns the number of calls of the loop, by kind."""
@@ -117,7 +102,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             break
         try:
             worker.set_all(pending)
-            answer = ("answer", getattr(worker, call)(*arguments))
+            called = worker.instance if call in worker.DIRECT else worker
+            answer = ("answer", getattr(called, call)(*arguments))
         except FmuFault as fault:
             answer = ("end" if isinstance(fault, AsksToEnd) else "fault", _told(fault))
         pickle.dump(answer, answers)

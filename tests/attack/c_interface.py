@@ -15,10 +15,10 @@ from pathlib import Path
 
 import fmpy
 
-from hapticlink.components import specs
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
+from hapticlink.components.specs.hand import ArmHand
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.fmus.archive import entries
 from hapticlink.fmus.native.archive import WRAPPER
@@ -166,7 +166,7 @@ def attack(number: int, seed: int) -> Iterator[cases.Made]:
         sample_components.spring(),
         sample_components.controller(),
         sample_components.fragile(),
-        hand(specs.ArmHand(target=rows)),
+        hand(ArmHand(target=rows)),
         virtual_mechanism(five_bar(), Mechanism(), step_s=1 / 512),
     )
     kinds = [k for k in KINDS if k is not sanitized or can_sanitize()]

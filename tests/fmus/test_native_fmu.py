@@ -21,12 +21,14 @@ from fmpy.fmi2 import FMU2Slave
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.components import specs
 from hapticlink.components.blocks.controller import controller
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
 from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.control import Controller
+from hapticlink.components.specs.drives import PDDrive
+from hapticlink.components.specs.hand import ArmHand
 from hapticlink.components.specs.linkage import (
     Body,
     Joint,
@@ -34,7 +36,6 @@ from hapticlink.components.specs.linkage import (
     Linkage,
     Mechanism,
     OperationalPoint,
-    PDDrive,
 )
 from hapticlink.components.specs.paths import CoordinateSine, Interpolation
 from hapticlink.fmus.blocks import component
@@ -63,7 +64,7 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
     made = {b.name: component(b.made_by, b.settings) for b in blocks.blocks(scene)}
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"})
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
-    made["passive"] = controller(specs.Controller(passivity=True), 0.04)
+    made["passive"] = controller(Controller(passivity=True), 0.04)
     made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
     # Several are named virtual_mechanism.
     return {
@@ -84,7 +85,7 @@ def arm(
     draw = np.random.default_rng(2)
     path = np.column_stack([np.cumsum(draw.uniform(1e-5, 2e-4, rows)), draw.normal(size=(rows, 3))])
     target = tuple(map(tuple, path.tolist()))
-    return hand(specs.ArmHand(target=target, interpolation=interpolation, timing=timing))
+    return hand(ArmHand(target=target, interpolation=interpolation, timing=timing))
 
 
 def driven_slider(sine: CoordinateSine | None = None) -> Component:

@@ -18,11 +18,8 @@ from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.step_check import SLOT, StepCheck
 
-_TYPES = {
-    "Real": 0, "Float64": 0, "Float32": 1, "Int64": 2, "Integer": 3, "Int32": 3, "Int16": 4,
-    "Int8": 5, "UInt64": 6, "UInt32": 7, "UInt16": 8, "UInt8": 9,
-}  # fmt: skip
-_BOOLEAN = {"2": 10, "3": 11}
+_NAMED = {"Real": "DOUBLE", "Float64": "DOUBLE", "Float32": "FLOAT", "Integer": "INT32"}
+"""The names of types in loop.h, where they are others there; BOOL2 and BOOL3 are apart."""
 
 
 def address(function: Any) -> int | None:
@@ -40,7 +37,8 @@ def of_transfers(transfers: Sequence[Transfer], instance: InProcess, memory: Mem
         c.references, c.n_references = memory.copy(t.references), len(t.references)
         c.buffer, c.values, c.n = t.buffer.ctypes.data, t.values.ctypes.data, len(t.values)
         c.kind.python = instance.holds_python
-        c.kind.type, c.kind.fmi = _TYPES.get(t.type, _BOOLEAN[t.fmi]), int(t.fmi)
+        name = f"BOOL{t.fmi}" if t.type == "Boolean" else _NAMED.get(t.type, t.type.upper())
+        c.kind.type, c.kind.fmi = getattr(structures, name), int(t.fmi)
     return made
 
 

@@ -35,12 +35,21 @@ from hapticlink.orchestrator.system.latency import Late, Link
 KINDS: Mapping[type[Hold], tuple[int, int]] = {
     kind: (code, depth)
     for code, depth, *kinds in (
-        (0, 1, ZeroOrder, Latest), (1, 2, Lead), (2, 2, FirstOrder), (3, 1, FirstOrderDerivative),
-        (4, 3, SecondOrder), (5, 2, Hermite), (6, 2, Delayed), (7, 2, Smooth), (8, 1, Mean),
-        (9, 1, PassiveSetPosition), (10, 1, Passive, NearlyEnergyPreserving), (11, 2, Slope),
+        (structures.ZERO_ORDER, 1, ZeroOrder, Latest),
+        (structures.LEAD, 2, Lead),
+        (structures.FIRST_ORDER, 2, FirstOrder),
+        (structures.FIRST_ORDER_DERIVATIVE, 1, FirstOrderDerivative),
+        (structures.SECOND_ORDER, 3, SecondOrder),
+        (structures.HERMITE, 2, Hermite),
+        (structures.DELAYED, 2, Delayed),
+        (structures.SMOOTH, 2, Smooth),
+        (structures.MEAN, 1, Mean),
+        (structures.PASSIVE_SET_POSITION, 1, PassiveSetPosition),
+        (structures.OBSERVED, 1, Passive, NearlyEnergyPreserving),
+        (structures.SLOPE, 2, Slope),
     )
     for kind in kinds
-}  # fmt: skip
+}
 """By class: its code in loop.h, and the number of samples that it keeps."""
 DRAWN, FEW = 256, 16
 """Latencies that are drawn at a time, and samples that there is room for at first."""

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from hapticlink.fmus import cache as fmu_cache
-from hapticlink.orchestrator.run.compiled import build, structures
+from hapticlink.orchestrator.run.compiled import build
 
 CHOICE = "HAPTICLINK_LOOP"
 """Environment variable: with the value "python" no compiled loop is used."""
@@ -37,7 +37,6 @@ def _loaded() -> ctypes.CDLL:
         "block": (pointer, pointer, integer),
         "push": (pointer, pointer, integer, integer),
         "value": (pointer, pointer, integer, number, pointer),
-        "sizes": (pointer,),
         "watch": (ctypes.c_int,),
         "now": (),
         "wait": (integer,),
@@ -47,9 +46,6 @@ def _loaded() -> ctypes.CDLL:
         function.argtypes = arguments
         setattr(found, name, function)
     found.now.restype = integer
-    sizes = (ctypes.c_int64 * len(structures.ALL))()
-    found.sizes(sizes)
-    assert [*sizes] == [ctypes.sizeof(kind) for kind in structures.ALL]
     api = ctypes.pythonapi
     calls = (api.PyGILState_Ensure, api.PyErr_Occurred, api.PyGILState_Release)
     found.python(*(ctypes.cast(call, pointer) for call in calls))

@@ -125,14 +125,3 @@ EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t
 EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
     return hold_value(h, l, tick, ahead, value);
 }
-
-/* The sizes of the structures, in the order of `structures.py`. */
-EXPORT void hapticlink_sizes(int64_t *sizes) {
-    const int64_t found[] = {
-        sizeof(Place),  sizeof(Kind), sizeof(Transfer), sizeof(Check),  sizeof(Fmu),   sizeof(Setter),
-        sizeof(Link),   sizeof(Tank), sizeof(Reader),   sizeof(Queue),  sizeof(Account),
-        sizeof(Hold),   sizeof(Meter), sizeof(Table),   sizeof(Op),     sizeof(Side),
-        sizeof(Clock),  sizeof(Pace), sizeof(Block),    sizeof(Loop),   sizeof(At),
-        sizeof(Events)};
-    memcpy(sizes, found, sizeof found);
-}

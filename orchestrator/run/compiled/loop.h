@@ -1,4 +1,4 @@
-/* What the compiled loop works on. `structures.py` has the same structures, field by field.
+/* What the compiled loop works on. `structures.py` reads the structures and numbers from here.
  *
  * All arrays belong to Python, which resolves everything that does not change during a run into
  * them. Every field has 8 bytes, so that there is no padding to agree on. What one operation reads

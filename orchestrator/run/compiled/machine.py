@@ -23,9 +23,8 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
-from hapticlink.orchestrator.run.beside import Collect
 from hapticlink.orchestrator.run.bind import Bound, Instruction, Stop
-from hapticlink.orchestrator.run.compiled import fmus, structures
+from hapticlink.orchestrator.run.compiled import fmus, in_python, structures
 from hapticlink.orchestrator.run.compiled.holds import (
     CompiledHold,
     CompiledTank,
@@ -38,7 +37,6 @@ from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
-from hapticlink.orchestrator.run.parallel_steps import Finish
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 
@@ -151,7 +149,9 @@ class Machine:
     def _record(self, instruction: Instruction) -> tuple[float, ...]:
         record = self._found(instruction)
         if record is None:
-            self.in_python[_named(instruction)] = self._why(instruction)
+            self.in_python[in_python.named(instruction)] = in_python.why(
+                instruction, self._simulation
+            )
             return (structures.PYTHON, 0, 0, 0, 0, 0.0)
         return (*record, *(0,) * (5 - len(record)), 0.0) if len(record) < 6 else record
 
@@ -194,26 +194,6 @@ class Machine:
                 comparison = [*COMPARISONS].index(condition.comparison)
                 return structures.STOP_WHEN, place, comparison, 0, 0, condition.value
         return None
-
-    def _why(self, instruction: Instruction) -> str:
-        """Why an operation is carried out in Python."""
-        match instruction:
-            case Evaluate(_, _, order) if order:
-                return "the FMU takes derivatives of its inputs"
-            case Set(_, _, True):
-                return "the FMU takes derivatives of its inputs"
-            case Step(fmu) if fmu in self._simulation.beside:
-                return "the FMU runs beside the loop, in a thread"
-            case Collect():
-                return "its FMUs run beside the loop, in a thread"
-            case Push(connection) | Evaluate(connection) | Blend(connection):
-                kind = type(parts(self._simulation.holds[connection]).own).__name__
-                return f"there is no C for {kind}, or none that takes samples back"
-            case Get(fmu) | Read(fmu) | Set(fmu) | Step(fmu) if fmu in self._simulation.isolated:
-                return "the FMU runs in a process of its own"
-            case Finish():
-                return "the FMU runs in a process of its own"
-        return "Python repeats steps, whose operations are in C"
 
     def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
         """The index of an object of `kind`, made at its first use."""
@@ -359,8 +339,3 @@ def _fill_meter(c: structures.Meter, meter: Meter) -> None:
     c.ticks, c.moves = meter.ticks.ctypes.data, meter.moves.ctypes.data
     c.efforts, c.totals = meter.efforts.ctypes.data, meter.totals.ctypes.data
     c.room, c.full, c.least = len(meter.stamps), meter.full, ROWS
-
-
-def _named(instruction: Instruction) -> str:
-    first = next(iter(vars(instruction).values()), "")
-    return f"{type(instruction).__name__.lower()} {first if isinstance(first, str) else ''}".strip()

@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hapticlink.components import specs
 from hapticlink.components.blocks.hand import hand
+from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
 from tests.blocks import Running
 
 TABLE = ((0.5, 0.0, 1.0, 0.0), (1.0, 2.0, 1.0, 0.01), (1.5, 0.0, -1.0, 0.01))
 
 
 def test_constant_wrench_needs_no_input():
-    component = hand(specs.ConstantHand(wrench=(-0.5, 0, -0.0025)))
+    component = hand(ConstantHand(wrench=(-0.5, 0, -0.0025)))
     assert component.inputs == ()
     np.testing.assert_array_equal(Running(component).y["F"], (-0.5, 0, -0.0025))
 
 
 def test_damping_to_ground():
-    component = hand(specs.ConstantHand(wrench=(1, 2, 3), damping=(1, 2, 0.5)))
+    component = hand(ConstantHand(wrench=(1, 2, 3), damping=(1, 2, 0.5)))
     assert [v.name for v in component.inputs] == ["v"]
     y = Running(component, {"v": (0.1, 0.2, 4)}).y
     np.testing.assert_allclose(y["F"], (0.9, 1.6, 1.0), rtol=1e-15)
@@ -26,7 +26,7 @@ def test_damping_to_ground():
 
 def test_profile_is_the_table():
     """Against NumPy's interpolation, which holds the ends too."""
-    running = Running(hand(specs.ProfileHand(table=TABLE)))
+    running = Running(hand(ProfileHand(table=TABLE)))
     rows = np.array(TABLE)
     for running.t in np.linspace(0, 2, 41):
         expected = [np.interp(running.t, rows[:, 0], column) for column in rows.T[1:]]
@@ -35,14 +35,14 @@ def test_profile_is_the_table():
 
 def test_table_must_increase_in_time():
     with pytest.raises(ValueError, match=r"hand\.table.*row 2 at t = 0\.0 s"):
-        hand(specs.ProfileHand(table=((1.0, 0, 0, 0), (0.0, 0, 0, 0))))
+        hand(ProfileHand(table=((1.0, 0, 0, 0), (0.0, 0, 0, 0))))
     with pytest.raises(ValueError, match=r"hand\.target.*no rows"):
-        hand(specs.ArmHand(target=()))
+        hand(ArmHand(target=()))
 
 
 def test_arm_starts_at_the_handle_with_no_force():
     x, v = (0.01, -0.02, 3.6), (0.3, -0.1, 2.0)
-    running = Running(hand(specs.ArmHand(target=((0.0, 0.1, 0, 0),))), {"x": x, "v": v})
+    running = Running(hand(ArmHand(target=((0.0, 0.1, 0, 0),))), {"x": x, "v": v})
     np.testing.assert_array_equal(running.y["F"], 0)
     np.testing.assert_array_equal(running.state["x_arm"], x)
     np.testing.assert_array_equal(running.state["v_arm"], v)
@@ -50,14 +50,14 @@ def test_arm_starts_at_the_handle_with_no_force():
 
 def test_arm_output_belongs_to_the_start_of_the_step():
     """F_k is from x_k and v_k: a handle that jumps is felt at once."""
-    running = Running(hand(specs.ArmHand(target=((0.0, 0, 0, 0),))))
+    running = Running(hand(ArmHand(target=((0.0, 0, 0, 0),))))
     running.set(x=(0.001, 0, 0.01), v=(0.1, 0, 0))
     np.testing.assert_allclose(running.y["F"], (-2000 * 0.001 - 20 * 0.1, 0, -5 * 0.01), rtol=1e-14)
 
 
 def test_arm_follows_its_target_path():
     """A clamped handle and a moving target, against SciPy."""
-    spec = specs.ArmHand(target=((0.0, 0, 0, 0), (0.5, 0.05, -0.02, 0.8)))
+    spec = ArmHand(target=((0.0, 0, 0, 0), (0.5, 0.05, -0.02, 0.8)))
     m, k, b = (np.array(v) for v in (spec.mass, spec.stiffness, spec.damping))
     kg, bg = np.array(spec.grip_stiffness), np.array(spec.grip_damping)
     rate = np.array([0.1, -0.04, 1.6])
@@ -76,7 +76,7 @@ def test_arm_follows_its_target_path():
 
 def test_arm_settles_between_target_and_handle():
     """At rest the two springs share the distance."""
-    running = Running(hand(specs.ArmHand(target=((0.0, 0.1, 0, 0),))))
+    running = Running(hand(ArmHand(target=((0.0, 0.1, 0, 0),))))
     for _ in range(4000):
         running.step(0.002)
     assert running.y["F"][0] == pytest.approx(0.1 * 300 * 2000 / 2300, rel=1e-9)
@@ -85,7 +85,7 @@ def test_arm_settles_between_target_and_handle():
 def test_a_spring_pulls_to_its_moving_target():
     block = Running(
         hand(
-            specs.SpringHand(
+            SpringHand(
                 stiffness=(100.0, 200.0, 3.0),
                 damping=(1.0, 2.0, 0.1),
                 target=((0.0, 0.0, 0.0, 0.0), (1.0, 0.1, 0.2, 0.3)),

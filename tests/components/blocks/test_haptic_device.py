@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hapticlink.components import specs
 from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.device import pantograph
+from hapticlink.components.specs.device import Device, Observer
 from tests.blocks import Running
 
 T = 1 / 512
 START = (-0.02, 0.01, 3.6)
-IDEAL = haptic_device(specs.Device())
-ENCODERS = haptic_device(specs.Device(sensing="encoders"))
+IDEAL = haptic_device(Device())
+ENCODERS = haptic_device(Device(sensing="encoders"))
 
 
 def at_start(component, **inputs):
@@ -73,7 +73,7 @@ def test_held_torques_against_scipy():
     expected = solve_ivp(rate, (0, h), x0, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
     errors, substeps = [], (8, 16, 32)
     for n in substeps:
-        device = at_start(haptic_device(specs.Device(substeps=n)), F_hand=wrench, F_motor=motor)
+        device = at_start(haptic_device(Device(substeps=n)), F_hand=wrench, F_motor=motor)
         device.put(v_true=x0[3:])
         device.step(h)
         errors.append(np.abs(device.x - expected).max())
@@ -129,9 +129,7 @@ def test_theta_is_continuous_over_many_turns():
 def test_observer_converges_to_a_constant_force(rule):
     """The motors balance the hand: the device stays, and the observed force is the hand's."""
     component = haptic_device(
-        specs.Device(
-            sensing="encoders", encoder_resolution=1e-6, observer=specs.Observer(rule=rule)
-        )
+        Device(sensing="encoders", encoder_resolution=1e-6, observer=Observer(rule=rule))
     )
     hand = np.array([0.4, -0.3, 0.003])
     device = at_start(component, F_hand=hand, F_motor=-hand)

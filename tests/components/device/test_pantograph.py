@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from hapticlink.components import specs
 from hapticlink.components.device import pantograph
+from hapticlink.components.specs.device import Device
 
-DEVICE = specs.Device()
+DEVICE = Device()
 P = {k: v for k, v in asdict(DEVICE).items() if isinstance(v, float | int)}
 POSE, V, WRENCH, ANGLES = (ca.SX.sym(s, n) for s, n in (("x", 3), ("v", 3), ("F", 3), ("a", 4)))
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hapticlink.components import specs
 from hapticlink.components.device.workspace import links, margin, workspace
+from hapticlink.components.specs.device import Device
 
-DEVICE = specs.Device()
+DEVICE = Device()
 SPACE = workspace(DEVICE)
 FULL = DEVICE.proximal_length + DEVICE.distal_length
 LONGEST = DEVICE.reach_limit * FULL

@@ -18,8 +18,8 @@ from hapticlink.components.dynamics.massless_bodies import MasslessError
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import parameters
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.specs import (
-    Body,
+from hapticlink.components.specs.bodies import Body
+from hapticlink.components.specs.linkage import (
     Directions,
     GraphicsCopy,
     Joint,

@@ -8,18 +8,12 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from hapticlink.components import specs
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.specs.linkage import (
-    Body,
-    Joint,
-    Linkage,
-    Mechanism,
-    OperationalPoint,
-    PDDrive,
-)
+from hapticlink.components.specs.drives import PDDrive
+from hapticlink.components.specs.hand import ArmHand
+from hapticlink.components.specs.linkage import Body, Joint, Linkage, Mechanism, OperationalPoint
 from hapticlink.components.specs.paths import CoordinateSine, Interpolation, PoseSine
 from tests.blocks import Running
 
@@ -97,7 +91,7 @@ def test_a_row_within_a_step_leaves_order_two() -> None:
 def test_an_arm_follows_its_path_to_order_four() -> None:
     """The handle clamped at 0; in x the arm has mass 1 kg."""
     rows = tuple((t, x, 0.0, 0.0) for t, x in TABLE)
-    spec = specs.ArmHand(target=rows)
+    spec = ArmHand(target=rows)
     k, b = spec.stiffness[0], spec.damping[0]
     matrix = np.array([[0.0, 1.0], [-k - spec.grip_stiffness[0], -b - spec.grip_damping[0]]])
     x, v = moved(TABLE, k, b, matrix, np.zeros(2))
@@ -171,8 +165,8 @@ def test_an_arm_follows_a_smooth_path_to_order_four(path: str) -> None:
         frequency=(SINE.frequency, 0.0, 0.0),
         phase=(SINE.phase, 0.0, 0.0),
     )
-    given = {"spline": specs.ArmHand(target=rows, interpolation="spline")}
-    spec = (given | {"sine": specs.ArmHand(target=sine)})[path]
+    given = {"spline": ArmHand(target=rows, interpolation="spline")}
+    spec = (given | {"sine": ArmHand(target=sine)})[path]
     k, b = spec.stiffness[0], spec.damping[0]
     matrix = np.array([[0.0, 1.0], [-k - spec.grip_stiffness[0], -b - spec.grip_damping[0]]])
     start = np.zeros(2)

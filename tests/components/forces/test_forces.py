@@ -6,15 +6,13 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.drives import ConstantDrive, PDDrive, ProfileDrive
 from hapticlink.components.specs.linkage import (
     Body,
-    ConstantDrive,
     Joint,
     Linkage,
     Mechanism,
     OperationalPoint,
-    PDDrive,
-    ProfileDrive,
     Spring,
 )
 from tests.blocks import Running

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.drives import PDDrive
 from hapticlink.components.specs.linkage import (
     Body,
     Joint,
@@ -17,7 +18,6 @@ from hapticlink.components.specs.linkage import (
     Loop,
     Mechanism,
     OperationalPoint,
-    PDDrive,
 )
 from hapticlink.orchestrator import open_scene
 from tests.blocks import Running

@@ -10,14 +10,13 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.specs.drives import ConstantDrive, ProfileDrive
 from hapticlink.components.specs.linkage import (
     Body,
-    ConstantDrive,
     Joint,
     Linkage,
     Mechanism,
     OperationalPoint,
-    ProfileDrive,
     Spring,
 )
 from hapticlink.orchestrator.open_scene import load

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.components.specs import Device
+from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.workspace import draw, lines
 from tests.orchestrator.conftest import status
 

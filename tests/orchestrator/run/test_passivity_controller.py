@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.components import specs
 from hapticlink.components.blocks.controller import controller
+from hapticlink.components.specs.control import Controller, Passivity
 from hapticlink.orchestrator.stability import wall_limits
 from tests.blocks import Running
 
@@ -101,9 +101,7 @@ def test_the_lifted_map_is_that_of_the_loop_without_it() -> None:
 
 def block(**spec: Any) -> Running:
     """A controller that holds a spring of 1000 N/m, with the passivity controller `spec`."""
-    law = specs.Controller(
-        **TWO_SIDED, stiffness=(1000.0, 1000.0, 5.0), passivity=specs.Passivity(**spec)
-    )
+    law = Controller(**TWO_SIDED, stiffness=(1000.0, 1000.0, 5.0), passivity=Passivity(**spec))
     return Running(controller(law, 0.04), {"M": M}, {"step_size": T})
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hapticlink.components import specs
+from hapticlink.components.specs.hand import SpringHand
 from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
@@ -61,10 +61,10 @@ def test_a_path_is_rows_or_a_sine_which_replaces_them_in_a_scene_that_extends(tm
     sine = "target = { amplitude = [0.1, 0.0, 0.0], frequency = [2.0, 1.0, 0.0] }\n"
     text = 'title = "t"\nextends = "base.toml"\n[hand]\n'
     scene = load.read(text + sine, folder=tmp_path)
-    assert isinstance(scene.hand, specs.SpringHand)
+    assert isinstance(scene.hand, SpringHand)
     assert scene.hand.target == PoseSine(amplitude=(0.1, 0.0, 0.0), frequency=(2.0, 1.0, 0.0))
     scene = load.read(text + 'interpolation = "spline"\n', folder=tmp_path)
-    assert isinstance(scene.hand, specs.SpringHand)
+    assert isinstance(scene.hand, SpringHand)
     assert scene.hand.interpolation == "spline"
     found = findings(GOOD[: GOOD.index("[hand]")] + hand + sine.replace("2.0", "-2.0"))
     assert "give a number >= 0 (Hz)" in found["hand.target.frequency[0]"][1]
