@@ -43,9 +43,8 @@ enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8 }; /* mode
 
 typedef struct { /* what fmi2GetFMUstate saves and serialises; without padding */
     char guid[40];
-    double time;
     long long mode, start_due, output_due; /* due: to be computed before it is read */
-    double reals[REALS], x[N_X];
+    double time, reals[REALS], x[N_X];
 } State;
 
 typedef struct {

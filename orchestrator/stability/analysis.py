@@ -19,7 +19,7 @@ from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
-from hapticlink.orchestrator.stability.modes import Mode, leading, modes, verdict
+from hapticlink.orchestrator.stability.modes import Mode, counted, leading, modes, verdict
 from hapticlink.orchestrator.stability.oscillation import traced
 from hapticlink.orchestrator.stability.tangent import KINK
 from hapticlink.orchestrator.stability.varying import (
@@ -144,7 +144,7 @@ def _result(title: str, map_: LiftedMap, at: Linear, lines: list[str]) -> Stabil
     names = tuple(str(map_.coordinates[i]) for i in at.taken)
     kinked = np.abs(at.V[:, at.kink > KINK]).max(axis=1, initial=0.0)
     kinks = tuple(str(c) for c, share in zip(map_.coordinates, kinked, strict=True) if share)
-    first = others[0] if others else None
+    first = next(iter(counted(found)), None)
     return Stability(
         title=title,
         period=map_.period,

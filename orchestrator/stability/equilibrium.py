@@ -64,7 +64,7 @@ def _require_rest(map_: LiftedMap, at: Linear) -> None:
             f"the equilibrium moves with time, as under a drive or target that does: by "
             f"{moved.max():.1e} in {map_.period:.4g} s, seen in "
             f"{map_.coordinates[at.taken[int(np.argmax(moved))]]}; give `at`, a time from which "
-            "on nothing changes"
+            f"on nothing changes, here later than {map_.begin:.4g} s"
         )
 
 

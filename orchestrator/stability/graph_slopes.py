@@ -1,4 +1,5 @@
-"""The exact slopes of a doStep and of a get of our Python FMUs, from the graph that they carry.
+"""The exact slopes of a doStep and of a get of our FMUs: from the graph that a Python FMU carries,
+or that of the component from which a native one was generated.
 
 With trial states x_0 = x, x_{k+1} = f(x_k, u, p, t_k, h), k < n substeps (fmus/one_pass.py),
 
@@ -20,7 +21,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.fmus.blocks import component
+from hapticlink.fmus.one_pass import one_pass
 from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.scene import Scene
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
@@ -29,10 +34,19 @@ KEPT = 32
 """Graphs that a process keeps, as many as FMUs."""
 
 
-def graph_slopes(found: Description) -> GraphSlopes | None:
-    """Those of an FMU; None for FMUs of others, and those without CasADi's functions, such as
-    native ones."""
-    return _read(found.path, found.guid) if found.block else None
+def graph_slopes(found: Description, fmu: str, scene: Scene | None) -> GraphSlopes | None:
+    """Those of an FMU of `scene`; None for FMUs of others, and for native ones that are no block of
+    the scene."""
+    if not found.block:
+        return None
+    if carried := _read(found.path, found.guid):
+        return carried
+    block = next((b for b in blocks(scene) if b.name == fmu), None) if scene else None
+    if block is None:
+        return None
+    made = component(block.made_by, block.settings)
+    functions = {f.name(): f for f in one_pass(made).functions}
+    return GraphSlopes(functions, made.timing == "sampled", made.substeps)
 
 
 @lru_cache(KEPT)

@@ -55,8 +55,8 @@ class LiftedMap:
     """F of a system, from the first multiple of the hyperperiod on that is behind its start and not
     before the time `at` (s).
 
-    period: the hyperperiod (s), of a number of `events`. coordinates: of the state, in order.
-    start: the state there.
+    begin: that time (s). period: the hyperperiod (s), of a number of `events`. coordinates: of the
+    state, in order. start: the state there.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class LiftedMap:
         length = window[1] if window else hyperperiod(time)
         self.period, self.seconds = time.seconds(length), time.seconds
         first = window[0] if window else length * math.ceil(behind_start(plan.system, at) / length)
-        self._begin = self._state.save()
+        self._begin, self.begin = self._state.save(), time.seconds(first)
         moments = list(takewhile(lambda moment: moment.tick < first + 2 * length, plan))
         for tick, event in moments:
             if tick < first:

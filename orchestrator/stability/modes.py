@@ -22,6 +22,8 @@ from hapticlink.orchestrator.stability.linearise import Linear
 
 FLOOR = 1e-9
 """Relative error of the entries of A by rounding."""
+NEAR = 1e-4
+"""Largest |z - 1| of a neutral mode, however uncertain z is: one further off may grow."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Mode:
     @property
     def neutral(self) -> bool:
         """Whether z is 1 within its uncertainty: a motion that neither grows nor decays."""
-        return abs(self.z - 1.0) <= self.uncertainty
+        return abs(self.z - 1.0) <= min(self.uncertainty, NEAR)
 
 
 def verdict(radius: float, uncertainty: float) -> str:
@@ -53,6 +55,11 @@ def verdict(radius: float, uncertainty: float) -> str:
     if abs(radius - 1.0) <= uncertainty:
         return "marginal"
     return "unstable" if radius > 1.0 else "stable"
+
+
+def counted(found: Sequence[Mode]) -> Sequence[Mode]:
+    """The modes by which a scene is judged: neutral ones only where there are no others."""
+    return [mode for mode in found if not mode.neutral] or found
 
 
 def modes(at: Linear, period: float) -> list[Mode]:

@@ -23,7 +23,7 @@ from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
-from hapticlink.orchestrator.stability.modes import modes, verdict
+from hapticlink.orchestrator.stability.modes import counted, modes, verdict
 from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 
@@ -102,10 +102,10 @@ class Session:
 
 
 def _verdict(at: Linear, period: float) -> Verdict:
-    counted = [mode for mode in modes(at, period) if not mode.neutral]
-    if not counted:
+    found = counted(modes(at, period))
+    if not found:
         return Verdict(0.0, 0.0, period)
-    return Verdict(abs(counted[0].z), counted[0].uncertainty, period)
+    return Verdict(abs(found[0].z), found[0].uncertainty, period)
 
 
 def _kind(system: System) -> Hashable:

@@ -7,7 +7,7 @@ column each, and their errors D follow
     M <- J M,   D <- J D + E M
 
 J is found by central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
-difference of its slopes to both sides. For a doStep and a get of an FMU that carries its graph, J
+difference of its slopes to both sides. For a doStep and a get of an FMU with a graph, J
 is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
 have a slope in one way only, or another one to each side, keep those by differences. Slopes at the
 same numbers, with the same age of samples, are the same, so that around a state of rest each
@@ -40,7 +40,7 @@ from hapticlink.orchestrator.run.parallel_steps import Finish
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.frozen import discrete
-from hapticlink.orchestrator.stability.graph_slopes import graph_slopes
+from hapticlink.orchestrator.stability.graph_slopes import GraphSlopes, graph_slopes
 from hapticlink.orchestrator.stability.state_vector import (
     SIGNALS,
     Coordinate,
@@ -93,6 +93,7 @@ class Tangent:
         self._reach: dict[Instruction, Reach | None] = {}
         self._known: dict[Any, list[Slopes]] = {}
         self._apart: dict[str, frozenset[str] | None] = {}
+        self._graphs: dict[str, GraphSlopes | None] = {}
         self._named: dict[Any, list[Coordinate]] = {}
 
     def forget(self, fmus: Container[str]) -> None:
@@ -214,12 +215,15 @@ class Tangent:
         return known[0], sizes
 
     def _exact(self, operation: Instruction, before: Template, after: Template) -> Matrix | None:
-        """J of a doStep or a get of an FMU that carries its graph."""
+        """J of a doStep or a get of an FMU with a graph."""
         if not isinstance(operation, Step | Get):
             return None
         fmu = operation.fmu
         description = self._simulation.system.fmu[fmu].description
-        graph = graph_slopes(description)
+        if fmu not in self._graphs:
+            scene = self.closures.scene if self.closures else None
+            self._graphs[fmu] = graph_slopes(description, fmu, scene)
+        graph = self._graphs[fmu]
         if graph is None:
             return None
         if isinstance(operation, Step):

@@ -28,6 +28,8 @@ CASES = {
     "wall": ("virtual-wall", {}, {}),
     "substeps": ("virtual-wall", {"mechanism.substeps": 3}, {}),
     "pendulum": ("pendulum", {}, {}),
+    "native": ("pendulum", {"packaging": "native"}, {}),
+    "native substeps": ("virtual-wall", {"packaging": "native", "mechanism.substeps": 3}, {}),
     "neutral modes": ("scotch-yoke", {}, {"virtual_mechanism": {"closure_error"}}),
     "encoders": (
         "closed-loop-direct",
@@ -69,7 +71,7 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
         assert graph == "graph"
         assert set(filter(None, others.split(", "))) <= without.get(fmu, set())
 
-    monkeypatch.setattr(tangent, "graph_slopes", lambda description: None)
+    monkeypatch.setattr(tangent, "graph_slopes", lambda *_: None)
     differences = hl.stability(scene, options)
     assert set(differences.linearised.values()) == {"differences"}
     both = found.uncertainty + differences.uncertainty

@@ -81,8 +81,10 @@ def test_a_target_that_comes_to_rest_later_is_judged_from_there() -> None:
     arm = {"type": "spring", "stiffness": [300.0, 0.0, 0.0], "damping": [5.0, 0.0, 0.0]}
     options = {k: v for k, v in WALL.items() if k != "hand.wrench"}
     options |= {"hand": arm | {"target": path}, "fmu.wall.start.stiffness": 3000.0}
-    with pytest.raises(hl.InputFault, match="give `at`"):
+    with pytest.raises(hl.InputFault, match=r"give `at`.* later than 0\.0"):
         hl.passivity("virtual-wall", options)
+    with pytest.raises(hl.InputFault, match=r"give `at`.* later than 0\.5"):
+        hl.passivity("virtual-wall", options, at=0.5)
     found = hl.passivity("virtual-wall", options, at=1.5)
     assert found.needed == pytest.approx(3000 * T / 2 + 1, rel=1e-3)
 

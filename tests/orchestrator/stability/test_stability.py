@@ -13,6 +13,8 @@ from scipy.integrate import solve_ivp
 
 import hapticlink as hl
 from hapticlink.orchestrator.commands import main
+from hapticlink.orchestrator.stability.linearise import Linear
+from hapticlink.orchestrator.stability.modes import counted, modes, verdict
 
 T = 1 / 512
 HELD: dict[str, Any] = {
@@ -39,6 +41,20 @@ def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
     assert shares == pytest.approx(
         {"virtual_mechanism.q[1]": 0.5, "virtual_mechanism.qd[1]": 0.5}, abs=1e-6
     )
+
+
+@pytest.mark.parametrize(
+    ("A", "error", "said"),
+    [
+        ([[1.0, 0.0], [0.0, 0.5]], 1e-6, "stable"),  # moves freely, and is damped otherwise
+        ([[1.05, 0.0], [0.0, 0.5]], 0.1, "marginal"),  # may grow
+        ([[1.0, 0.1], [0.0, 1.0]], 1e-6, "marginal"),  # moves freely, and nothing else
+    ],
+)
+def test_a_mode_that_may_grow_is_counted(A: list[list[float]], error: float, said: str) -> None:
+    E = np.diag([error, 0.0])
+    first = counted(modes(Linear(np.zeros(2), np.zeros(2), np.eye(2), np.array(A), E), 1.0))[0]
+    assert verdict(abs(first.z), first.uncertainty) == said
 
 
 def test_a_hanging_and_a_standing_mechanism_move_as_their_linearisations_do() -> None:
