@@ -14,7 +14,13 @@ from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import folders, summary, tables
+from hapticlink.orchestrator.results import (
+    figure_axes,
+    figures_beside,
+    folders,
+    summary,
+    tables,
+)
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.run.real_time import RealTimeRun
@@ -133,9 +139,7 @@ def _explained(ended: Experiment) -> list[str]:
 
 def _drawn(ended: Experiment, found: Results) -> list[str]:
     """Writes the figures; returns their names. Raises Interrupted and OSError."""
-    from hapticlink.orchestrator.results import figures  # with Matplotlib, slow to load
-
-    return figures.save(figures.figures(found), ended.folder)
+    return figure_axes.write(figures_beside.pngs(found), ended.folder)
 
 
 def load(folder: str | Path) -> Run:

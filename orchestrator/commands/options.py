@@ -14,7 +14,6 @@ from cyclopts import Parameter
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.say import say
 from hapticlink.orchestrator.commands import completion
-from hapticlink.orchestrator.scene import overrides
 
 Scene = Annotated[
     str,
@@ -64,6 +63,8 @@ def options(set: Iterable[str] | None, swap: Iterable[str] | None) -> tuple[str,
 
 
 def _swap(given: str) -> str:
+    from hapticlink.orchestrator.scene import overrides  # with all of a scene, slow to load
+
     block, equals, file = given.partition("=")
     if not (block and equals and file):
         raise InputFault(f"--swap {given}: write block=file.fmu, e.g. --swap controller=my.fmu")

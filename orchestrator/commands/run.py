@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +24,7 @@ from hapticlink.orchestrator.commands.options import (
     tell,
 )
 from hapticlink.orchestrator.commands.progress import progress
+from hapticlink.orchestrator.results.figures_beside import prepared
 
 if TYPE_CHECKING:
     from hapticlink.orchestrator.api.result import Run
@@ -65,20 +67,24 @@ def run(
         hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
         hapticlink run my-scene.toml --no-figures --json > result.json
     """
-    from hapticlink.orchestrator import api
-    from hapticlink.orchestrator.results import summary
+    # Not beside the steps of a run in real time, which it would delay.
+    with prepared() if figures and not (explain or real_time) else nullcontext():
+        from hapticlink.orchestrator import api
+        from hapticlink.orchestrator.results import summary
 
-    given = options(set, swap)
-    if explain:
-        say(*api.explain(scene, given), sep="\n")
-        return 0
-    folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ())))
-    try:
-        read = api.scene(scene, given)
-        with progress(read.title, read.duration, hidden=quiet) as told:
-            made = api.run(read, out=folder, figures=figures, progress=told, real_time=real_time)
-    except api.RunInterrupted as ended:
-        made = ended.run
+        given = options(set, swap)
+        if explain:
+            say(*api.explain(scene, given), sep="\n")
+            return 0
+        folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ())))
+        try:
+            read = api.scene(scene, given)
+            with progress(read.title, read.duration, hidden=quiet) as told:
+                made = api.run(
+                    read, out=folder, figures=figures, progress=told, real_time=real_time
+                )
+        except api.RunInterrupted as ended:
+            made = ended.run
     if made.fault:
         say(f"hapticlink: {made.fault}", file=sys.stderr)
     warned = made.run.get("warnings")

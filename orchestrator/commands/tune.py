@@ -38,7 +38,7 @@ def tune(
         hapticlink tune closed-loop --set sensing=encoders --set graphics.rate=32
     """
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.figure_axes import save
+    from hapticlink.orchestrator.results.figure_axes import png, write
     from hapticlink.orchestrator.results.files import write_json
     from hapticlink.orchestrator.tune import figure
     from hapticlink.orchestrator.tune import tune as find
@@ -49,7 +49,7 @@ def tune(
     folder = folders.ensure(out or default_folder("tuned", scene))
     write_json(folder / "tune.json", found.record())
     (folder / "tuned.toml").write_text(tuned_scene(scene, found), encoding="utf-8")
-    save(figure.draw(found), folder / "tune.png")
+    write([("tune", png(figure.draw(found)))], folder)
     say(*(f"  {line}" for line in found.lines()), sep="\n")
     say(f"  {folder}/: tune.json, tune.png, tuned.toml")
     return 0

@@ -51,17 +51,17 @@ class Process:
         self._ended = threading.Event()
         self._deadline: float | None = None
         self._late = self.busy = False
-        interrupt.add(self._kill)
+        interrupt.add(self.kill)
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
         while not self._ended.wait(WATCH):
             if self._deadline is not None and monotonic() > self._deadline:
                 self._late = True
-                self._kill()
+                self.kill()
                 return
 
-    def _kill(self) -> None:
+    def kill(self) -> None:
         """Kill the process group: the process and those that its FMU has started."""
         if sys.platform == "win32":
             self._popen.kill()
@@ -113,8 +113,8 @@ class Process:
         try:
             return self._popen.wait(ENDING)
         except subprocess.TimeoutExpired:
-            self._kill()
+            self.kill()
             return self._popen.wait()
         finally:
-            self._kill()
-            interrupt.remove(self._kill)
+            self.kill()
+            interrupt.remove(self.kill)

@@ -6,12 +6,15 @@ and `savefig` draws twice, which together takes longer than the rest of a short 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from io import BytesIO
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.results.tables import Results
 
 if TYPE_CHECKING:
@@ -102,8 +105,22 @@ def legend_above_curves(axes: Axes, columns: int) -> None:
     axes.set_ylim(low, low + (high - low) / (1 - covered))
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Writes a figure as a PNG, at 150 dots per inch."""
+def png(figure: Figure) -> bytes:
+    """A figure as a PNG, at 150 dots per inch."""
     canvas: Any = figure.canvas
     figure.set_dpi(150)
-    canvas.print_png(path, metadata={"Software": None}, pil_kwargs={"compress_level": 1})
+    file = BytesIO()
+    canvas.print_png(file, metadata={"Software": None}, pil_kwargs={"compress_level": 1})
+    return file.getvalue()
+
+
+def write(pngs: Iterable[tuple[str, bytes]], folder: Path) -> list[str]:
+    """Writes PNGs by name; returns the file names. Raises Interrupted."""
+    names = []
+    for name, content in pngs:
+        interrupt.check()
+        path = folder / f"{name}.png"
+        path.unlink(missing_ok=True)  # a link is replaced, not followed
+        path.write_bytes(content)
+        names.append(path.name)
+    return names

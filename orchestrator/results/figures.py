@@ -5,8 +5,9 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -18,11 +19,23 @@ from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.results import figure_axes, mechanism_drawing
 from hapticlink.orchestrator.results.episodes import KINDS, episodes
-from hapticlink.orchestrator.results.figure_axes import framed, last_time, plain, short, titled
-from hapticlink.orchestrator.results.force_figure import ENVIRONMENT, WRENCHES, forces, touching
+from hapticlink.orchestrator.results.figure_axes import (
+    framed,
+    last_time,
+    plain,
+    png,
+    short,
+    titled,
+)
+from hapticlink.orchestrator.results.force_figure import (
+    ENVIRONMENT,
+    WRENCHES,
+    forces,
+    touching,
+    wrenches,
+)
 from hapticlink.orchestrator.results.real_time_figure import real_time
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
@@ -53,44 +66,53 @@ COORDINATES = "virtual_mechanism.q"
 
 def figures(results: Results) -> dict[str, Figure]:
     """Figures of a run by name, as far as it has the signals; none before its first step."""
-    drawn: dict[str, Figure] = {}
+    return {name: draw() for name, draw in drawings(results).items()}
+
+
+def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
+    """By name, what draws each figure of a run."""
+    found: dict[str, Callable[[], Figure]] = {}
     with_rows = {name: table for name, table in results.tables.items() if len(table["time"])}
     results = replace(results, tables=with_rows)
     if not last_time(results):
-        return drawn
+        return found
     linkage = scene_part(
         results, "linkage", Linkage
     )  # an SSP has the block, but not its description
     size = len(coordinate_units(linkage)) if linkage else 0
     if linkage and (coordinates := of_block(results, COORDINATES, size)):
-        drawn["mechanism"] = _mechanism(results, linkage, coordinates)
+        found["mechanism"] = partial(_mechanism, results, linkage, coordinates)
     if of_block(results, MECHANISM, 3):
-        drawn["trajectories"] = _trajectories(results)
+        found["trajectories"] = partial(_trajectories, results)
         if of_block(results, DEVICE, 3):
-            drawn["distance"] = _distance(results)
-    if found := forces(results, scene_part(results, "device", Device)):
-        drawn["forces"] = found
+            found["distance"] = partial(_distance, results)
+    if wrenches(results):
+        found["forces"] = partial(forces, results, scene_part(results, "device", Device))
     if contact := touching(results):
-        drawn["contact"] = _contact(results, *contact)
+        found["contact"] = partial(_contact, results, *contact)
     if counted := constrained(results):
-        drawn["constraints"] = _constraints(results, *counted)
+        found["constraints"] = partial(_constraints, results, *counted)
     if port := user_port(results):
-        drawn["user_port"] = _port(results, port)
+        found["user_port"] = partial(_port, results, port)
     if generated := _generated(results):
-        drawn["energies"] = _energies(results, generated)
-    if paced := real_time(results):
-        drawn["real_time"] = paced
-    return drawn
+        found["energies"] = partial(_energies, results, generated)
+    if (paced := results.run.get("real_time")) and paced["ticks"]:
+        found["real_time"] = partial(real_time, results)
+    return found
+
+
+def warm_up() -> None:
+    """Draws a figure that nobody sees: the first one takes longest, as it loads fonts."""
+    ended = Results(None, {"end": {"reason": "duration"}}, {})
+    figure, axes = titled(ended, "0", "0", "0")
+    axes.plot([0, 1], label="0")
+    figure_axes.legend_below(figure)
+    png(figure)
 
 
 def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
     """Write each figure as a PNG; returns the file names. Raises Interrupted."""
-    for name, figure in figures.items():
-        interrupt.check()
-        path = folder / f"{name}.png"
-        path.unlink(missing_ok=True)  # a link is replaced, not followed
-        figure_axes.save(figure, path)
-    return [f"{name}.png" for name in figures]
+    return figure_axes.write(((name, png(figure)) for name, figure in figures.items()), folder)
 
 
 def _mechanism(results: Results, linkage: Linkage, table: Table) -> Figure:

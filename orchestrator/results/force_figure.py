@@ -58,11 +58,9 @@ def torques(results: Results, device: Device | None) -> tuple[Vector, Vector] | 
     return table["time"], motor_torques(device, table[MOTOR], table[HANDLE])
 
 
-def forces(results: Results, device: Device | None) -> Figure | None:
-    """Forces, moments and, against their limit, motor torques; None for a run without wrenches."""
+def forces(results: Results, device: Device | None) -> Figure:
+    """Forces, moments and, against their limit, motor torques of a run that has wrenches."""
     found, driven = wrenches(results), torques(results, device)
-    if not found:
-        return None
     largest, (_, force, _) = max(found.items(), key=lambda item: item[1][1].max())
     title = f"The largest force is that of the {largest}: {short(force.max())} N"
     labels = ["force (N)", "moment (N.m)", *(["motor torque (N.m)"] if driven else [])]

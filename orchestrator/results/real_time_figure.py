@@ -21,12 +21,10 @@ LEAST = 1e-7
 
 def real_time(
     results: Results, curves: Mapping[str, Histogram] | None = None, more: str = ""
-) -> Figure | None:
-    """The figure of a run in real time, with further `curves` by their labels and `more` said in
-    its title; None for others."""
-    found = results.run.get("real_time")
-    if not found or not found["ticks"]:
-        return None
+) -> Figure:
+    """The figure of a run in real time that had a tick, with further `curves` by their labels and
+    `more` said in its title."""
+    found = results.run["real_time"]
     title = "; ".join(filter(None, (finding(found), more)))
     figure, axes = titled(results, title, "time (ms)", "share of ticks that exceed it")
     histograms = found["histograms"]

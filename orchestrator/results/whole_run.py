@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -106,12 +107,17 @@ def scene_part(results: Results, name: str, kind: Any) -> Any:
     """The table `name` of a run's scene as a record of `kind`, None where the scene has none.
     Raises InputFault where it is not as this version writes it."""
     try:
-        return TypeAdapter(kind | None).validate_python(results.run["scene"][name])
+        return _adapter(kind).validate_python(results.run["scene"][name])
     except KeyError:
         why = "is missing"
     except ValidationError as error:
         why = _first(error)
     raise InputFault(f"{results.folder}/run.json: scene.{name} {why}: run the scene again")
+
+
+@cache  # which takes longer to make than most figures take to draw
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind | None)
 
 
 def _first(error: ValidationError) -> str:

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import hapticlink as hl
-from hapticlink.orchestrator.results import figures
+from hapticlink.orchestrator.results import figures_beside
 from tests.orchestrator.conftest import sets, status
 
 SHORT = {"duration": 0.1, "graphics.rate": 40}
@@ -193,13 +192,13 @@ def test_ctrl_c_raises_with_the_results_so_far(out: str | None, tmp_path: Path) 
 def test_ctrl_c_while_figures_are_drawn_says_so(
     bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    made = figures.figures
+    drawn = figures_beside.pngs
 
-    def interrupted(found: hl.Run) -> dict[str, Figure]:
+    def interrupted(found: hl.Run) -> figures_beside.Pngs:
         os.kill(os.getpid(), signal.SIGINT)
-        return made(found)
+        return drawn(found)
 
-    monkeypatch.setattr(figures, "figures", interrupted)
+    monkeypatch.setattr(figures_beside, "pngs", interrupted)
     assert status("run", bar, "--out", tmp_path) == 1
     assert "has the results of the run, not all of its figures" in capsys.readouterr().err
     assert hl.load(tmp_path).run["end"]["reason"] == "duration"
@@ -231,7 +230,7 @@ def test_a_disk_that_is_full_for_the_figures_keeps_the_run(
             file.write(b"a figure")
         return []
 
-    monkeypatch.setattr("hapticlink.orchestrator.results.figures.save", full)
+    monkeypatch.setattr("hapticlink.orchestrator.results.figure_axes.write", full)
     made = hl.run(bar, out=tmp_path)
     assert made.fault is None
     assert "No space left on device" in caplog.text

@@ -97,7 +97,7 @@ EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.archive", "scip
     [
         (("--help",), (*EQUATIONS, "casadi", "numpy", "pydantic", "fmpy", "matplotlib")),
         (("run", "{bar}", "--no-figures"), (*EQUATIONS, "matplotlib")),
-        (("run", "{bar}"), ("scipy",)),
+        (("run", "{bar}"), ("scipy", "matplotlib")),  # a process beside it draws
         (("info", "{bar}"), ("scipy", "matplotlib")),
     ],
 )
