@@ -20,10 +20,15 @@ def numbers(device: Device) -> dict[str, Any]:
     return {k: v for k, v in asdict(device).items() if isinstance(v, float | int)}
 
 
-def motor_torques(device: Device, wrenches: Field, poses: Field) -> Field:
-    """Torques (N.m), (k, 4), of wrenches (N, N, N.m) at poses (m, m, rad) of the handle, both
-    (k, 3), as the device's motors give them: of least norm, and limited."""
+def torque_function(device: Device) -> ca.Function:
+    """Torques (N.m), (4,), of a wrench (N, N, N.m) at a pose (m, m, rad) of the handle, both (3,),
+    as the device's motors give them: of least norm, and limited."""
     wrench, pose = ca.SX.sym("wrench", 3), ca.SX.sym("pose", 3)
     tau = pantograph.motor_torques(wrench, pose, numbers(device))
-    found = ca.Function("torques", [wrench, pose], [tau]).map(len(wrenches))
+    return ca.Function("torques", [wrench, pose], [tau])
+
+
+def motor_torques(device: Device, wrenches: Field, poses: Field) -> Field:
+    """`torque_function` of wrenches and poses, both (k, 3): (k, 4)."""
+    found = torque_function(device).map(len(wrenches))
     return np.asarray(found(wrenches.T, poses.T)).T

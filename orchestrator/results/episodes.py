@@ -13,23 +13,13 @@ from numpy.typing import NDArray
 
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.force_figure import torques, touching
+from hapticlink.orchestrator.results.marks import FELT, KINDS
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.orchestrator.results.tracking import BRANCH, constrained, of_block
 from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.results.whole_run import scene_part
 
 MARGIN = "haptic_device.workspace_margin"
-FELT = 1e-3
-"""Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
-KINDS = {
-    "folded": ("#cc3311", "graphics copy folded"),
-    "saturated": ("#ee7733", "motors at their limit"),
-    "energy": ("#ddaa00", "energy generated at the user's port"),
-    "constraints": ("#aa3377", "unusual number of constrained directions"),
-    "contacts": ("#4477aa", "contacts"),
-    "outside": ("#777777", "outside the device's workspace"),
-}
-"""Colour and meaning of each kind of episode."""
 
 
 class Episode(NamedTuple):

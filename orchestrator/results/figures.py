@@ -19,8 +19,8 @@ from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.results import figure_axes, mechanism_drawing
-from hapticlink.orchestrator.results.episodes import KINDS, episodes
+from hapticlink.orchestrator.results import figure_axes, marks, mechanism_drawing
+from hapticlink.orchestrator.results.episodes import episodes
 from hapticlink.orchestrator.results.figure_axes import (
     framed,
     last_time,
@@ -124,9 +124,7 @@ def _mechanism(results: Results, linkage: Linkage, table: Table) -> Figure:
         scene_part(results, "contacts", Contacts),
     )
     for label, style, path in _paths(results):
-        axes.plot(
-            *path.T, style, color=mechanism_drawing.RED, lw=0.8, label=plain(f"path of {label}")
-        )
+        axes.plot(*path.T, style, color=marks.RED, lw=0.8, label=plain(f"path of {label}"))
     _mark(results, axes)
     mechanism_drawing.draw(axes, linkage, q[0], q[-1], device, contacts)
     figure.set_size_inches(7.4, 6.4)
@@ -141,7 +139,7 @@ def _mark(results: Results, axes: Axes) -> None:
     time, path = table["time"], table[MECHANISM][:, :2] * 1e3
     marked = [*episodes(results)]
     for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
-        color, label = KINDS[kind]
+        color, label = marks.KINDS[kind]
         spans = [(e.begin - 1e-12, e.end + 1e-12) for e in marked if e.kind == kind]
         parts = [path[slice(*np.searchsorted(time, span))] for span in spans]
         broken = np.vstack([rows for part in parts for rows in (part, [[np.nan, np.nan]])])
@@ -182,7 +180,7 @@ def _trajectories(results: Results) -> Figure:
         axes.plot(*path.T, style, label=plain(label))
     axes.plot(*np.array([path[0] for _, _, path in paths]).T, "k.", label="start")
     if contacts := scene_part(results, "contacts", Contacts):
-        mechanism_drawing.obstacles(axes, contacts)
+        mechanism_drawing.paint(axes, marks.obstacles(contacts), marks.STILL)
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(fontsize="small")
     return figure

@@ -1,26 +1,33 @@
-"""A drawing of a scene's mechanism: bodies, joints, operational points, walls and the device."""
+"""A drawing of a scene's mechanism: paints the marks of `marks.py` with Matplotlib, in mm, and
+writes the names of bodies and joints beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.linkage.poses import poses
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.results import workspace
 from hapticlink.orchestrator.results.figure_axes import plain
-from hapticlink.orchestrator.results.mechanism_geometry import (
+from hapticlink.orchestrator.results.marks import (
     BODIES,
+    ORIGIN,
+    SHAPES,
+    Mark,
+    Place,
+    Point,
     attached,
-    contact_shape,
     outline,
+    outlined,
+    reach,
 )
+from hapticlink.orchestrator.results.picture import Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,11 +35,16 @@ if TYPE_CHECKING:
 
     from hapticlink.orchestrator.scene.scene import Scene
 
-Pose = NDArray[np.float64]
+Points = NDArray[np.float64]
+Frame = Mapping[str, Any]
+Look = dict[str, Any]
 NAMED = 10
 """Number of bodies up to which names are written beside them."""
 MM = 1e3
-RED = "#cc3311"
+SHORTEST, LONGEST = 3.0, 120.0
+"""Of arrows (pt); shorter ones are not drawn."""
+UNDER = ("obstacle", "device", "directions", "ground", "rail", "spring")
+"""Roles that are behind paths."""
 
 
 def draw(
@@ -42,43 +54,24 @@ def draw(
     end: Sequence[float] | None = None,
     device: Device | None = None,
     contacts: Contacts | None = None,
+    others: Mapping[str, Device] | None = None,
 ) -> None:
     """The linkage at joint coordinates q, in mm; its pose at `end` as thin lines; what the links
-    can touch; the arms of the device, its handle at the operational point, and the border of its
-    workspace, as far as they reach into the picture."""
-    drawing = _Drawing(axes, linkage, poses(linkage, [q]))
-    if contacts:
-        obstacles(axes, contacts)
+    can touch; the arms of the devices, each with its handle at its user's point, and the border of
+    the first one's workspace, as far as they reach into the picture."""
+    picture = Picture(linkage, device, contacts, others)
+    frame = picture.at_rest(q)
     if end is not None:
-        _Drawing(axes, linkage, poses(linkage, [end])).outlines()
-    drawing.bodies()
-    drawing.joints()
-    drawing.springs()
-    drawing.points()
+        at_end = {"end": picture.drawn({"q": end})["poses"]}
+        paint(axes, outlined(linkage, "end", "#8c8c8c", "at the end"), at_end, zorder=2)
+    paint(axes, (mark for mark in picture.marks if mark.role != "device"), frame)
+    _names(axes, linkage, frame)
     limits = _limits(axes)
     if device:
-        workspace.beneath(axes, device, drawing.operational_pose(), limits)
+        paint(axes, (mark for mark in picture.marks if mark.role == "device"), frame)
+        workspace.beneath(axes, device, limits)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", xlim=limits[0], ylim=limits[1])
     axes.set_aspect("equal", adjustable="box")
-
-
-def pose(axes: Axes, linkage: Linkage, at: dict[str, Pose]) -> None:
-    """Bodies, joints, springs and points that hands hold, in mm, without names, for poses (1, 3)
-    of the bodies by name."""
-    drawing = _Drawing(axes, linkage, at, names=False)
-    drawing.bodies()
-    drawing.joints()
-    drawing.springs()
-    drawing.points()
-
-
-def _limits(axes: Axes) -> Pose:
-    """Limits of x and y (mm) that contain what is drawn with a margin for names, (2, 2), in a ratio
-    between 3/4 and 4/3; 100 mm about a single point."""
-    found = np.array([axes.dataLim.intervalx, axes.dataLim.intervaly])
-    size = 1.3 * np.ptp(found, axis=1)
-    half = np.maximum(size, 0.75 * size.max() if size.max() > 1e-6 else 100.0) / 2
-    return found.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
 
 
 def figure(scene: Scene, q: Sequence[float]) -> Figure:
@@ -90,232 +83,194 @@ def figure(scene: Scene, q: Sequence[float]) -> Figure:
     FigureCanvasAgg(drawn)
     axes = drawn.add_subplot()
     assert scene.linkage is not None
-    draw(axes, scene.linkage, q, None, scene.device, scene.contacts)
+    draw(axes, scene.linkage, q, None, scene.device, scene.contacts, scene.devices)
     axes.set_title(plain(fill(f"{scene.title} at the start", 70)), fontsize="medium")
     axes.grid(alpha=0.3)
     drawn.legend(fontsize="x-small", ncols=3, loc="outside lower center")
     return drawn
 
 
-class _Drawing:
-    """One pose of a linkage."""
-
-    def __init__(
-        self, axes: Axes, linkage: Linkage, at: dict[str, Pose], names: bool = True
-    ) -> None:
-        self.axes, self.linkage = axes, linkage
-        self._at = {name: found[0] for name, found in at.items()}
-        self._names = names and len(linkage.body) <= NAMED
-
-    def _world(self, body: str, point: Sequence[float] | None) -> Pose:
-        """The place (mm) of a point of a body."""
-        x, y, angle = self._at[body]
-        c, s = np.cos(angle), np.sin(angle)
-        px, py = point or (0.0, 0.0)
-        return np.array([x + c * px - s * py, y + s * px + c * py]) * MM
-
-    def _attached(self, body: str) -> Iterator[Pose]:
-        """What a body holds together (mm), and the pins that slide in it."""
-        yield from (self._world(body, at) for at in attached(self.linkage, body))
-        for loop in self.linkage.loop:
-            if loop.type != "revolute" and loop.bodies[1] == body:
-                yield self._world(loop.bodies[0], loop.at[0])
-
-    def _outline(self, body: Body) -> Pose:
-        """As of mechanism_geometry, with the pins that slide in the body."""
-        return outline([*self._attached(body.name)])
-
-    def _shape(self, body: Body) -> Pose:
-        """The outline (mm) of what a body touches with."""
-        return np.array([self._world(body.name, at) for at in contact_shape(body).tolist()])
-
-    def outlines(self) -> None:
-        """The bodies as thin lines."""
-        for i, body in enumerate(self.linkage.body):
-            corners = self._outline(body)
-            if len(corners) == 1 and body.shape:
-                corners = self._shape(body)
-            closed = np.vstack([corners, corners[:1]])
-            label = "at the end" if i == 0 else None
-            self.axes.plot(*closed.T, color="0.55", lw=1.0, ls="--", zorder=2, label=label)
-
-    def bodies(self) -> None:
-        """Each body with its name, centre of mass and, where it has one, shape for contacts."""
-        from matplotlib.patches import Polygon
-
-        for i, body in enumerate(self.linkage.body):
-            color = BODIES[i % len(BODIES)]
-            corners = self._outline(body)
-            if len(corners) > 2:
-                self.axes.add_patch(
-                    Polygon(corners, fc=(*_rgb(color), 0.25), ec=color, lw=2.5, zorder=3)
-                )
-            else:
-                self.axes.plot(*corners.T, color=color, lw=5, solid_capstyle="round", zorder=3)
-                if len(corners) == 1 and not body.shape:
-                    self.axes.plot(*corners.T, "s", color=color, ms=14, alpha=0.5, zorder=3)
-            if body.shape:
-                filled = (*_rgb(color), 0.25)
-                self.axes.add_patch(
-                    Polygon(self._shape(body), fc=filled, ec=color, lw=0.8, zorder=3)
-                )
-            center = self._world(body.name, body.center)
-            mark = "centre of mass" if i == 0 else None
-            self.axes.plot(*center, "k+", ms=6, mew=1.2, zorder=6, ls="", label=mark)
-            if self._names:
-                self._name(i, body.name, corners, color)
-
-    def joints(self) -> None:
-        """Revolute joints as circles, prismatic ones as sliders on their axis; closures are
-        filled. Joints at one place have their names below each other."""
-        names: dict[tuple[float, ...], list[str]] = {}
-        for joint in self.linkage.joint:
-            if joint.type == "free":
-                continue
-            place = self._world(joint.parent, joint.at_parent)
-            if joint.type == "prismatic":
-                place = self._slider(joint, place)
-            else:
-                self._circle(place, "w")
-            self._ground(joint.parent, place)
-            names.setdefault(tuple(np.round(place, 6)), []).append(joint.name)
-        for loop in self.linkage.loop:
-            place = self._world(loop.bodies[0], loop.at[0])
-            if loop.type != "revolute":
-                self._slot(loop, place)
-            self._circle(place, "k")
-            if "ground" in loop.bodies:
-                self._ground("ground", place)
-        middle = self._extent().mean(axis=0)
-        for at, several in names.items() if self._names else ():
-            right, up = at[0] > middle[0], at[1] > middle[1]
-            offset = (7 if right else -7, 6 if up else -6)  # away from the mechanism
-            where = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
-            self._text(at, "\n".join(several), offset, "0.3", **where)
-        if self.linkage.loop:
-            self.axes.plot([], [], "ko", ms=6, label="joint that closes a loop")
-
-    def _circle(self, place: Pose, fill: str) -> None:
-        self.axes.plot(*place, "o", mfc=fill, mec="k", ms=6, mew=1.2, zorder=5)
-
-    def _ground(self, body: str, place: Pose) -> None:
-        if body == "ground":
-            self.axes.plot(*place, marker=(3, 0, 0), color="0.55", ms=17, zorder=1)
-
-    def _slider(self, joint: Joint, place: Pose) -> Pose:
-        """The place of the slider; its axis is drawn through it."""
-        child = self._world(joint.child, joint.at_child)
-        angle = self._at[joint.parent][2] + (joint.axis or 0.0)
-        along = np.array([np.cos(angle), np.sin(angle)])
-        reach = max(float(np.linalg.norm(child - place)), 0.15 * self._size())
-        ends = np.array([place - 0.3 * reach * along, place + 1.3 * reach * along])
-        if np.dot(child - place, along) < 0:
-            ends = 2 * place - ends
-        self.axes.plot(*ends.T, color="0.4", lw=1, ls="-.", zorder=1)
-        turned = (4, 0, np.degrees(angle) + 45)
-        self.axes.plot(*child, marker=turned, mfc="w", mec="k", ms=12, mew=1.2, zorder=4)
-        return child
-
-    def _slot(self, loop: Loop, pin: Pose) -> None:
-        """The line in which a pin slides, from its point on the body to beyond the pin."""
-        angle = self._at[loop.bodies[1]][2] + (loop.axis or 0.0)
-        along = np.array([np.cos(angle), np.sin(angle)]) * 0.15 * self._size()
-        ends = np.array([self._world(loop.bodies[1], loop.at[1]), pin])
-        ends = ends[np.argsort(ends @ along)] + np.array([-along, along])
-        self.axes.plot(*ends.T, color="0.4", lw=1, ls="-.", zorder=1)
-
-    def _size(self) -> float:
-        """The larger side of `_extent` (mm)."""
-        return float(np.ptp(self._extent(), axis=0).max()) or 100.0
-
-    def _extent(self) -> Pose:
-        """The least and the largest x and y (mm) of all joints and points, (2, 2)."""
-        found = np.array([p for b in self.linkage.body for p in self._attached(b.name)])
-        return np.array([found.min(axis=0), found.max(axis=0)])
-
-    def springs(self) -> None:
-        """Springs and dampers between points of bodies."""
-        for i, spring in enumerate(self.linkage.spring):
-            ends = [self._world(b, at) for b, at in zip(spring.bodies, spring.at, strict=True)]
-            label = "spring or damper" if i == 0 else None
-            self.axes.plot(*_zigzag(*ends).T, color="0.3", lw=1.0, zorder=2, label=label)
-
-    def points(self) -> None:
-        """The points that hands hold."""
-        held = self.linkage.operational_point
-        marks = [(held, "X", "operational point")]
-        marks += [(point, "P", f"point {point.name}") for point in self.linkage.point]
-        for point, mark, label in marks:
-            place = self._world(point.body, point.at)
-            self.axes.plot(*place, mark, color=RED, ms=9, zorder=7, ls="", label=label)
-
-    def operational_pose(self) -> Pose:
-        """Of the operational point: x m, y m, theta rad."""
-        held = self.linkage.operational_point
-        return np.array([*(self._world(held.body, held.at) / MM), self._at[held.body][2]])
-
-    def _name(self, i: int, name: str, corners: Pose, color: str) -> None:
-        """The name of the i-th body: on the inner side of a line, beside a single point."""
-        middle, inward = corners.mean(axis=0), np.array([0.0, 0.7])
-        if len(corners) == 2:
-            low, high = sorted(corners.tolist(), key=lambda corner: corner[1])
-            x, y = np.subtract(high, low)
-            if abs(y) > abs(x):  # neighbours have their names at different heights
-                middle = np.array(low) + (0.6, 0.4)[i % 2] * np.array([x, y])
-            inward = np.array([-y, x]) / np.hypot(x, y)
-            inward = inward if inward @ (self._extent().mean(axis=0) - middle) > 0 else -inward
-        elif len(corners) == 1:
-            right, up = middle > self._extent().mean(axis=0)
-            inward = np.array([0.8 if right else -0.8, -0.6 if up else 0.6])
-        side = "left" if inward[0] > 0.3 else "right" if inward[0] < -0.3 else "center"
-        dark = tuple(0.65 * part for part in _rgb(color))
-        offset = (12 * inward[0], 12 * inward[1])
-        self._text(middle, name, offset, dark, ha=side, va="center")
-
-    def _text(
-        self,
-        place: Sequence[float] | Pose,
-        text: str,
-        offset: tuple[float, float],
-        color: str | tuple[float, ...],
-        **how: Any,
-    ) -> None:
-        halo: dict[str, Any] = {"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7}
-        self.axes.annotate(
-            plain(text), tuple(place), xytext=offset, textcoords="offset points", fontsize="small",
-            color=color, zorder=8, bbox=halo, **how,
-        )  # fmt: skip
+def paint(axes: Axes, marks: Iterable[Mark], frame: Frame, zorder: float | None = None) -> None:
+    """The marks that a frame has the places of."""
+    told: set[str] = {""}
+    for mark in marks:
+        at = [found for each in mark.at if (found := place(frame, each)) is not None]
+        if not at or (mark.when and mark.when not in frame.get("states", ())):
+            continue
+        layer = (1.0 if mark.role in UNDER else 3.0) if zorder is None else zorder
+        look = {"zorder": layer, "label": None if mark.label in told else mark.label}
+        if PAINTERS.get(mark.kind, _shape)(axes, mark, np.array(at), frame, look):
+            told.add(mark.label)
 
 
-def obstacles(axes: Axes, contacts: Contacts) -> None:
-    """Enclosure and obstacles, in mm."""
-    from matplotlib.patches import Circle, Patch, Polygon
-
-    look: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "0.4"}
-    found: list[Patch] = [
-        Circle((d.center[0] * MM, d.center[1] * MM), d.radius * MM, **look) for d in contacts.disc
-    ]
-    found += [Polygon(np.array(p.corners) * MM, **look) for p in contacts.polygon]
-    if found:
-        found[0].set_label("obstacles")
-    if contacts.enclosure:
-        walls = np.array(contacts.enclosure) * MM
-        found.append(Polygon(walls, fill=False, edgecolor="0.4", label="enclosure"))
-    for patch in found:
-        axes.add_patch(patch)
+def place(frame: Frame, of: Place) -> Points | None:
+    """The place (mm) of a point in the frame, (2,)."""
+    found = reach(frame, of.path)
+    return None if found is None else (np.array(found[:2]) + _turned(found, of.point)) * MM
 
 
-def _rgb(color: str) -> tuple[float, float, float]:
-    from matplotlib.colors import to_rgb
+def _turned(pose: Sequence[float], at: Any, by: float = 0.0) -> Points:
+    """Points, (2,) or (k, 2), of the frame of a pose, turned into the world's directions."""
+    angle = by + (pose[2] if len(pose) > 2 else 0.0)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(at) @ [[c, s], [-s, c]]
 
-    return to_rgb(color)
+
+def _area(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    from matplotlib.patches import Polygon
+
+    if mark.fill is None:
+        return _line(axes, mark, np.vstack([at, at[:1]]), frame, look)
+    axes.add_patch(Polygon(at, fc=mark.fill, ec=mark.stroke, lw=mark.width, **look))
+    return True
 
 
-def _zigzag(a: Pose, b: Pose) -> Pose:
-    """A spring's line from a to b."""
+def _line(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    # A line's dashes are multiples of its width.
+    dash: Any = (0, [each / mark.width for each in mark.dash]) if mark.dash else "-"
+    look = look | {"color": mark.stroke, "lw": mark.width, "ls": dash}
+    axes.plot(*at.T, solid_capstyle="round", **look)
+    return True
+
+
+def _rail(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    pose = reach(frame, mark.at[-1].path)
+    along = _turned(pose, (mark.size * MM, 0.0), mark.angle or 0.0)
+    along = -along if np.dot(at[1] - at[0], along) < 0 else along
+    return _line(axes, mark, at + np.array([-along, along]), frame, look)
+
+
+def _spring(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    a, b = at
     along = b - a
     length = float(np.linalg.norm(along)) or 1.0
     across = np.array([-along[1], along[0]]) / length * min(0.04 * length, 6.0)
-    share = np.linspace(0.2, 0.8, 13)
     waves = np.where(np.arange(13) % 2, 1.0, -1.0)[:, None] * across
-    return np.vstack([a, a + share[:, None] * along + waves, b])
+    line = np.vstack([a, a + np.linspace(0.2, 0.8, 13)[:, None] * along + waves, b])
+    return _line(axes, mark, line, frame, look)
+
+
+def _disc(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    from matplotlib.patches import Circle
+
+    x, y = at[0]
+    look = look | {"fc": mark.fill, "ec": mark.stroke, "lw": mark.width}
+    axes.add_patch(Circle((x, y), mark.size * MM, **look))
+    return True
+
+
+def _shape(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    corners = np.array(SHAPES[mark.kind])
+    if mark.angle is not None:
+        corners = _turned(reach(frame, mark.at[-1].path), corners, mark.angle)
+    axes.plot(
+        *at[0], marker=np.vstack([corners, corners[:1]]), ms=2 * np.abs(corners).max(), ls="",
+        mfc=mark.fill or "none", mec=mark.stroke or "none", mew=mark.width, **look,
+    )  # fmt: skip
+    return True
+
+
+def _arrow(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    force = np.array(reach(frame, mark.vector) or (0.0, 0.0))[:2]
+    length = mark.size * float(np.hypot(*force))
+    if length < SHORTEST:
+        return False
+    tip = (*(force * mark.size * min(1.0, LONGEST / length)),)
+    line: Any = {"color": mark.stroke, "lw": mark.width}
+    axes.annotate(
+        "", at[0], tip, textcoords="offset points", annotation_clip=False, zorder=look["zorder"],
+        arrowprops={"arrowstyle": "<|-", "shrinkA": 0, "shrinkB": 0} | line,
+    )  # fmt: skip
+    axes.plot([], [], **line, label=look["label"])
+    return True
+
+
+def _directions(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    size = float(np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1).sum())
+    for way in reach(frame, mark.vector) or ():
+        _line(axes, mark, at[0] + size * np.outer([-1, 1], way), frame, look)
+        look = look | {"label": None}
+    return True
+
+
+PAINTERS = {
+    "area": _area,
+    "line": _line,
+    "rail": _rail,
+    "spring": _spring,
+    "disc": _disc,
+    "arrow": _arrow,
+    "directions": _directions,
+}
+"""By kind of mark; all other kinds are SHAPES."""
+
+
+def _limits(axes: Axes) -> Points:
+    """Limits of x and y (mm) that contain what is drawn with a margin for names, (2, 2), in a ratio
+    between 3/4 and 4/3; 100 mm about a single point."""
+    found = np.array([axes.dataLim.intervalx, axes.dataLim.intervaly])
+    size = 1.3 * np.ptp(found, axis=1)
+    half = np.maximum(size, 0.75 * size.max() if size.max() > 1e-6 else 100.0) / 2
+    return found.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
+
+
+def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
+    """The names of bodies, and of joints away from the middle of the mechanism; those of joints at
+    one place are below each other."""
+    if len(linkage.body) > NAMED:
+        return
+    corners = {
+        body.name: outline([*_world(frame, body.name, [*attached(linkage, body.name)] or [ORIGIN])])
+        for body in linkage.body
+    }
+    every = np.vstack([*corners.values()])
+    middle = (every.min(axis=0) + every.max(axis=0)) / 2
+    for i, (name, found) in enumerate(corners.items()):
+        _name(axes, i, name, found, middle)
+    names: dict[tuple[float, ...], list[str]] = {}
+    for joint in linkage.joint:
+        if joint.type != "free":
+            slides = joint.type == "prismatic"
+            body, at = (joint.child, joint.at_child) if slides else (joint.parent, joint.at_parent)
+            (found,) = _world(frame, body, [at or ORIGIN])
+            names.setdefault(tuple(np.round(found, 6)), []).append(joint.name)
+    for where, several in names.items():
+        right, up = np.array(where) > middle
+        offset = (7 if right else -7, 6 if up else -6)
+        side = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
+        _text(axes, where, "\n".join(several), offset, "0.3", **side)
+
+
+def _world(frame: Frame, body: str, points: Iterable[Point]) -> Iterator[Points]:
+    found = (place(frame, Place(("poses", body), at)) for at in points)
+    return (each for each in found if each is not None)
+
+
+def _name(axes: Axes, i: int, name: str, corners: Points, about: Points) -> None:
+    """The name of the i-th body: on the inner side of a line, beside a single point."""
+    from matplotlib.colors import to_rgb
+
+    middle, inward = corners.mean(axis=0), np.array([0.0, 0.7])
+    if len(corners) == 2:
+        low, high = sorted(corners.tolist(), key=lambda corner: corner[1])
+        x, y = np.subtract(high, low)
+        if abs(y) > abs(x):  # neighbours have their names at different heights
+            middle = np.array(low) + (0.6, 0.4)[i % 2] * np.array([x, y])
+        inward = np.array([-y, x]) / np.hypot(x, y)
+        inward = inward if inward @ (about - middle) > 0 else -inward
+    elif len(corners) == 1:
+        right, up = middle > about
+        inward = np.array([0.8 if right else -0.8, -0.6 if up else 0.6])
+    side = "left" if inward[0] > 0.3 else "right" if inward[0] < -0.3 else "center"
+    dark = tuple(0.65 * part for part in to_rgb(BODIES[i % len(BODIES)]))
+    _text(axes, middle, name, (12 * inward[0], 12 * inward[1]), dark, ha=side, va="center")
+
+
+def _text(
+    axes: Axes, at: Any, text: str, offset: tuple[float, float], color: Any, **how: Any
+) -> None:
+    halo: dict[str, Any] = {"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7}
+    axes.annotate(
+        plain(text), tuple(at), xytext=offset, textcoords="offset points", fontsize="small",
+        color=color, zorder=8, bbox=halo, **how,
+    )  # fmt: skip

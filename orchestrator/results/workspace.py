@@ -81,14 +81,9 @@ def draw(device: Device, start: Pose, title: str) -> Figure:
     return figure
 
 
-def beneath(axes: Axes, device: Device, pose: Field, limits: Field) -> None:
-    """The arms at `pose`, and a shade where the handle cannot be at any theta, within `limits` of x
-    and y (mm), for a drawing in mm."""
-    arms = links(device, [float(value) for value in pose]) * 1e3
-    if np.isfinite(arms).all():
-        for i, arm in enumerate(arms):
-            label = "arms of the device" if i == 0 else None
-            axes.plot(*arm.T, color="0.75", lw=1.5, marker="o", ms=3, zorder=0, label=label)
+def beneath(axes: Axes, device: Device, limits: Field) -> None:
+    """A shade where the handle cannot be at any theta, within `limits` of x and y (mm), for a
+    drawing in mm."""
     x, y = (np.linspace(low, high, 41) for low, high in limits)
     theta = np.linspace(-math.pi, math.pi, 16, endpoint=False)
     poses = np.stack(np.meshgrid(x / 1e3, y / 1e3, theta, indexing="ij"), axis=-1)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.linkage.poses import poses
-from hapticlink.orchestrator.results import mechanism_drawing, summary
-from hapticlink.orchestrator.results.episodes import KINDS, episodes
+from hapticlink.orchestrator.results import summary
+from hapticlink.orchestrator.results.episodes import episodes
 from hapticlink.orchestrator.results.figure_axes import plain, short
-from hapticlink.orchestrator.results.mechanism_drawing import MM, RED
+from hapticlink.orchestrator.results.marks import KINDS, RED
+from hapticlink.orchestrator.results.mechanism_drawing import MM, paint, place
 from hapticlink.orchestrator.view.recorded import Recorded
 
 if TYPE_CHECKING:
@@ -28,8 +28,12 @@ SHORTEST, REST = 2.0, 1.0
 COLORS = 64
 SIZE, DPI = (4.6, 5.0), 80
 """Of the picture of one run (in)."""
-HAND, REACH = "#b85c00", 0.22
-"""Colour of the hand's force, and the share of the picture that the largest one takes."""
+ARROW = 60.0
+"""Length (pt) of the largest force of the hand."""
+LEFT_OUT = ("centre", "directions", "cut")
+"""Roles of marks that are too small for an animation."""
+FITTED = ("obstacle", "body", "handle")
+"""Roles of marks that the picture contains."""
 
 Array = NDArray[np.float64]
 
@@ -55,18 +59,23 @@ class _Panel:
         self.run, self.name, self.times = run, name, times
         self._rows = np.maximum(np.searchsorted(run.times, times + 1e-9, "right") - 1, 0)
         values = run.values()
-        self._poses = poses(run.linkage, values["q"][self._rows].tolist())
         self._x, self._handle = values["x"][:, :2] * MM, values.get("handle")
-        self._force = values.get("F_hand")
+        self._frames = run.frames()
+        most = max((float(np.hypot(*f[:2])) for f in values.get("F_hand", ())), default=0.0)
+        self._marks = [
+            m._replace(size=ARROW / most) if m.kind == "arrow" and most else m
+            for m in run.picture.marks
+            if m.role not in LEFT_OUT
+        ]
         self._episodes = episodes(run.results)
 
     def limits(self) -> Array:
         """Least and largest x and y (mm) of all that moves, (2, 2)."""
+        fixed = [mark for mark in self._marks if mark.role in FITTED]
         found = [self._x]
-        found += [at[:, :2] * MM for name, at in self._poses.items() if name != "ground"]
-        found += [] if self._handle is None else [self._handle[:, :2] * MM]
-        if self.run.contacts and self.run.contacts.enclosure:
-            found.append(np.array(self.run.contacts.enclosure) * MM)
+        for row in self._rows:
+            at = (place(self._frames[row], each) for mark in fixed for each in mark.at)
+            found.append(np.array([each for each in at if each is not None]))
         every = np.vstack(found)
         return np.array([every.min(axis=0), every.max(axis=0)]).T
 
@@ -74,39 +83,15 @@ class _Panel:
         """The k-th frame, within limits of x and y (mm)."""
         axes.clear()
         row = self._rows[k]
-        if self.run.contacts:
-            mechanism_drawing.obstacles(axes, self.run.contacts)
-        axes.plot(*self._x[: row + 1].T, color=RED, lw=0.8, alpha=0.5)
-        self._device(axes, row)
-        at = {name: found[k : k + 1] for name, found in self._poses.items()}
-        mechanism_drawing.pose(axes, self.run.linkage, at)
-        self._hand(axes, row, float(np.ptp(limits[0])))
         axes.set(xlim=limits[0], ylim=limits[1], xticks=[], yticks=[], aspect="equal")
+        axes.plot(*self._x[: row + 1].T, color=RED, lw=0.8, alpha=0.5)
+        paint(axes, self._marks, self._frames[row])
         axes.set_title(plain(self.name), fontsize="medium", fontweight="bold", y=1.0, pad=22)
         for text, y, color in zip(self._said(k, row), (1.02, 0.02), ("0.3", None), strict=True):
             color = color or self._now(k)[1]
             axes.text(
                 0.5, y, plain(text), color=color, ha="center", transform=axes.transAxes, zorder=9
             )
-
-    def _device(self, axes: Axes, row: int) -> None:
-        arms = self.run.picture.arms([] if self._handle is None else self._handle[row].tolist())
-        for i in range(0, len(arms), 3):
-            reached = np.array([point for point in arms[i : i + 3] if point]).reshape(-1, 2) * MM
-            axes.plot(*reached.T, color="0.8", lw=2, zorder=0)
-
-    def _hand(self, axes: Axes, row: int, width: float) -> None:
-        """Handle, force on it, and its way to the operational point."""
-        if self._handle is None:
-            return
-        at = self._handle[row, :2] * MM
-        axes.plot(*np.array([at, self._x[row]]).T, color=RED, lw=1, ls=":", zorder=7)
-        axes.plot(*at, "o", mfc="none", mec=RED, ms=13, mew=2, zorder=7)
-        if self._force is None or not (most := np.hypot(*self._force[:, :2].T).max()):
-            return
-        force = self._force[row, :2] * REACH * width / most
-        arrow = {"arrowstyle": "-|>", "color": HAND, "lw": 2.2, "shrinkA": 0, "shrinkB": 0}
-        axes.annotate("", tuple(at + force), tuple(at), arrowprops=arrow, zorder=8)
 
     def _said(self, k: int, row: int) -> tuple[str, str]:
         """Time and tracking error, and what happens."""

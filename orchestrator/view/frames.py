@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from hapticlink.orchestrator.api.real_time import RealTime
-from hapticlink.orchestrator.results.episodes import FELT
+from hapticlink.orchestrator.results.marks import FELT
+from hapticlink.orchestrator.results.picture import PORT
 from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
 from hapticlink.orchestrator.run.energy.meter import Energy
 
@@ -30,9 +31,10 @@ OF_USER = {
     "n": ("virtual_environment.{at}n_constraints", "virtual_mechanism.{at}n_constraints"),
     "P_c": ("virtual_environment.{at}P_c", "virtual_mechanism.{at}P_c"),
     "margin": ("haptic_device{of}.workspace_margin",),
+    "F_motor": ("controller{of}.F_motor",),
+    "measured": ("haptic_device{of}.x",),
 }
 """The same of each user; what further ones have is in `others` of a frame, by their points."""
-PORT = "user's port"
 SELDOM = 5
 """Turns between two readings of energies and deadlines, which take longer."""
 WINDOW = 1.0
@@ -48,38 +50,34 @@ class Frames:
         self._others = {user: _there(fmus, of_user(user)) for user in live.scene.devices}
         self._turns, self._start = 0, float(live["virtual_mechanism.energy"][0])
         self._past: deque[tuple[float, float, float]] = deque()
-        self._slow: dict[str, Any] = {}
+        self._energy: dict[str, float] = {}
 
     def frame(self, live: RealTime) -> dict[str, Any]:
-        """The newest samples, and now and then `energy` (generated, J, at the user's port and by
-        connection), `light` and the deadlines `missed`."""
+        """The newest samples, `energy` (generated, J, at the user's port and by connection), and
+        now and then `light` and the deadlines `missed`."""
         found: dict[str, Any] = {k: live[name].tolist() for k, name in self._outputs.items()}
         if self._turns % SELDOM == 0:
-            self._slow = self._energies(live)
+            self._energy, found["light"] = self._energies(live)
         elif self._turns % SELDOM == 2:
-            self._slow = {"missed": live.report()["deadlines_missed"]}
-        else:
-            self._slow = {}
+            found["missed"] = live.report()["deadlines_missed"]
         self._turns += 1
         if self._others:
             found["others"] = {
                 user: {k: live[name].tolist() for k, name in outputs.items()}
                 for user, outputs in self._others.items()
             }
-        return {"t": live.time} | found | self._slow
+        return {"t": live.time, "energy": self._energy} | found
 
-    def _energies(self, live: RealTime) -> dict[str, Any]:
+    def _energies(self, live: RealTime) -> tuple[dict[str, float], str]:
         booked = live.energies()
         generated, put_in = generated_and_put_in(live.system, booked)
         self._past.append((live.time, generated, put_in))
         while live.time - self._past[0][0] > WINDOW:
             self._past.popleft()
         _, before, put_before = self._past[0]
-        return {
-            "energy": {PORT: self._port(live, booked)}
-            | {name: e.generated for name, e in booked.items()},
-            "light": light(generated - before, put_in - put_before),
-        }
+        energy = {name: e.generated for name, e in booked.items()}
+        said = light(generated - before, put_in - put_before)
+        return {PORT: self._port(live, booked)} | energy, said
 
     def _port(self, live: RealTime, booked: Mapping[str, Energy]) -> float:
         """The energy generated at the user's port, as results/user_port has it: what the mechanism

@@ -19,6 +19,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.episodes import episodes
+from hapticlink.orchestrator.results.picture import PORT, Picture
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
     further_users,
@@ -28,8 +29,7 @@ from hapticlink.orchestrator.results.tracking import (
 )
 from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.results.whole_run import load_whole, scene_part
-from hapticlink.orchestrator.view.frames import PORT, of_user, shown
-from hapticlink.orchestrator.view.picture import Picture
+from hapticlink.orchestrator.view.frames import of_user, shown
 
 PLACES = ("q", "x", "handle")
 """What a frame cannot be drawn without, of each user."""
@@ -102,10 +102,10 @@ class Recorded:
         made = []
         for i in range(len(self.times)):
             found = {k: v[i].tolist() for k, v in values.items() if np.isfinite(v[i]).all()}
-            frame = self.picture.drawn(_by_user(found))
+            frame = _by_user(found)
             if energy is not None and np.isfinite(energy[i]):
                 frame["energy"] = {PORT: float(energy[i])}
-            made.append(frame)
+            made.append(self.picture.drawn(frame))
         return made
 
     def told(self) -> dict[str, Any]:
@@ -117,7 +117,7 @@ class Recorded:
         return {
             "title": run["scene"]["title"],
             "ending": summary.ending(self.results),
-            "shapes": self.picture.shapes,
+            "marks": [mark._asdict() for mark in self.picture.marks],
             "times": [_rounded(float(t)) for t in self.times],
             "every": self.every,
             "missing": self.missing,

@@ -8,7 +8,7 @@ from pathlib import Path
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folders
-from hapticlink.orchestrator.results.episodes import KINDS
+from hapticlink.orchestrator.results.marks import KINDS, SHAPES
 from hapticlink.orchestrator.results.whole_run import names
 from hapticlink.orchestrator.view import one_file
 from hapticlink.orchestrator.view.recorded import Recorded
@@ -23,7 +23,7 @@ def html(runs: Sequence[Recorded]) -> str:
         run.told() | {"short": name}
         for run, name in zip(runs, names([run.folder for run in runs]), strict=True)
     ]
-    return one_file.page("replay.html", {"runs": told, "kinds": KINDS})
+    return one_file.page("replay.html", {"runs": told, "kinds": KINDS, "shapes": SHAPES})
 
 
 def require_written(path: Path) -> None:

@@ -23,9 +23,10 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
+from hapticlink.orchestrator.results.marks import KINDS, SHAPES
+from hapticlink.orchestrator.results.picture import Picture
 from hapticlink.orchestrator.view import messages
 from hapticlink.orchestrator.view.link import read
-from hapticlink.orchestrator.view.picture import Picture
 
 PAGE = Path(__file__).parent / "page"
 TYPES = {
@@ -64,7 +65,8 @@ class Pages:
         kind = message["type"]
         if kind == "scene":
             self._picture = Picture(*message.pop("picture"))
-            message["shapes"] = self._picture.shapes
+            message["marks"] = [mark._asdict() for mark in self._picture.marks]
+            message |= {"shapes": SHAPES, "kinds": KINDS}
             self._holding = {user: self._holding.get(user) for user in message["users"]}
         elif kind == "frame" and self._picture:
             message = self._picture.drawn(message)

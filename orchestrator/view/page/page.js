@@ -1,6 +1,7 @@
 // The page: the socket to the run, the buttons, and who draws what.
 import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
+import { tags } from "./legend.js";
 import { Stage } from "./stage.js";
 
 const $ = (id) => document.getElementById(id);
@@ -18,7 +19,8 @@ function send(message) {
 const HANDLERS = {
   scene(message) {
     document.title = $("title").textContent = message.title;
-    stage.begin(message.shapes);
+    stage.begin(message.marks, message.shapes);
+    view.kinds = message.kinds;
     charts.begin(message.energies, message.users);
     view.frame = null;
   },
@@ -82,6 +84,10 @@ document.addEventListener("keydown", (event) => {
 function draw() {
   if (view.frame) {
     stage.draw(view.frame);
+    tags($("tags"), view.frame.states.map((state) => {
+      const [kind, user] = state.split(" "), [color, meaning] = view.kinds[kind];
+      return [color, user ? `${meaning}: ${user}` : meaning];
+    }));
     $("time").textContent = `${view.frame.t.toFixed(2)} s`;
   }
   charts.draw();

@@ -1,5 +1,6 @@
 // A replay of one or two recorded runs: time, pictures, charts and episodes.
 import { Charts } from "./charts.js";
+import { tags } from "./legend.js";
 import { Lanes } from "./lanes.js";
 import { Recording } from "./recording.js";
 import { Stage } from "./stage.js";
@@ -27,7 +28,7 @@ function View(recording) {
   $("stages").append(section);
   this.section = section;
   this.stage = new Stage(canvas, legend);
-  this.stage.begin(recording.shapes);
+  this.stage.begin(recording.marks, data.shapes);
 }
 
 // One window on the plane for all frames of all runs, so that pictures can be compared.
@@ -73,26 +74,17 @@ function show() {
   view.changed = true;
 }
 
-function tags(host, shown) {
-  host.replaceChildren(...shown.map(({ kind, said }) => {
-    const tag = document.createElement("li");
-    tag.style.background = data.kinds[kind][0];
-    tag.textContent = said;
-    return tag;
-  }));
-}
-
 function draw() {
   $("time").textContent = `${view.t.toFixed(3)} s`;
   $("slider").value = view.t;
   views.forEach((each, k) => {
     if (each.section.hidden) return;
     const recording = recordings[k], frame = view.frames[k];
-    const others = view.overlaid ? recordings.slice(1).map((r, i) => ({ shapes: r.shapes, frame: view.frames[i + 1], color: SECOND })) : [];
+    const others = view.overlaid ? recordings.slice(1).map((r, i) => ({ marks: r.marks, frame: view.frames[i + 1], color: SECOND })) : [];
     each.stage.draw(frame, others);
     each.about.textContent = view.overlaid ? `in colour; ${recordings.slice(1).map((r) => r.short).join(", ")} in orange`
       : view.t >= recording.end ? recording.ending : "";
-    tags(each.tags, frame.episodes);
+    tags(each.tags, frame.episodes.map(({ kind, said }) => [data.kinds[kind][0], said]));
   });
   charts.draw([0, end], view.t);
   lanes.draw(view.t);

@@ -1,18 +1,16 @@
 // The mechanism on its canvas, and where `pull` is given the pointers that pull the handles: each
 // that of the user whose handle is nearest when it is pressed.
 import { fitted } from "./canvas.js";
-import { Arrows } from "./arrows.js";
-import { drawBody, drawClosure, drawGhost, drawJoint, drawObstacles, drawSpring } from "./shapes.js";
+import { Legend } from "./legend.js";
+import { paint, place, zigzag } from "./painter.js";
 
-const HANDLE = "#cc3311", HAND = "#b85c00", GHOST = "#333a", ARMS = "#c3c7d0", SATURATED = "#ee7733", GENERATED = "#ddaa0099";
-
-// Whether a recorded frame is in an episode of a kind.
-const marked = (frame, kind) => frame.episodes?.some((e) => e.kind === kind);
+const HAND = "#b85c00";
+const FITTED = ["obstacle", "body", "handle"]; // roles of marks that the picture contains
 
 export class Stage {
   constructor(canvas, legend, pull) {
     this.canvas = canvas;
-    this.arrows = new Arrows(legend);
+    this.legend = new Legend(legend);
     this.pulls = new Map(); // by pointer: the user, the target, and when it was sent
     this.limits = null;
     this.bounds = null; // the part of the plane to show, in place of what the first frame has
@@ -53,9 +51,10 @@ export class Stage {
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(end, release);
   }
 
-  begin(shapes) {
+  begin(marks, shapes) {
+    this.marks = marks;
     this.shapes = shapes;
-    this.limits = null;
+    this.limits = this.frame = null;
     this.pulls.clear();
     this.canvas.classList.remove("held");
   }
@@ -72,16 +71,16 @@ export class Stage {
 
   // The part of the plane that is shown (m): all that the first frame has, with a margin.
   frameLimits(frame, open = 0.45) {
-    const handles = users(frame).map(([, user]) => (user.handle ?? user.x).slice(0, 2));
-    const points = [...handles, ...this.shapes.enclosure, ...this.shapes.polygons.flat()];
-    for (const [[x, y], r] of this.shapes.discs) points.push([x - r, y - r], [x + r, y + r]);
-    for (const body of this.shapes.bodies) {
-      for (const at of [...body.outline, ...body.shape]) points.push(place(frame.poses, body.name, at));
+    const fitted = this.marks.filter((mark) => FITTED.includes(mark.role)), points = [];
+    for (const mark of fitted) {
+      for (const [x, y] of mark.at.map((each) => place(frame, each)).filter(Boolean)) {
+        points.push([x - mark.size, y - mark.size], [x + mark.size, y + mark.size]);
+      }
     }
     const xs = points.map((p) => p[0]), ys = points.map((p) => p[1]);
     const low = [Math.min(...xs), Math.min(...ys)], high = [Math.max(...xs), Math.max(...ys)];
     const size = Math.max(high[0] - low[0], high[1] - low[1], 0.02);
-    const margin = this.shapes.enclosure.length ? 0.12 : open;
+    const margin = fitted.some((mark) => mark.label === "enclosure") ? 0.12 : open;
     return [0, 1].map((i) => [low[i] - margin * size, high[i] + margin * size]);
   }
 
@@ -94,91 +93,33 @@ export class Stage {
   toScreen = ([x, y]) => [this.origin[0] + this.scale * x, this.origin[1] - this.scale * y];
   toWorld = (px, py) => [(px - this.origin[0]) / this.scale, (this.origin[1] - py) / this.scale];
 
-  // `others` are runs in the same picture: shapes, frame and color of each.
+  // `others` are runs in the same picture: marks, frame and color of each.
   draw(frame, others = []) {
-    this.frame = frame;
     const { context, width, height } = fitted(this.canvas);
+    if (!this.frame) this.legend.begin(this.marks, frame);
+    this.frame = frame;
     this.limits ??= this.bounds ?? this.frameLimits(frame);
     this.fit(width, height);
-    const shapes = this.shapes, on = (poses) => (body, at) => this.toScreen(place(poses, body, at));
-    const at = on(frame.poses);
-    context.lineJoin = context.lineCap = "round";
-    drawObstacles(context, shapes, this.toScreen, this.scale);
-    const arms = marked(frame, "saturated") ? SATURATED : ARMS;
-    for (const [name, user] of users(frame)) {
-      this.drawArms(context, user.arms, name ? ARMS : arms);
-      this.drawDirections(context, user, width + height);
-    }
-    for (const body of shapes.bodies) drawBody(context, body, at);
-    for (const spring of shapes.springs) drawSpring(context, at(...spring[0]), at(...spring[1]));
-    for (const joint of shapes.joints) drawJoint(context, joint, at, frame.poses);
-    for (const loop of shapes.loops) drawClosure(context, loop, at, frame.poses);
-    const folded = frame.branch_ok?.[0] === 0;
-    if (frame.ghost) for (const body of shapes.bodies) drawGhost(context, body, on(frame.ghost), folded ? HANDLE : GHOST);
-    for (const other of others) this.drawOther(context, other, on(other.frame.poses));
-    for (const [name, user] of users(frame)) this.drawHandle(context, user, HANDLE, name);
-    this.arrows.draw(context, frame, shapes, this.toScreen, at);
+    paint(context, this.marks, frame, this);
+    for (const other of others) paint(context, outlined(other), other.frame, this);
+    for (const [name, user] of users(frame)) this.drawPull(context, user, name);
+    this.legend.draw(frame);
     this.drawScale(context, height);
   }
 
-  drawOther(context, { shapes, frame, color }, at) {
-    for (const body of shapes.bodies) drawGhost(context, body, at, color, []);
-    this.drawHandle(context, frame, color);
-  }
-
-  drawArms(context, arms, color) {
-    if (!arms) return;
-    context.strokeStyle = color;
-    context.lineWidth = 3;
-    for (let i = 0; i < arms.length; i += 3) {
-      const points = arms.slice(i, i + 3).filter(Boolean).map(this.toScreen);
-      context.beginPath();
-      points.forEach((p) => context.lineTo(...p));
-      context.stroke();
-    }
-  }
-
-  drawDirections(context, user, reach) {
-    if (!user.directions?.length) return;
-    const [x, y] = this.toScreen(user.x);
-    context.save();
-    context.strokeStyle = "#aa337788";
-    context.lineWidth = 1.5;
-    context.setLineDash([2, 5]);
-    for (const [dx, dy] of user.directions) {
-      context.beginPath();
-      context.moveTo(x - reach * dx, y + reach * dy);
-      context.lineTo(x + reach * dx, y - reach * dy);
-      context.stroke();
-    }
-    context.restore();
-  }
-
-  drawHandle(context, user, color, name) {
-    const handle = this.toScreen(user.handle ?? user.x), [x, y] = this.toScreen(user.x);
+  // The mouse's spring.
+  drawPull(context, user, name) {
     const held = [...this.pulls.values()].find((pull) => pull.user === name);
-    if (held) {
-      const target = this.toScreen(held.target);
-      drawSpring(context, handle, target, HAND);
-      context.beginPath();
-      context.arc(...target, 4, 0, 7);
-      context.fillStyle = HAND;
-      context.fill();
-    }
-    context.lineWidth = 3;
-    context.strokeStyle = color;
+    if (!held) return;
+    const target = this.toScreen(held.target);
+    context.strokeStyle = context.fillStyle = HAND;
+    context.lineWidth = 1.4;
     context.beginPath();
-    for (const s of [-1, 1]) { context.moveTo(x - 5, y - 5 * s); context.lineTo(x + 5, y + 5 * s); }
+    zigzag(this.toScreen(user.handle), target).forEach((p) => context.lineTo(...p));
     context.stroke();
-    if (!user.handle) return;
     context.beginPath();
-    context.arc(...handle, 9, 0, 7);
-    if (marked(user, "energy")) {
-      context.fillStyle = GENERATED;
-      context.fill();
-    }
-    context.lineWidth = 2;
-    context.stroke();
+    context.arc(...target, 4, 0, 7);
+    context.fill();
   }
 
   drawScale(context, height) {
@@ -198,8 +139,7 @@ export class Stage {
 // The users of a frame: name of the point ("" for the first one's), and what the frame has of them.
 export const users = (frame) => [["", frame], ...Object.entries(frame.others ?? {})];
 
-// The place in the world (m) of a point of a body.
-export function place(poses, body, [px, py]) {
-  const [x, y, angle] = poses[body], c = Math.cos(angle), s = Math.sin(angle);
-  return [x + c * px - s * py, y + s * px + c * py];
-}
+// Bodies and handle of another run in its colour.
+const outlined = ({ marks, color }) => marks
+  .filter(({ role, when }) => ["body", "handle"].includes(role) && !when)
+  .map((mark) => ({ ...mark, stroke: color, fill: null, width: 1.5 }));

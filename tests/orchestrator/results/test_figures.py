@@ -58,8 +58,8 @@ def test_obstacles_and_the_force_of_contacts_are_drawn(tmp_path: Path) -> None:
     assert force == pytest.approx((F[:, 0] ** 2 + F[:, 1] ** 2) ** 0.5)
     assert force.max() > 0
     enclosed = drawn(run("enclosure", tmp_path, "duration=0.2"))
-    (walls,) = enclosed["trajectories"].patches
-    assert walls.get_xy()[:4].min(axis=0) == pytest.approx((-30, -45))
+    walls = enclosed["trajectories"].lines[-1]
+    assert walls.get_xydata().min(axis=0) == pytest.approx((-30, -45))
 
 
 def test_every_hand_s_point_is_drawn(tmp_path: Path) -> None:

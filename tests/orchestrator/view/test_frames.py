@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.view.frames import PORT, Frames
+from hapticlink.orchestrator.results.picture import PORT
+from hapticlink.orchestrator.view.frames import Frames
 from hapticlink.orchestrator.view.scene import viewed
 
 
@@ -21,7 +22,7 @@ def test_the_energy_at_the_users_port_is_that_of_the_results() -> None:
             live.set("hand.stiffness", (100.0, 100.0, 0.0))
             live.set("hand.target", (0.03, 0.03, 0.0))
         seen.append(frames[0].frame(live))
-        if live.time > 0.3 and "energy" in seen[-1]:
+        if live.time > 0.3 and "light" in seen[-1]:
             live.stop()
 
     made = hl.RealTime(viewed("closed-loop", ["haptics.rate=512"])).run(turn)

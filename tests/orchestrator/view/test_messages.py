@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.picture import directions
 from hapticlink.orchestrator.view.frames import light
 from hapticlink.orchestrator.view.messages import Hand, parse
-from hapticlink.orchestrator.view.picture import directions
 from hapticlink.orchestrator.view.scene import viewed
 
 

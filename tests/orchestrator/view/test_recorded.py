@@ -16,6 +16,7 @@ import pytest
 from PIL import Image
 
 import hapticlink as hl
+from hapticlink.orchestrator.results.episodes import episodes
 from hapticlink.orchestrator.view import recorded, replay
 from hapticlink.orchestrator.view.recorded import Recorded
 from hapticlink.orchestrator.view.serve import served
@@ -67,6 +68,8 @@ def told_by(html: str) -> dict[str, Any]:
 
 
 def flat(value: Any) -> list[float]:
+    if isinstance(value, str):
+        return [float(ord(letter)) for letter in value]
     if isinstance(value, dict):
         return flat([*value.values()])
     return [x for each in value for x in flat(each)] if isinstance(value, list) else [value]
@@ -88,6 +91,18 @@ def test_signals_that_are_not_recorded_are_named_and_nothing_stands_in_for_them(
     assert {"haptic_device.x_true", "hand.F", "virtual_environment.q"} <= {*run.missing}
     (frame, *_) = run.frames()
     assert not {"handle", "arms", "F_hand", "ghost"} & {*frame}
+
+
+def test_the_picture_of_a_frame_marks_what_the_episodes_of_its_run_have(tmp_path: Path) -> None:
+    options = {"graphics.rate": 10, "controller.topology": False, "device.torque_limit": 0.02}
+    hl.run("closed-loop", options, out=tmp_path, figures=False)
+    run = Recorded(str(tmp_path))
+    marked = [(t, f["states"]) for t, f in zip(run.times, run.frames(), strict=True)]
+    for kind in ("saturated", "energy"):
+        spans = [e for e in episodes(run.results) if e.kind == kind]
+        expected = [any(e.begin <= t < e.end for e in spans) for t, _ in marked]
+        assert [kind in states for _, states in marked][:-1] == expected[:-1]
+        assert 0 < sum(expected) < len(expected)
 
 
 Change = Callable[[dict[str, Any]], object]
