@@ -19,6 +19,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
+from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator import oscillator
@@ -76,19 +77,22 @@ def system(
     *,
     base: Fraction | None = None,
     between: str | None = None,
-    hold: str | None = None,
+    hold: str | Mapping[str, str] | None = None,
     substeps: int = 1,
+    power: tuple[PowerPort, ...] = (),
+    springs: tuple[SetSpring, ...] = (),
     **others: object,
 ) -> System:
-    """All FMUs at one rate. between: the hold of iterated connections; hold: of all connections."""
+    """All FMUs at one rate. between: the hold of iterated connections; hold: of all connections,
+    or by source."""
     ticks = int(period / base) if base else 1
     steps = int(until / period)
     clock = Clock("haptics", range(0, (steps + 3) * ticks, ticks))
     timeline = Timeline(period / ticks, steps * ticks, (clock,))
     units = tuple(Fmu(name, fmu, "haptics") for name, fmu in fmus.items())
     rows = list(rows)
-    holds = {source: hold for source, _ in rows} if hold else {}
-    rules = Rules(holds=holds, between_plants=between)
+    holds = dict.fromkeys(dict(rows), hold) if isinstance(hold, str) else hold or {}
+    rules = Rules(holds=holds, between_plants=between, power=power, springs=springs)
     connections, _ = connected(units, rows, timeline, rules)
     return System(
         units,
@@ -96,7 +100,33 @@ def system(
         timeline,
         coupling,
         substeps=dict.fromkeys(fmus, substeps),
+        power=power,
+        springs=springs,
         **others,  # type: ignore[arg-type]
+    )
+
+
+def masses(
+    fmus: Mapping[str, Description],
+    period: Fraction,
+    steps: int,
+    hold: str | Mapping[str, str],
+    coupling: str = "jacobi",
+    get_after_set: tuple[str, ...] = ("two",),
+    substeps: int = 1,
+) -> System:
+    """The two-mass oscillator."""
+    return system(
+        fmus,
+        ROWS,
+        coupling,
+        period,
+        steps * period,
+        hold=hold,
+        substeps=substeps,
+        get_after_set=get_after_set,
+        power=POWER,
+        springs=oscillator.SPRINGS,
     )
 
 
@@ -104,7 +134,11 @@ def simulate(made: System, folder: Path) -> tuple[Outcome, Table]:
     return run(Plan(made), RunFolder(folder)), read_table(folder / "haptics.csv")
 
 
+def motion(table: Table) -> NDArray[np.float64]:
+    """Rows x1, v1, x2, v2 of the two-mass oscillator."""
+    return np.stack([table[name] for name in ("one.x", "one.v", "two.x", "two.v")], axis=1)
+
+
 def error(table: Table) -> float:
     """The largest error of a position of the two-mass oscillator."""
-    found = np.stack([table["one.x"], table["two.x"]], axis=1)
-    return float(np.abs(found - oscillator.exact(table["time"])[:, [0, 2]]).max())
+    return float(np.abs(motion(table) - oscillator.exact(table["time"]))[:, [0, 2]].max())

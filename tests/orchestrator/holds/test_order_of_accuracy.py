@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.fmi.description import Description
+from tests.orchestrator import coupled
 from tests.orchestrator.native_mass import held
-from tests.orchestrator.oscillator import WARM, exact, simulate, system
+from tests.orchestrator.oscillator import WARM
 
 Fmus = Mapping[str, Description]
 Hold = str | Mapping[str, str]
@@ -33,9 +34,10 @@ OWN = {"two.F": "lead", "one.x": "foh-derivative", "one.v": "foh-derivative"}
 def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how: object) -> float:
     """The largest error of a position within 1 s after the start."""
     steps = round((1 + WARM) * rate)
-    made = system(fmus, Fraction(1, rate), steps, hold, substeps=substeps, **how)  # type: ignore[arg-type]
-    times, rows = simulate(made, folder)
-    return float(np.abs(rows - exact(times))[:, [0, 2]].max())
+    made = coupled.masses(fmus, Fraction(1, rate), steps, hold, substeps=substeps, **how)  # type: ignore[arg-type]
+    outcome, table = coupled.simulate(made, folder)
+    assert outcome.fault is None
+    return coupled.error(table)
 
 
 @pytest.mark.parametrize(
@@ -104,9 +106,10 @@ def growth(
     fmus: Fmus, folder: Path, step: Fraction, hold: str, substeps: int, steps: int, **how: object
 ) -> float:
     """Of the envelope between the last quarters of a run; 1 is the limit of stability."""
-    made = system(fmus, step, steps, hold, substeps=substeps, **how)  # type: ignore[arg-type]
-    _, rows = simulate(made, folder)
-    size = np.abs(rows / [1.0, 17.0, 1.0, 17.0]).max(axis=1)
+    made = coupled.masses(fmus, step, steps, hold, substeps=substeps, **how)  # type: ignore[arg-type]
+    outcome, table = coupled.simulate(made, folder)
+    assert outcome.fault is None
+    size = np.abs(coupled.motion(table) / [1.0, 17.0, 1.0, 17.0]).max(axis=1)
     quarter = steps // 4
     return float(size[-quarter:].max() / size[-2 * quarter : -quarter].max())
 
@@ -134,7 +137,7 @@ def test_limit_of_stability_to_one_percent(
     get_after_set: bool,
     coupling: str,
 ) -> None:
-    how = {"get_after_set": get_after_set, "coupling": coupling}
+    how = {"get_after_set": ("two",) * get_after_set, "coupling": coupling}
     steps = 500 if substeps > 1 else 2000
     below, above = (
         growth(fmus, tmp_path, Fraction(limit) * part, hold, substeps, steps, **how)

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
-from tests.orchestrator import coupled, oscillator
+from tests.orchestrator import coupled
 from tests.orchestrator.conftest import status
 from tests.orchestrator.holds.test_order_of_accuracy import error, growth
 from tests.orchestrator.native_mass import FLAGS, native
@@ -123,8 +123,8 @@ def test_substeps_change_nothing(fmus: Fmus, tmp_path: Path, hold: str) -> None:
     """Each substep goes on along the same polynomial."""
     rows = []
     for substeps in (1, 3):
-        made = oscillator.system(fmus, Fraction(1, 100), 60, hold, substeps=substeps)
-        rows.append(oscillator.simulate(made, tmp_path)[1])
+        made = coupled.masses(fmus, Fraction(1, 100), 60, hold, substeps=substeps)
+        rows.append(coupled.motion(coupled.simulate(made, tmp_path)[1]))
     np.testing.assert_allclose(rows[0], rows[1], rtol=0, atol=1e-11)
 
 
@@ -146,7 +146,7 @@ def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus: Fmus, tmp_path: P
     constant = {n: native(tmp_path, n, FLAGS[1:]) for n in ("one", "two")}
     assert error(constant, tmp_path, 100, "foh", 1) == pytest.approx(7.08e-3, rel=0.02)
     mixed = {"one": fmus["one"], "two": constant["two"]}
-    made = oscillator.system(mixed, Fraction(1, 100), 10, "foh")
+    made = coupled.masses(mixed, Fraction(1, 100), 10, "foh")
     assert {c.name: held_polynomials.order(made, c) for c in made.connections} == {
         "two.F -> one.F": 1,
         "one.x -> two.x1": 0,
