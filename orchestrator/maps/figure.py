@@ -8,7 +8,6 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
@@ -33,7 +32,6 @@ def draw(made: Map) -> Figure:
     across = 4 if len(panels) % 4 == 0 else min(COLUMNS, len(panels))
     down = -(-len(panels) // across)
     figure = Figure(figsize=(1.2 + 3.8 * across, 0.9 + 3.2 * down), layout="constrained")
-    FigureCanvasAgg(figure)
     all_axes = figure.subplots(down, across, squeeze=False, sharex=True).ravel()
     rates = [abs(r["growth_rate"]) for r in made.of("grid") if "growth_rate" in r]
     top = float(np.quantile(rates, 0.95)) if rates else 1.0

@@ -24,7 +24,6 @@ BOX = 3.4
 def figure(system: System, title: str) -> Figure:
     """The FMUs with rate and timing, in the colour of their clock; each signal with the input that
     it leads to, if that has another name, and with its hold where one bridges two rates."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     names = [fmu.name for fmu in system.fmus]
@@ -38,7 +37,6 @@ def figure(system: System, title: str) -> Figure:
     ]
     size = (max(WIDTH * len(names) + 0.2, 4.0), sum(heights) + 0.75)
     drawn = Figure(figsize=size)
-    FigureCanvasAgg(drawn)
     axes = drawn.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(0, size[0]), ylim=(0, size[1]))
     axes.axis("off")

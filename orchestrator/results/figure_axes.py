@@ -59,7 +59,6 @@ def plain(text: str) -> str:
 def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     """A figure whose title tells where a run ended early, and its axes: one, or one below the other
     for several labels y."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     end = results.run["end"]
@@ -67,7 +66,6 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
         why = _ENDS.get(end["reason"], "a fault ended the run")
         title += f", until {why} at {short(last_time(results))} s"
     figure = Figure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
-    FigureCanvasAgg(figure)
     framed(figure)
     every = figure.subplots(len(y), 1, sharex=True, squeeze=False)[:, 0]
     for axes, label in zip(every, y, strict=True):
@@ -107,10 +105,13 @@ def legend_above_curves(axes: Axes, columns: int) -> None:
 
 def png(figure: Figure) -> bytes:
     """A figure as a PNG, at 150 dots per inch."""
-    canvas: Any = figure.canvas
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     figure.set_dpi(150)
     file = BytesIO()
-    canvas.print_png(file, metadata={"Software": None}, pil_kwargs={"compress_level": 1})
+    FigureCanvasAgg(figure).print_png(
+        file, metadata={"Software": None}, pil_kwargs={"compress_level": 1}
+    )
     return file.getvalue()
 
 

@@ -76,11 +76,9 @@ def draw(
 
 def figure(scene: Scene, q: Sequence[float]) -> Figure:
     """A figure of the scene's mechanism at joint coordinates q."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     drawn = Figure(figsize=(6.4, 5.6), layout="constrained")
-    FigureCanvasAgg(drawn)
     axes = drawn.add_subplot()
     assert scene.linkage is not None
     draw(axes, scene.linkage, q, None, scene.device, scene.contacts, scene.devices)

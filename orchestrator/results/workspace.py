@@ -49,13 +49,11 @@ def _range(of: Range) -> str:
 
 def draw(device: Device, start: Pose, title: str) -> Figure:
     """A drawing of the device at the pose `start`, and of its workspace."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
     space = workspace(device)
     figure = Figure(figsize=(6.4, 5.4), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     shades = (
         (space.some, "0.92", "handle at some theta"),

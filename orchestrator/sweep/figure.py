@@ -89,11 +89,9 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def _axes(wide: bool) -> tuple[Figure, Any]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.4 if wide else 6.4, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.grid(alpha=0.3)
     return figure, axes
