@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,32 +11,6 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.run import step_check
 from hapticlink.orchestrator.run.compiled.library import CHOICE
-
-SLIDER = """
-title = "A slider in oil"
-duration = 2.0
-haptics.rate = 512
-
-[linkage]
-operational_point = {{ body = "slider", at = [0.0, 0.0] }}
-start_velocity = {{ rail = 1.0 }}
-
-[[linkage.body]]
-name = "slider"
-mass = 0.5
-inertia = 1e-3
-
-[[linkage.joint]]
-name = "rail"
-type = "prismatic"
-axis = 0.0
-child = "slider"
-damping = {damping}
-stiffness = {stiffness}
-
-[mechanism]
-substeps = {substeps}
-"""
 
 DEAD_CENTRE = """
 title = "A slider turns a light crank over its dead centre"
@@ -60,13 +35,23 @@ loop = [{ bodies = ["rod", "slider"], at = [[0.25, 0.0], [0.0, 0.0]] }]
 """
 
 
-def slider(folder: Path, z: float, substeps: int = 1, spring: float = 0.0) -> hl.Run:
+@pytest.fixture
+def slider(bar: Path) -> Callable[..., hl.Run]:
     """v' = -(b/m) v - (k/m) x, with z = -b h/m and spring = h sqrt(k/m) at the communication step
     size."""
-    path = folder / "slider.toml"
-    given = {"damping": -z * 0.5 * 512, "stiffness": 0.5 * (512 * spring) ** 2}
-    path.write_text(SLIDER.format(substeps=substeps, **given))
-    return hl.run(path)
+
+    def run(z: float, substeps: int = 1, spring: float = 0.0) -> hl.Run:
+        options = {
+            "duration": 2.0,
+            "haptics.rate": 512,
+            "linkage.start_velocity.slide": 1.0,
+            "linkage.joint.slide.damping": -z * 512,
+            "linkage.joint.slide.stiffness": (512 * spring) ** 2,
+            "mechanism.substeps": substeps,
+        }
+        return hl.run(bar, options)
+
+    return run
 
 
 def rk4(z: float) -> float:
@@ -74,10 +59,12 @@ def rk4(z: float) -> float:
 
 
 @pytest.mark.parametrize("z", [-0.5, -1.0, -2.0, -2.6])
-def test_errors_are_those_of_the_stability_function(tmp_path: Path, z: float) -> None:
+def test_errors_are_those_of_the_stability_function(
+    slider: Callable[..., hl.Run], z: float
+) -> None:
     """v decays from 1: the first step errs most, and changes v most, so that the second is checked,
     too."""
-    found = slider(tmp_path, z).run["step_errors"]["virtual_mechanism"]
+    found = slider(z).run["step_errors"]["virtual_mechanism"]
     apart, first = abs(rk4(z) - rk4(z / 2) ** 2), step_check.FIRST - 1
     assert found["largest"] == pytest.approx(apart, rel=1e-12)
     assert found["time"] == 0
@@ -87,9 +74,9 @@ def test_errors_are_those_of_the_stability_function(tmp_path: Path, z: float) ->
     assert found["sum"] == pytest.approx(total, rel=1e-9)
 
 
-def test_the_sum_is_what_errors_add_up_to(tmp_path: Path) -> None:
+def test_the_sum_is_what_errors_add_up_to(slider: Callable[..., hl.Run]) -> None:
     """A slider on a spring: v = cos(w t); e_k is 2/pi of its amplitude in the mean."""
-    run = slider(tmp_path, 0.0, spring=0.4)
+    run = slider(0.0, spring=0.4)
     v, t = run["haptics"]["virtual_mechanism.v"][:, 0], run["haptics"]["time"]
     error = np.abs(v - np.cos(0.4 * 512 * t)).max()
     assert run.run["step_errors"]["virtual_mechanism"]["sum"] == pytest.approx(
@@ -110,12 +97,12 @@ def test_a_short_episode_is_told(tmp_path: Path) -> None:
     ]
 
 
-def test_a_step_that_is_too_long_is_told_with_its_remedy(tmp_path: Path) -> None:
-    (line,) = slider(tmp_path, -2.0).run["warnings"]
+def test_a_step_that_is_too_long_is_told_with_its_remedy(slider: Callable[..., hl.Run]) -> None:
+    (line,) = slider(-2.0).run["warnings"]
     assert "steps of virtual_mechanism are too long" in line
     assert "mechanism.substeps" in line
-    assert slider(tmp_path, -2.0, substeps=20).run["warnings"] == []
-    assert slider(tmp_path, -0.1).run["warnings"] == []
+    assert slider(-2.0, substeps=20).run["warnings"] == []
+    assert slider(-0.1).run["warnings"] == []
 
 
 def test_light_coupler_under_its_drive_is_told(tmp_path: Path) -> None:
