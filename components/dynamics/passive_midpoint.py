@@ -48,8 +48,6 @@ def require_fitting(mechanism: Mechanism, linkage: Linkage, *, held: bool) -> No
     if mechanism.integrator != "passive-midpoint":
         return
     name = '`mechanism.integrator` = "passive-midpoint"'
-    if linkage.closed and mechanism.formulation != "multipliers":
-        raise ValueError(f'{name} has `mechanism.formulation` = "multipliers"')
     if linkage.closed and mechanism.stabilization == "baumgarte":
         raise ValueError(
             f'{name}: Baumgarte\'s terms add energy; take `mechanism.stabilization` = "projection"'
