@@ -29,13 +29,11 @@ from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.retry import Retry
 from hapticlink.orchestrator.fmi.setter import Places, Setter
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
-from hapticlink.orchestrator.fmi.states import ERROR, WARNING, WithStates
+from hapticlink.orchestrator.fmi.states import WithStates
+from hapticlink.orchestrator.fmi.status import DISCARD, ERROR, FATAL, STATUS, WARNING
 from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
-
-STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
-DISCARD, FATAL = 2, 4
 
 
 class InProcess(WithStates):

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.setter import Places
 from hapticlink.orchestrator.fmi.start_values import wide
-from hapticlink.orchestrator.fmi.states import WARNING
+from hapticlink.orchestrator.fmi.status import WARNING
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 

@@ -8,8 +8,7 @@ from typing import Any
 from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.retry import Saved
-
-WARNING, ERROR = 1, 3
+from hapticlink.orchestrator.fmi.status import ERROR, WARNING
 
 
 class WithStates(Instance):
