@@ -56,15 +56,12 @@ PROJECTED = ("passive-midpoint",)
 ALL = (
     *((i, s) for i in METHODS if i not in PROJECTED for s in ("none", "baumgarte", "projection")),
     *((i, "projection") for i in PROJECTED),
-    ("rk4", "partitioning"),
 )
 FEW = (("semi-implicit-euler", "baumgarte"), ("heun", "projection"), ("rk4", "projection"))
 
 
-def setting(integrator: str, closing: str) -> Mechanism:
-    """closing: a stabilisation of the multipliers, or the formulation that needs none."""
-    named = "formulation" if closing == "partitioning" else "stabilization"
-    return Mechanism(integrator=integrator, **{named: closing})  # type: ignore[arg-type]
+def setting(integrator: str, stabilization: str) -> Mechanism:
+    return Mechanism(integrator=integrator, stabilization=stabilization)  # type: ignore[arg-type]
 
 
 def cases(quick: bool) -> list[Case]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import statistics
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -32,3 +34,10 @@ class Rows:
         with self.path.open("a", newline="") as file:
             csv.writer(file).writerow(flat)
         self.rows[tuple(flat[: self.keys])] = dict(zip(self.columns, flat, strict=True))
+
+
+def quartiles(values: Sequence[float]) -> tuple[float, float, float]:
+    if len(values) < 2:
+        return (values[0],) * 3
+    first, middle, third = statistics.quantiles(values, n=4, method="inclusive")
+    return first, middle, third

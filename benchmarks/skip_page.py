@@ -10,7 +10,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks.rows import Rows
+from benchmarks.rows import Rows, quartiles
 from benchmarks.skip import OFF, ON
 
 COUNTS = ("operations", "calls", "values")
@@ -28,13 +28,6 @@ def ratios(rows: Rows) -> Ratios:
         for name, values in of.items():
             values.append(float(off[name]) / max(float(row[name]), 1e-12))
     return found
-
-
-def quartiles(values: list[float]) -> tuple[float, float, float]:
-    if len(values) < 2:
-        return (values[0],) * 3
-    first, middle, third = statistics.quantiles(values, n=4, method="inclusive")
-    return first, middle, third
 
 
 def write(out: Path, rows: Rows, same: Rows, command: str) -> None:

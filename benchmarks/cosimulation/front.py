@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 
 from benchmarks.cosimulation.measure import APART, SETTINGS
 from benchmarks.cosimulation.points import NONE, Point
-from benchmarks.rows import Rows
+from benchmarks.rows import Rows, quartiles
 
 REFUSED = "refused"
 WORTH = 0.02
@@ -34,10 +33,7 @@ class Measured:
     @property
     def time(self) -> tuple[float, float, float]:
         """Quartiles of the run time (s)."""
-        if len(self.times) < 2:
-            return (self.times[0],) * 3
-        first, middle, third = statistics.quantiles(self.times, n=4, method="inclusive")
-        return first, middle, third
+        return quartiles(self.times)
 
     @property
     def kind(self) -> str:

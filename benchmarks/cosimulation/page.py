@@ -13,7 +13,7 @@ from benchmarks.cosimulation import figure
 from benchmarks.cosimulation.front import Measured, front, measured
 from benchmarks.cosimulation.measure import APART
 from benchmarks.cosimulation.points import CONTACT, ITERATED, LOOP, NONE, STUDY, Point
-from benchmarks.rows import Rows
+from benchmarks.rows import Rows, quartiles
 
 DURATION = 3.0
 RATE = 1024
@@ -144,7 +144,7 @@ def _choices(found: Mapping[str, Sequence[Measured]]) -> Iterator[str]:
         for name, point in _singles(BASES[scene]):
             if m := by.get(point):
                 ratios = [a / b for a, b in zip(m.times, base.times, strict=False)]
-                first, middle, third = Measured(point, tuple(ratios), 0, 0, 0, "").time
+                first, middle, third = quartiles(ratios)
                 why = "too far" if m.end == "duration" else m.end
                 error = f"{m.most:.3g}" + (f", unstable ({why})" if m.unstable else "")
                 spread = f"{middle:.2f} ({first:.2f} to {third:.2f})"

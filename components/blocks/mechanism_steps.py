@@ -14,7 +14,6 @@ from hapticlink.components.contact.unilateral import OneSidedForces
 from hapticlink.components.dynamics import further_points, joint_ports
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.partitioning import Partitioning
 from hapticlink.components.dynamics.passive_midpoint import Applied, PassiveStep
 from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.forces import friction, gravity
@@ -56,10 +55,9 @@ class MechanismSteps:
         return found, ca.vertcat(u, over), ca.vertcat(u, known)
 
     def integrated(self, space: OperationalSpace) -> ca.SX:
-        """By integration of the stabilised equations, followed by projection if chosen; or in
-        independent coordinates."""
+        """By integration of the stabilised equations, followed by projection if chosen."""
         block, model, mechanism, touching = self.block, self.model, self.mechanism, self.touching
-        n, linkage, x, p, t = model.q.numel(), model.linkage, self._state, block.p.vector, block.t
+        n, x, p, t = model.q.numel(), self._state, block.p.vector, block.t
         (efforts,), u, given = self._over([space.terms.efforts + self.applied])
         integrator = integrators.METHODS[mechanism.integrator]
         rates = friction.deflection_rates(model)
@@ -73,16 +71,11 @@ class MechanismSteps:
             efforts += touching.efforts(laws)
             rates = ca.vertcat(rates, touching.state_rates(laws))
         closing = -space.terms.w
-        if linkage.closed and mechanism.stabilization == "baumgarte":
+        if model.linkage.closed and mechanism.stabilization == "baumgarte":
             alpha, beta = block.p["alpha"], block.p["beta"]
             closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
         qdd = space.solver.follow(efforts, closing, refined=integrator.extrapolates)
         ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], {"cse": True})
-        if linkage.closed and mechanism.formulation == "partitioning":
-            independent = Partitioning(model, block.p, ode)
-            if isinstance(integrator, LocatedEvents):
-                integrator = integrator.completed(independent.complete)
-            return independent.step(integrator, x, given, p, t, block.h)
         after = integrators.step(integrator, ode, x, given, p, t, block.h, range(n))
         inertia = space.terms.inertia
         own = inertia if isinstance(inertia, TreeInertia) else TreeInertia(model)

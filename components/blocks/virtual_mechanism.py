@@ -35,7 +35,6 @@ from hapticlink.components.dynamics import (
     further_points,
     joint_ports,
     local_model,
-    partitioning,
     starting_friction,
 )
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
@@ -84,10 +83,9 @@ def virtual_mechanism(
     The parameter `step_size` starts at step_s (s), and `frame_size` at frame_s: defaults depend on
     them (step_defaults.py). length_scale (m) is L where `directions` does not give it. Raises
     AssemblyError where a loop does not close, MasslessError where a massless body is free to move,
-    ValueError for an unknown method, for a formulation that does not fit the other settings and for
-    friction too stiff for step_s.
+    ValueError for an unknown method, for settings that do not fit it and for friction too stiff for
+    step_s.
     """
-    partitioning.require_fitting(mechanism, held=frame_s is not None)
     require_fitting(mechanism, linkage, held=frame_s is not None)
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None

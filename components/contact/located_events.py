@@ -44,17 +44,6 @@ class LocatedEvents(Integrator):
         self.method, self.events, self.functions = method, events, functions
         self.order, self.extrapolates = method.order, method.extrapolates
 
-    def completed(self, complete: ca.Function) -> LocatedEvents:
-        """The same for independent coordinates z: complete is (z, near, p) -> x, and the inputs of
-        a step are (u, near)."""
-        z, near, p = (ca.SX.sym("symbol", complete.numel_in(i)) for i in range(3))
-        u, zdot = ca.SX.sym("u", self.functions.numel_in(2)), ca.SX.sym("zdot", z.numel())
-        x = complete(z, near, p)
-        found = self.functions.call([x, ca.jtimes(x, z, zdot), u, p])
-        arguments = [z, zdot, ca.vertcat(u, near), p]
-        at = ca.Function("events", arguments, found, {"cse": True})
-        return LocatedEvents(self.method, self.events, at)
-
     def step(
         self,
         ode: ca.Function,

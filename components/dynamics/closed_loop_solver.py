@@ -134,6 +134,28 @@ class Regularised(Factored):
         return y
 
 
+class MatrixInertia:
+    """D from its entries as an `Inertia`, D = L diag(d) L' in an `order` of elimination, leaf to
+    root, with pivots d of at least `least`, if given; k as there."""
+
+    def __init__(self, D: ca.SX, k: ca.SX, order: list[int], least: ca.SX | None = None) -> None:
+        self.n, self.k, self._order = D.shape[0], k, order
+        least = None if least is None else least[order]
+        self._factored = Factored(symmetric(D[order, order]), least)
+        self.d = self._placed(self._factored.pivots)
+
+    def inward(self, b: ca.SX) -> ca.SX:
+        return self._placed(self._factored.forward(b[self._order, :]))
+
+    def outward(self, u: ca.SX) -> ca.SX:
+        return self._placed(self._factored.backward(u[self._order, :]))
+
+    def _placed(self, ordered: ca.SX) -> ca.SX:
+        placed = ca.SX(*ordered.shape)
+        placed[self._order, :] = ordered
+        return placed
+
+
 class ClosedLoopSolver:
     """Factors of D and W (m x n), with the number of rows of each closure; for m = 0 it applies
     D^-1."""

@@ -18,6 +18,7 @@ from hapticlink.components import forces
 from hapticlink.components.component import Signals, Variable
 from hapticlink.components.dynamics.articulated_body import FLOOR
 from hapticlink.components.dynamics.assembly import assemble
+from hapticlink.components.dynamics.closed_loop_solver import MatrixInertia
 from hapticlink.components.dynamics.light_bodies import added_inertia
 from hapticlink.components.dynamics.operational_space import Terms
 from hapticlink.components.dynamics.variables import parameters, start_parameters
@@ -70,39 +71,13 @@ def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
     }
 
 
-class DenseInertia:
-    """D from its entries, factored in an order of elimination (leaf to root, as in
-    articulated_body.py): D = L diag(d) L', so D^-1 = L'^-1 diag(d)^-1 L^-1. k: n x 1, see
-    light_bodies.py."""
-
-    def __init__(self, D: ca.SX, k: ca.SX, order: list[int]) -> None:
-        self.n, self.k, self._order = D.shape[0], k, order
-        d, upper, _ = ca.ldl((D + FLOOR * ca.diag(k))[order, order], False)
-        self._back = sorted(range(self.n), key=order.__getitem__)
-        self.d = ca.vec(d)[self._back]
-        self._L = upper.T + ca.SX.eye(self.n)
-
-    def inward(self, b: ca.SX) -> ca.SX:
-        rows: list[ca.SX] = []
-        for i, given in enumerate(self._order):
-            known = sum((self._L[i, j] * rows[j] for j in range(i)), start=0 * b[given, :])
-            rows.append(b[given, :] - known)
-        return ca.vertcat(*rows)[self._back, :]
-
-    def outward(self, u: ca.SX) -> ca.SX:
-        rows = [u[given, :] for given in self._order]
-        for i in reversed(range(self.n)):
-            for j in range(i + 1, self.n):
-                rows[i] = rows[i] - self._L[j, i] * rows[j]
-        return ca.vertcat(*rows)[self._back, :]
-
-
 def held(model: LinkageModel, u: Mapping[str, ca.SX]) -> Terms:
     """The terms of (B.15) from the ports `u`."""
     n, loop = model.q.numel(), model.linkage.closed
     W = u["W"] if loop else ca.SX(0, n)
+    k = added_inertia(model, W)
     return Terms(
-        inertia=DenseInertia(u["D"], added_inertia(model, W), model.leaf_to_root),
+        inertia=MatrixInertia(u["D"] + FLOOR * ca.diag(k), k, model.leaf_to_root),
         W=W,
         w=u["w"] if loop else ca.SX(0, 1),
         J_h=u["J_h"],

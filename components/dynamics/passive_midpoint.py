@@ -30,8 +30,8 @@ from dataclasses import dataclass
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.dynamics.articulated_body import TreeInertia, symmetric
-from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, Factored
+from hapticlink.components.dynamics.articulated_body import TreeInertia
+from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, MatrixInertia
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Linkage, Mechanism
@@ -48,8 +48,6 @@ def require_fitting(mechanism: Mechanism, linkage: Linkage, *, held: bool) -> No
     if mechanism.integrator != "passive-midpoint":
         return
     name = '`mechanism.integrator` = "passive-midpoint"'
-    if linkage.closed and mechanism.formulation != "multipliers":
-        raise ValueError(f'{name} has `mechanism.formulation` = "multipliers"')
     if linkage.closed and mechanism.stabilization == "baumgarte":
         raise ValueError(
             f'{name}: Baumgarte\'s terms add energy; take `mechanism.stabilization` = "projection"'
@@ -79,28 +77,6 @@ class Applied:
 def stops_output() -> Variable:
     text = "steps whose energy balance left only to stop the mechanism: the step is too long"
     return Variable("stops", (), "1", description=text)
-
-
-class Pivoted:
-    """A symmetric matrix A as an `Inertia`, A = L diag(d) L' from leaf to root, with pivots d of at
-    least those of the tree."""
-
-    def __init__(self, A: ca.SX, tree: TreeInertia, leaf_to_root: list[int]) -> None:
-        self.n, self.k, self._order = tree.n, tree.k, leaf_to_root
-        self._factored = Factored(symmetric(A[leaf_to_root, leaf_to_root]), tree.d[leaf_to_root])
-        self.d = ca.SX(tree.d)
-        self.d[leaf_to_root] = self._factored.pivots
-
-    def inward(self, b: ca.SX) -> ca.SX:
-        return self._placed(self._factored.forward(b[self._order, :]))
-
-    def outward(self, u: ca.SX) -> ca.SX:
-        return self._placed(self._factored.backward(u[self._order, :]))
-
-    def _placed(self, ordered: ca.SX) -> ca.SX:
-        placed = ca.SX(*ordered.shape)
-        placed[self._order, :] = ordered
-        return placed
 
 
 class PassiveStep:
@@ -140,7 +116,7 @@ class PassiveStep:
         n, V = self._n, ca.SX.sym("V", model.velocities.numel())
         b, s, A = ca.SX.sym("b", n), ca.SX.sym("s", n), ca.SX.sym("A", n * soft, n * soft)
         tree = TreeInertia(model)
-        inertia = Pivoted(model.D + A, tree, model.leaf_to_root) if soft else tree
+        inertia = MatrixInertia(model.D + A, tree.k, model.leaf_to_root, tree.d) if soft else tree
         solver = ClosedLoopSolver(inertia, model.W, rows(model.linkage))
         a = solver.follow(model.momentum(V) + b, -model.W @ s)
         return ca.Function("solved", [model.q, V, b, A, s, p], [a], {"cse": True})

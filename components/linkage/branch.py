@@ -13,19 +13,15 @@ import numpy as np
 from hapticlink.components.linkage.model import LinkageModel
 
 
-def dependent_coordinates(
-    model: LinkageModel, start: np.ndarray, unseen_first: bool = True
-) -> tuple[list[int], list[int]]:
+def dependent_coordinates(model: LinkageModel, start: np.ndarray) -> tuple[list[int], list[int]]:
     """Rows and columns of W that form a regular block W_d at the start pose, by elimination.
 
-    start: the pose and the flat default parameters, (q, p). Redundant rows are left out. With
-    unseen_first, columns that do not move the operational point are taken first; otherwise the
-    largest pivots are, for a block far from singular.
+    start: the pose and the flat default parameters, (q, p). Redundant rows are left out.
     """
     n = model.q.numel()
     W = ca.Function("W", [model.q, model.p.vector], [model.W])
     A = np.array(W(start[:n], start[n:]), dtype=float)
-    unseen = [unseen_first and not model.J_h[:, j].nnz() for j in range(n)]
+    unseen = [not model.J_h[:, j].nnz() for j in range(n)]
     smallest = 1e-9 * np.abs(A).max()
     chosen: list[int] = []
     columns: list[int] = []

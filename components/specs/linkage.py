@@ -286,9 +286,6 @@ class Mechanism:
 
     integrator: Annotated[str, METHODS.names()] = "rk4"
     """Integration method."""
-    formulation: Literal["multipliers", "partitioning"] = "multipliers"
-    """Formulation of loops (section B.2): Lagrange multipliers with a stabilization, or independent
-    coordinates, which need none."""
     stabilization: Literal["none", "baumgarte", "projection"] = "projection"
     """Stabilisation of the loop closures."""
     directions: bool = False

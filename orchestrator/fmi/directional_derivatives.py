@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.status import WARNING
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 Matrix = NDArray[np.float64]
-WARNING = 1
 
 
 def derivatives(

@@ -25,19 +25,18 @@ from hapticlink.orchestrator.fmi import kept, messages, python_libraries
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
-from hapticlink.orchestrator.fmi.instance import Instance, Vector
-from hapticlink.orchestrator.fmi.retry import Retry, Saved
+from hapticlink.orchestrator.fmi.instance import Vector
+from hapticlink.orchestrator.fmi.retry import Retry
 from hapticlink.orchestrator.fmi.setter import Places, Setter
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
+from hapticlink.orchestrator.fmi.states import WithStates
+from hapticlink.orchestrator.fmi.status import DISCARD, ERROR, FATAL, STATUS, WARNING
 from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
-STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
-WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 
-
-class InProcess(Instance):
+class InProcess(WithStates):
     """An FMU of FMI 2.0 whose library is loaded into this process. `slave`, `gets`, `fewer` and
     `retry` are for the compiled loop."""
 
@@ -46,13 +45,9 @@ class InProcess(Instance):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.retry: Retry | None = None
-        self._saved: dict[int, Saved] = {}
-        self._saved_time: dict[int, float] = {}
         self._initialized = False
-        self._status = 0
         self._setters = 0
         """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
-        self.slave: Any = None
         self.holds_python = False
         self._key = messages.opened()
 
@@ -271,47 +266,6 @@ class InProcess(Instance):
     def finish(self) -> None:
         """Nothing to wait for: `step` returns after doStep."""
 
-    def save(self, slot: int = 0) -> None:
-        if (status := self.slot(slot).save()) > WARNING:
-            raise self.failed(f"fmi{self.description.fmi}GetFMUstate", status)
-        self._saved_time[slot] = self.time
-
-    def slot(self, slot: int) -> Saved:
-        """The storage of a slot, which may not have been saved to."""
-        if slot not in self._saved:
-            self._saved[slot] = Saved(self.slave, self.description.fmi, self.place)
-        return self._saved[slot]
-
-    def rollback(self, slot: int = 0) -> None:
-        if (status := self._saved[slot].restore()) > WARNING:
-            raise self.failed(f"fmi{self.description.fmi}SetFMUstate", status)
-        self.place.time, self.place.ended = self._saved_time[slot], 0
-        self._status = 0
-
-    def serialized(self) -> bytes:
-        state = self._state("Get", "getFMUState")
-        try:
-            found: bytes = self._state("Serialize", "serializeFMUState", state)
-            return found
-        finally:
-            self.slave.freeFMUState(state)
-
-    def deserialize(self, state: bytes) -> None:
-        restored = self._state("DeSerialize", "deserializeFMUState", state)
-        try:
-            self._state("Set", "setFMUState", restored)
-            self.place.setter = 0
-        finally:
-            self.slave.freeFMUState(restored)
-
-    def _state(self, verb: str, method: str, *arguments: Any) -> Any:
-        """The result of FMPy's `method`, which raises an exception for a status of error."""
-        try:
-            return getattr(self.slave, method)(*arguments)
-        except Exception as error:
-            call = f"fmi{self.description.fmi}{verb}FMUstate"
-            raise self.failed(call, getattr(error, "status", ERROR)) from error
-
     # --- ends -----------------------------------------------------------------------------
 
     def failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
@@ -348,8 +302,7 @@ class InProcess(Instance):
             if slave is not None and self._status < FATAL:
                 if self.retry is not None:
                     self.retry.free()
-                for saved in self._saved.values():
-                    saved.free()
+                self.free_states()
                 if self._status < ERROR and self._initialized:
                     terminate = f"fmi{self.description.fmi}Terminate"
                     status = slave.dll[terminate](ctypes.c_void_p(slave.component))

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from fmpy import fmi3
 
-from hapticlink.orchestrator.fmi.in_process import WARNING, InProcess
+from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.setter import Places
 from hapticlink.orchestrator.fmi.start_values import wide
+from hapticlink.orchestrator.fmi.status import WARNING
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.fmi.status import WARNING
 from hapticlink.orchestrator.fmi.transfer import transfers
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 Vector = NDArray[np.float64]
-WARNING = 1
 
 
 class Varying:

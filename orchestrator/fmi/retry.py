@@ -7,15 +7,12 @@ import ctypes
 from collections.abc import Callable
 from typing import Any
 
+from hapticlink.orchestrator.fmi.capabilities import STATE, VARIABLE_STEP
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.place import Place
+from hapticlink.orchestrator.fmi.status import DISCARD, WARNING
 
-WARNING, DISCARD = 1, 2
 HALVINGS = 10
-_NEEDED = {
-    "2": ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate"),
-    "3": ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUState"),
-}
 
 
 class Saved:
@@ -64,7 +61,7 @@ class Retry:
         """The reason why an FMU cannot repeat a step in smaller ones, "" if it can."""
         if description.timing == "sampled":
             return "not retried: a sampled block takes whole periods only"
-        missing = [n for n in _NEEDED[description.fmi] if n not in description.flags]
+        missing = [n for n in (VARIABLE_STEP, STATE[description.fmi]) if n not in description.flags]
         return f"not retried: the FMU lacks {' and '.join(missing)}" if missing else ""
 
     def step(self, time: float, size: float, depth: int = 0) -> int:

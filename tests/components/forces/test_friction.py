@@ -233,8 +233,7 @@ def test_a_linkage_with_a_redundant_loop_sticks_in_all_its_joints():
     np.testing.assert_allclose(held.state["deflection"], deflection, atol=1e-9)
 
 
-@pytest.mark.parametrize("formulation", ["multipliers", "partitioning"])
-def test_a_cut_joint_rubs_as_one_of_the_tree(formulation):
+def test_a_cut_joint_rubs_as_one_of_the_tree():
     """A four-bar with friction, a spring, a damper and a servo in the pivot between coupler and
     rocker, with this pivot cut, and with the rocker's cut instead."""
     crank, coupler, rocker = (
@@ -271,7 +270,7 @@ def test_a_cut_joint_rubs_as_one_of_the_tree(formulation):
         start_velocity={"crank": 8.0},
         **common,
     )
-    runs = [running(cut, 5e-4, formulation=formulation), running(whole, 5e-4)]
+    runs = [running(cut, 5e-4), running(whole, 5e-4)]
     runs[0].put(q=q)
     for _ in range(20):
         first, second = (steps(r, 0.05, 2000).y for r in runs)
@@ -280,18 +279,14 @@ def test_a_cut_joint_rubs_as_one_of_the_tree(formulation):
     assert runs[0].state["deflection"] == pytest.approx(runs[1].state["deflection"], abs=1e-6)
 
 
-def test_formulations_agree_on_friction():
-    """The five-bar slides under a wrench, and sticks once it is gone."""
+def test_a_linkage_with_a_loop_slides_and_sticks():
+    """The five-bar under a wrench, and once it is gone."""
     linkage = five_bar()
     linkage = replace(linkage, joint=tuple(replace(j, friction=5e-3) for j in linkage.joint))
-    poses = []
-    for kind in ("multipliers", "partitioning"):
-        five = running(linkage, formulation=kind)
-        five.set(F_hand=(-0.5, 0.3, 0.0))
-        steps(five, 0.2, 2000)
-        assert np.abs(five.state["qd"]).max() > 0.5
-        five.set(F_hand=(0.0, 0.0, 0.0))
-        steps(five, 2.0, 2000)
-        assert np.abs(five.state["qd"]).max() < 1e-3
-        poses.append(five.state["q"])
-    np.testing.assert_allclose(*poses, atol=1e-5)
+    five = running(linkage)
+    five.set(F_hand=(-0.5, 0.3, 0.0))
+    steps(five, 0.2, 2000)
+    assert np.abs(five.state["qd"]).max() > 0.5
+    five.set(F_hand=(0.0, 0.0, 0.0))
+    steps(five, 2.0, 2000)
+    assert np.abs(five.state["qd"]).max() < 1e-3

@@ -172,7 +172,6 @@ def test_a_stiff_spring_keeps_its_energy():
     ("settings", "held", "told"),
     [
         ({"stabilization": "baumgarte"}, None, "projection"),
-        ({"formulation": "partitioning"}, None, "multipliers"),
         ({}, 1 / 30, "local_model"),
     ],
 )
