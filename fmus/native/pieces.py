@@ -1,25 +1,27 @@
 """Splits long C functions of straight-line code into pieces that compile in linear time.
 
-The time to compile a function grows faster than its length (190,000 statements: 29 s as three
-functions, 12 s in pieces). A piece is a function that is not inlined; the slots of CasADi's work
-vector that it shares with other pieces are in an array `a`, all others are its local variables.
-Every statement stays as it is, so that the results are the same, bit for bit.
+The time to compile a function grows faster than its length, since its registers are allocated in
+quadratic time (N-four-bar of 40 windows, 220,000 statements: 37 s as three functions, 13 s in
+pieces). A piece is a function that is not inlined; the slots of CasADi's work vector that it shares
+with other pieces are in an array `a`, all others are its local variables. A shared slot is read
+right before its first use and written right after its last value: read or written all at once,
+slots are more than registers, move to the stack a second time, and take 25 % longer to run. Every
+statement stays as it is, so that the results are the same, bit for bit.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
-LONGEST = 100_000
-"""Statements that stay one function, since in pieces it takes up to 30 % longer to run: N-four-bar
-of 40 windows, RK4, 86,000 statements, which compile in 15 s, and in 7 s in pieces."""
-PIECE = 300
-FILE = 60
+LONGEST = 30_000
+"""Statements that stay one function, which compiles in 3 s."""
+PIECE = 500
+FILE = 40
 """Pieces in a file."""
 
 _FUNCTION = re.compile(
-    r"^static int (\w+)\(([^)]*)\) \{\n(?:  casadi_real [a\d, ]+;\n)+(.*?)^  return 0;\n\}\n",
+    r"^static int (\w+)\(([^)]*)\) \{\n((?:  casadi_real [a\d, ]+;\n)+)(.*?)^  return 0;\n\}\n",
     re.MULTILINE | re.DOTALL,
 )
 _SLOT = re.compile(r"\ba\d+\b")
@@ -32,7 +34,7 @@ def split(text: str) -> tuple[str, tuple[str, ...]]:
     pieces: list[str] = []
 
     def shortened(found: re.Match[str]) -> str:
-        name, parameters, body = found.groups()
+        name, parameters, declared, body = found.groups()
         statements = body.splitlines(keepends=True)
         if len(statements) <= LONGEST:
             return found[0]
@@ -40,7 +42,7 @@ def split(text: str) -> tuple[str, tuple[str, ...]]:
         for head, piece in _pieces(name, parameters, statements):
             heads.append(head)
             pieces.append(f"{head} {piece}")
-        size = 1 + max(int(slot[1:]) for slot in _SLOT.findall(body))
+        size = 1 + max(int(slot[1:]) for slot in _SLOT.findall(declared))
         calls = (f"  if (part{k}_{name}(arg, res, iw, w, mem, a)) return 1;\n"
                  for k in range(len(heads)))  # fmt: skip
         return (
@@ -68,13 +70,23 @@ def _pieces(name: str, parameters: str, statements: list[str]) -> Iterator[tuple
             live.update(read)
     before: set[str] = set()
     for k, (piece, needed) in enumerate(zip(bounds, reversed(after), strict=True)):
-        written = {slot for slot, _ in slots[piece]} - {""}
-        every = sorted(written.union(*(read for _, read in slots[piece])))
-        declared = f"  casadi_real {', '.join(every)};\n" if every else ""
-        load = _moved("{0}=a[{1}];", before.intersection(every))
-        store = _moved("a[{1}]={0};", written & needed)
+        last = {written: i for i, (written, _) in enumerate(slots[piece])}
+        body: list[str] = []
+        local: set[str] = set()
+        for i, (statement, (written, read)) in enumerate(
+            zip(statements[piece], slots[piece], strict=True)
+        ):
+            for slot in read:
+                if slot in before and slot not in local:
+                    body.append(f"  {slot}=a[{int(slot[1:])}];\n")
+                    local.add(slot)
+            body.append(statement)
+            if written in needed and last[written] == i:
+                body.append(f"  a[{int(written[1:])}]={written};\n")
+            local.update(read, {written} - {""})
+        declared = f"  casadi_real {', '.join(sorted(local))};\n" if local else ""
         head = f"__attribute__((noinline)) int part{k}_{name}({parameters}, casadi_real* a)"
-        yield head, f"{{\n{declared}{load}{''.join(statements[piece])}{store}  return 0;\n}}\n"
+        yield head, f"{{\n{declared}{''.join(body)}  return 0;\n}}\n"
         before = needed
 
 
@@ -82,7 +94,3 @@ def _slots(statement: str) -> tuple[str, list[str]]:
     """The slot that a statement writes ("" for none), and those that it reads."""
     slots = _SLOT.findall(statement)
     return (slots[0], slots[1:]) if statement.startswith("  a") and slots else ("", slots)
-
-
-def _moved(form: str, slots: Iterable[str]) -> str:
-    return "".join(f"  {form.format(slot, int(slot[1:]))}\n" for slot in sorted(slots))
