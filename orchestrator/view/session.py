@@ -12,6 +12,7 @@ from hapticlink.orchestrator.api.real_time import RealTime
 from hapticlink.orchestrator.api.result import Run
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.results.picture import by_user
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.view import messages
 from hapticlink.orchestrator.view.controls import Controls, Settings, users
@@ -102,7 +103,7 @@ class Session:
             {
                 "type": "scene",
                 "title": scene.title,
-                "picture": (scene.linkage, scene.device, scene.contacts, scene.devices),
+                "picture": (scene.linkage, by_user(scene.device, scene.devices), scene.contacts),
                 "users": [*users(scene)],
                 "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
                 "energies": [PORT, *live.energies()],

@@ -183,6 +183,45 @@ def test_a_run_json_that_was_changed_is_bad_input(
     assert "run.json: " in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "\n0.001953125,",
+            "\n0.001953125,7,",
+            "haptics.csv: line 3 has 67 values, not 66: run the",
+        ),
+        ("\n0.001953125,", "\nabc,", "haptics.csv: line 3: time = 'abc' is no number: run the"),
+        ("\n0.00390625,", "\n0.001,", "line 4: time = 0.001 s is before that of the line above"),
+        ("time,", "t,", "haptics.csv: line 1: its first column is 't', not 'time'"),
+    ],
+)
+def test_a_table_that_was_changed_is_bad_input(
+    root: Path, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    table = Path(shutil.copytree(root / "fast", tmp_path / "run")) / "haptics.csv"
+    table.write_text(table.read_text().replace(old, new, 1))
+    with pytest.raises(hl.InputFault, match=re.escape(said)):
+        named([tmp_path / "run"])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_run_without_a_finite_value_has_a_page(root: Path, tmp_path: Path) -> None:
+    run = shutil.copytree(root / "fast", tmp_path / "run")
+    lines = (run / "haptics.csv").read_text().splitlines()
+    lines[1:] = [f"{line.partition(',')[0]}{',nan' * line.count(',')}" for line in lines[1:]]
+    (run / "haptics.csv").write_text("\n".join(lines) + "\n")
+    assert 'alt="mechanism"' not in page.page(named([run]))
+
+
+def test_warnings_alone_are_red(root: Path) -> None:
+    found = named([root / "fast"])
+    found["fast"].run["warnings"] = ["one: 7 steps were repeated"]
+    assert 'class="bad"' not in page.page(found)
+    found["fast"].run["warnings"] += ["warning: a contact is too stiff"]
+    assert '<td class="bad">a contact is too stiff</td>' in page.page(found)
+
+
 def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -> None:
     """As a process that is killed can leave them."""
     folder = shutil.copytree(root / "fast", tmp_path / "run")
