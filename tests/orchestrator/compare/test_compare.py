@@ -18,6 +18,7 @@ import hapticlink as hl
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.compare import numbers, overlay, page, settings
 from hapticlink.orchestrator.compare.again import scene_file
+from hapticlink.orchestrator.results.figures import figures as run_figures
 from hapticlink.orchestrator.results.whole_run import named
 
 
@@ -151,6 +152,15 @@ def test_dollar_signs_of_a_scene_are_no_formula(tmp_path: Path) -> None:
     legend = overlay.figures(runs)["distance"].axes[0].get_legend()
     assert legend
     assert [text.get_text() for text in legend.get_texts()] == [r"\$a\$_{", "_b"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_letters_that_no_font_has_are_replaced(tmp_path: Path) -> None:
+    hl.run("closed-loop", {"duration": 0.05, "title": "闭环 Механизм"}, out=tmp_path / "环")
+    (name, run), *_ = named([tmp_path / "环"]).items()
+    assert "闭环" in page.page({name: run})
+    title = run_figures(run)["mechanism"].axes[0].get_title()
+    assert title.startswith("\N{REPLACEMENT CHARACTER}\N{REPLACEMENT CHARACTER} Механизм at the")
 
 
 @pytest.mark.parametrize(
