@@ -67,7 +67,8 @@ class Session:
         if self._controls is None:
             self._start(live)
         assert self._controls
-        for message in self._link.received():
+        changed = False
+        for message in messages.newest(self._link.received()):
             if isinstance(message, messages.Time):
                 self._time(message.do)
                 continue
@@ -75,8 +76,9 @@ class Session:
                 self._controls.apply(message)
             except InputFault as fault:
                 self._refuse(message, fault)
-            if not isinstance(message, messages.Hand):
-                self._tell_controls()
+            changed = changed or not isinstance(message, messages.Hand)
+        if changed:
+            self._tell_controls()
         self._require_server()
         if (now := time.monotonic()) - self._shown > FRAME:
             self._shown = now
