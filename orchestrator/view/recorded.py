@@ -52,7 +52,8 @@ class Recorded:
         self.folder = folder
         linkage: Linkage | None = scene_part(results, "linkage", Linkage)
         if linkage is None:
-            raise InputFault(f"{folder}: the run has no [linkage]: there is nothing to draw")
+            said = f"there is nothing to draw; `hapticlink report {folder}` has its figures"
+            raise InputFault(f"{folder}: the run has no [linkage]: {said}")
         self.linkage = linkage
         device = scene_part(results, "device", Device)
         self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)
