@@ -37,6 +37,9 @@ from hapticlink.orchestrator.system.assign_holds import misfit
 from hapticlink.orchestrator.system.ports import names
 from hapticlink.orchestrator.system.system import Connection, System
 
+SLOWEST = 1e-3
+"""Rate (Hz) below which a clock would not tick within a session."""
+
 
 class RealTime:
     """A scene that runs in real time and is watched and changed meanwhile, as by a page on which a
@@ -174,9 +177,10 @@ class RealTime:
         fixed = [f for f in fixed if not varies_step(self._simulation.system.fmu[f].description)]
         if fixed:
             raise InputFault(f"rate of {clock}: {fixed[0]} takes steps of one size only")
-        period = 1 / (exact(rate) * timeline.base) if rate > 0 else Fraction(0)
+        period = 1 / (exact(rate) * timeline.base) if SLOWEST <= rate < math.inf else Fraction(0)
         if period < haptics.longest:
-            raise InputFault(f"rate of {clock} = {rate} Hz: give a rate up to that of the haptics")
+            limits = f"from {SLOWEST:g} Hz up to that of the haptics"
+            raise InputFault(f"rate of {clock} = {rate} Hz: give a rate {limits}")
         first, begun, tick = self._loop.previous(clock), self._loop.current(clock), haptics.longest
         most = float(1 - tick / period)
         if not 0 <= jitter <= most:

@@ -130,6 +130,9 @@ def _status(arguments: Sequence[str] | None) -> int:
         if told := plugins.blamed(error):
             say(f"hapticlink: {told}", file=sys.stderr)
             return InputFault.exit_status
+        if isinstance(error, ModuleNotFoundError) and error.name != "hapticlink":
+            say(f"hapticlink: {error}: `hapticlink doctor` tells what is missing", file=sys.stderr)
+            return 1
         from hapticlink.orchestrator.base import internal_error  # slow to load
 
         say(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)

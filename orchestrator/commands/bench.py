@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.commands.options import Out
+from hapticlink.orchestrator.commands.progress import timed
 
 BENCHES = {
     "mechanism": "benchmarks.run:mechanism_bench",
@@ -70,14 +71,14 @@ def bench(
     make = getattr(importlib.import_module(module), name)
     folder = out or root / "results" / FOLDERS.get(what, what)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    command = f"hapticlink bench {what}{' --quick' * quick}"
+    with timed(command), Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(what)
 
         def told(text: str, done: int, total: int) -> None:
             interrupt.check()
             bar.update(task, description=text, completed=done, total=total)
 
-        command = f"hapticlink bench {what}{' --quick' * quick}"
         page = make(folder, quick, told, command)
     print(page or folder / "README.md")
     return 0

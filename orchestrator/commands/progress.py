@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from time import monotonic
 
-from hapticlink.orchestrator.base.say import printable
+from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.base.say import printable, say
+
+DURATIONS = "durations.json"
+"""In the folder of the cache: minutes by command."""
 
 
 @contextmanager
@@ -25,6 +31,33 @@ def progress(
         yield (
             (lambda time: show(time, duration, f"{time:.2f} of {duration:g} s")) if show else None
         )
+
+
+@contextmanager
+def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> Iterator[None]:
+    """Says before a long command how many minutes it took at most on this machine, or `guess`, and
+    keeps how many it takes. Raises Fault where it is interrupted."""
+    from hapticlink.fmus import cache
+    from hapticlink.fmus.atomic_file import atomic_file
+
+    folder, known = cache.folder(), dict[str, float]()
+    if folder:
+        with suppress(OSError, ValueError):
+            known = json.loads((folder / DURATIONS).read_text(encoding="utf-8"))
+    took = known.get(command)
+    told = guess if took is None else f"took up to {took:.1f} minutes here"
+    if not hidden:
+        say(f"{command}: duration {told}, less what is done already", file=sys.stderr)
+    begun = monotonic()
+    try:
+        yield
+    except Interrupted:
+        raise Fault("interrupted; what was finished is kept") from None
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
+        known[command] = max((monotonic() - begun) / 60, took or 0.0)
+        with suppress(OSError), atomic_file(folder / DURATIONS) as unfinished:
+            unfinished.write_text(json.dumps(known, indent=1), encoding="utf-8")
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from hapticlink.orchestrator.commands.options import Out
+from hapticlink.orchestrator.commands.progress import timed
 
 
 def reproduce(*, out: Out = None) -> int:
@@ -16,5 +17,7 @@ def reproduce(*, out: Out = None) -> int:
     def tell(what: str) -> None:
         print(what, file=sys.stderr)
 
-    print(make(out or Path("results/report"), tell))
+    with timed("hapticlink reproduce"):
+        page = make(out or Path("results/report"), tell)
+    print(page)
     return 0

@@ -19,7 +19,7 @@ from hapticlink.orchestrator.commands.options import (
     options,
     tell,
 )
-from hapticlink.orchestrator.commands.progress import counted, waiting
+from hapticlink.orchestrator.commands.progress import counted, timed, waiting
 from hapticlink.orchestrator.commands.sweep import Jobs, Vary
 
 At = Annotated[float, Parameter(help="Time (s) from which on no target, drive or wrench changes.")]
@@ -109,7 +109,8 @@ def _map(
 ) -> tuple[Iterator[str], dict[str, Any]]:
     from hapticlink.orchestrator import api
 
-    with counted(scene, hidden=quiet) as count:
+    command = f"hapticlink stability {scene} --vary {' --vary '.join(vary)}"
+    with timed(command, hidden=quiet), counted(scene, hidden=quiet) as count:
         made = api.stability_map(
             scene, vary, options, out=folder, check=check, seed=seed, jobs=jobs, progress=count
         )

@@ -14,14 +14,13 @@ def study(*, out: Out = None, jobs: Jobs = None) -> int:
     """Study which hold, with which gains, at which graphics rate; write tables, figures and a page
     to OUT (default results/mismatch). Runs are kept in sweeps/mismatch, so that an interrupted
     study can be continued."""
-    from hapticlink.orchestrator.commands.progress import counted
+    from hapticlink.orchestrator.commands.progress import counted, timed
     from hapticlink.orchestrator.study import expected
     from hapticlink.orchestrator.study import study as make
 
     processes = jobs or os.cpu_count() or 1
-    said = f"study: about {expected(processes):.0f} minutes with {processes} processes"
-    say(f"{said}, less what is in sweeps/mismatch already")
-    with counted("study") as tell:
+    guess = f"about {expected(processes):.0f} minutes with {processes} processes"
+    with timed("hapticlink study", guess), counted("study") as tell:
         page = make(
             out or Path("results/mismatch"), Path("sweeps/mismatch"), processes,
             lambda stage, done, of: tell(done, of),

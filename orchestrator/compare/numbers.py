@@ -12,12 +12,13 @@ from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.compare.settings import one_mechanism
 from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.figure_axes import last_time, short
-from hapticlink.orchestrator.results.force_figure import torques, wrenches
+from hapticlink.orchestrator.results.force_figure import all_wrenches, torques
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import (
     MECHANISM,
     constrained,
     folded,
+    further_users,
     has_tracking,
     of_block,
     pose_error,
@@ -79,18 +80,21 @@ def _ended(run: Results) -> Iterator[tuple[str, str]]:
     yield "end", summary.ending(run)
     if fault := run.run.get("fault"):
         yield "fault", fault["message"]
-    yield "warnings", "; ".join(run.run.get("warnings", ())) or "none"
+    said = run.run.get("warnings", ())
+    warnings = [line for line in said if line.startswith("warning: ")]
+    yield "warnings", "; ".join(w.removeprefix("warning: ") for w in warnings) or "none"
+    yield "notes", "; ".join(line for line in said if line not in warnings) or "none"
 
 
 def _did(run: Results, until: float) -> Iterator[tuple[str, str]]:
-    if has_tracking(run):
-        error = pose_error(run)
+    for user in ["", *further_users(run)] if has_tracking(run) else ():
+        error, of = pose_error(run, user), user and f"{user}: "
         distance = error.distance_mm[kept := error.time_s <= until + 1e-12]
         if len(distance):
-            yield "tracking error, largest (mm)", short(distance.max())
-            yield "tracking error, RMS (mm)", short(float(np.sqrt(np.mean(distance**2))))
-            yield "tracking error, largest angle (rad)", short(error.angle_rad[kept].max())
-    for name, (time, force, _) in wrenches(run).items():
+            yield f"{of}tracking error, largest (mm)", short(distance.max())
+            yield f"{of}tracking error, RMS (mm)", short(float(np.sqrt(np.mean(distance**2))))
+            yield f"{of}tracking error, largest angle (rad)", short(error.angle_rad[kept].max())
+    for name, (time, force, _) in all_wrenches(run).items():
         if len(acting := force[time <= until + 1e-12]):
             yield f"largest force, {name} (N)", short(acting.max())
     device = scene_part(run, "device", Device)

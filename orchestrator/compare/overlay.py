@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hapticlink.orchestrator.results.figure_axes import plain, short
-from hapticlink.orchestrator.results.force_figure import wrenches
+from hapticlink.orchestrator.results.force_figure import all_wrenches
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.orchestrator.results.tracking import (
     MECHANISM,
@@ -74,7 +74,7 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
 
 def _force(run: Results) -> tuple[Vector, Vector] | None:
     """The largest force (N) of a kind at each time (s) of the most frequent ones."""
-    found = [(time, force) for time, force, _ in wrenches(run).values()]
+    found = [(time, force) for time, force, _ in all_wrenches(run).values()]
     if not found:
         return None
     at = max((time for time, _ in found), key=len)

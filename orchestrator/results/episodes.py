@@ -5,7 +5,7 @@ Each is found in the samples as they are recorded, and lasts until the first sam
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.force_figure import torques, touching
 from hapticlink.orchestrator.results.marks import FELT, KINDS
+from hapticlink.orchestrator.results.picture import FULL, by_user
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.orchestrator.results.tracking import BRANCH, constrained, of_block
 from hapticlink.orchestrator.results.user_port import user_port
@@ -51,10 +52,12 @@ def _states(results: Results) -> Iterator[tuple[str, Vector, NDArray[np.bool_], 
     """Kind, times (s) of samples, whether each has it, and what is said where it varies."""
     if branch := of_block(results, BRANCH):
         yield "folded", branch["time"], branch[BRANCH] == 0, ""
-    device = scene_part(results, "device", Device)
-    if device and (driven := torques(results, device)):
-        most = np.abs(driven[1]).max(axis=1)
-        yield "saturated", driven[0], most >= device.torque_limit * (1 - 1e-6), ""
+    devices = scene_part(results, "devices", Mapping[str, Device])
+    for user, device in by_user(scene_part(results, "device", Device), devices).items():
+        if driven := torques(results, device, user):
+            most = np.abs(driven[1]).max(axis=1)
+            said = f"{KINDS['saturated'][1]}: {user}" if user else ""
+            yield "saturated", driven[0], most >= FULL * device.torque_limit, said
     if port := user_port(results):
         yield "energy", port.time_s, port.generated_J > FELT, ""
     if counted := constrained(results):

@@ -7,6 +7,7 @@ and `savefig` draws twice, which together takes longer than the rest of a short 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -52,8 +53,21 @@ def short(value: float) -> str:
 
 def plain(text: str) -> str:
     """A text that Matplotlib draws letter by letter; it takes what two dollar signs enclose for a
-    formula, and fails where it is none."""
-    return text.replace("$", r"\$")
+    formula, and fails where it is none. A letter that its fonts lack is a replacement character:
+    `font.family` of a matplotlibrc names others."""
+    there = _letters()
+    known = (c if ord(c) in there or c.isspace() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return "".join(known).replace("$", r"\$")
+
+
+@cache
+def _letters() -> frozenset[int]:
+    """The code points of Matplotlib's fonts."""
+    from matplotlib import font_manager, rcParams
+
+    families = (font_manager.FontProperties(family=[f]) for f in rcParams["font.family"])
+    files = [font_manager.findfont(family) for family in families]
+    return frozenset(code for file in files for code in font_manager.get_font(file).get_charmap())
 
 
 def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -31,18 +32,22 @@ from hapticlink.orchestrator.results.figure_axes import (
 )
 from hapticlink.orchestrator.results.force_figure import (
     ENVIRONMENT,
+    STYLES,
     WRENCHES,
     forces,
     touching,
     wrenches,
 )
+from hapticlink.orchestrator.results.picture import by_user
 from hapticlink.orchestrator.results.real_time_figure import real_time
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
     DEVICE,
     MECHANISM,
     constrained,
+    further_users,
     of_block,
+    pose_error,
     tracking,
 )
 from hapticlink.orchestrator.results.user_port import UserPort, user_port
@@ -81,13 +86,15 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     )  # an SSP has the block, but not its description
     size = len(coordinate_units(linkage)) if linkage else 0
     if linkage and (coordinates := of_block(results, COORDINATES, size)):
-        found["mechanism"] = partial(_mechanism, results, linkage, coordinates)
+        q = coordinates[COORDINATES]
+        if len(q := q[np.isfinite(q).all(axis=1)]):
+            found["mechanism"] = partial(_mechanism, results, linkage, q)
     if of_block(results, MECHANISM, 3):
         found["trajectories"] = partial(_trajectories, results)
         if of_block(results, DEVICE, 3):
             found["distance"] = partial(_distance, results)
     if wrenches(results):
-        found["forces"] = partial(forces, results, scene_part(results, "device", Device))
+        found["forces"] = partial(forces, results, _devices(results))
     if contact := touching(results):
         found["contact"] = partial(_contact, results, *contact)
     if counted := constrained(results):
@@ -115,21 +122,22 @@ def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
     return figure_axes.write(((name, png(figure)) for name, figure in figures.items()), folder)
 
 
-def _mechanism(results: Results, linkage: Linkage, table: Table) -> Figure:
-    q = table[COORDINATES]
+def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
     title = f"{results.run['scene']['title']} at the start and at {short(last_time(results))} s"
     figure, axes = titled(results, title, "x (mm)", "y (mm)")
-    device, contacts = (
-        scene_part(results, "device", Device),
-        scene_part(results, "contacts", Contacts),
-    )
+    contacts, devices = scene_part(results, "contacts", Contacts), _devices(results)
     for label, style, path in _paths(results):
         axes.plot(*path.T, style, color=marks.RED, lw=0.8, label=plain(f"path of {label}"))
     _mark(results, axes)
-    mechanism_drawing.draw(axes, linkage, q[0], q[-1], device, contacts)
+    mechanism_drawing.draw(axes, linkage, q[0], q[-1], devices, contacts)
     figure.set_size_inches(7.4, 6.4)
     figure_axes.legend_below(figure)
     return figure
+
+
+def _devices(results: Results) -> dict[str, Device]:
+    others = scene_part(results, "devices", Mapping[str, Device])
+    return by_user(scene_part(results, "device", Device), others)
 
 
 def _mark(results: Results, axes: Axes) -> None:
@@ -187,15 +195,25 @@ def _trajectories(results: Results) -> Figure:
 
 
 def _distance(results: Results) -> Figure:
-    time, gap = tracking(results)
+    users = {user: pose_error(results, user) for user in ("", *further_users(results))}
+    largest, (time, gap, _) = max(
+        users.items(), key=lambda each: each[1].distance_mm.max(initial=0)
+    )
     at = int(gap.argmax())
     title = (
-        f"Distance of handle to operational point: at most {short(gap[at])} mm, "
+        f"Distance of handle to {_point(largest)}: at most {short(gap[at])} mm, "
         f"at {short(time[at])} s"
     )
     figure, axes = titled(results, title, "time (s)", "distance |x_S - x_D| (mm)")
-    axes.plot(time, gap)
+    for (user, error), style in zip(users.items(), cycle(STYLES)):
+        axes.plot(error.time_s, error.distance_mm, style, label=plain(_point(user)))
+    if len(users) > 1:
+        axes.legend(fontsize="small")
     return figure
+
+
+def _point(user: str) -> str:
+    return f"point {user}" if user else "operational point"
 
 
 def _contact(results: Results, time: Vector, pushing: NDArray[np.bool_]) -> Figure:

@@ -27,7 +27,7 @@ from hapticlink.orchestrator.results.marks import (
     outlined,
     reach,
 )
-from hapticlink.orchestrator.results.picture import Picture
+from hapticlink.orchestrator.results.picture import Picture, by_user
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,15 +51,14 @@ def draw(
     axes: Axes,
     linkage: Linkage,
     q: Sequence[float],
-    end: Sequence[float] | None = None,
-    device: Device | None = None,
+    end: Sequence[float] | None,
+    devices: Mapping[str, Device],
     contacts: Contacts | None = None,
-    others: Mapping[str, Device] | None = None,
 ) -> None:
     """The linkage at joint coordinates q, in mm; its pose at `end` as thin lines; what the links
     can touch; the arms of the devices, each with its handle at its user's point, and the border of
     the first one's workspace, as far as they reach into the picture."""
-    picture = Picture(linkage, device, contacts, others)
+    picture = Picture(linkage, devices, contacts)
     frame = picture.at_rest(q)
     if end is not None:
         at_end = {"end": picture.drawn({"q": end})["poses"]}
@@ -67,9 +66,9 @@ def draw(
     paint(axes, (mark for mark in picture.marks if mark.role != "device"), frame)
     _names(axes, linkage, frame)
     limits = _limits(axes)
-    if device:
+    if devices:
         paint(axes, (mark for mark in picture.marks if mark.role == "device"), frame)
-        workspace.beneath(axes, device, limits)
+        workspace.beneath(axes, devices[""], limits)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", xlim=limits[0], ylim=limits[1])
     axes.set_aspect("equal", adjustable="box")
 
@@ -81,7 +80,7 @@ def figure(scene: Scene, q: Sequence[float]) -> Figure:
     drawn = Figure(figsize=(6.4, 5.6), layout="constrained")
     axes = drawn.add_subplot()
     assert scene.linkage is not None
-    draw(axes, scene.linkage, q, None, scene.device, scene.contacts, scene.devices)
+    draw(axes, scene.linkage, q, None, by_user(scene.device, scene.devices), scene.contacts)
     axes.set_title(plain(fill(f"{scene.title} at the start", 70)), fontsize="medium")
     axes.grid(alpha=0.3)
     drawn.legend(fontsize="x-small", ncols=3, loc="outside lower center")

@@ -25,16 +25,14 @@ RAW = ("ghost", "q", "lambda", "P_c", "F_motor", "measured")
 
 
 class Picture:
-    """The picture of a scene, of `marks`."""
+    """The picture of a scene, of `marks`; devices: by user, the first one's name is empty."""
 
     def __init__(
         self,
         linkage: Linkage,
-        device: Device | None,
+        devices: Mapping[str, Device],
         contacts: Contacts | None,
-        others: Mapping[str, Device] | None = None,
     ) -> None:
-        devices = ({"": device} if device else {}) | dict(others or {})
         self.marks = marks(linkage, contacts, devices)
         self._linkage = linkage
         self._names, self._poses = pose_function(linkage)
@@ -118,6 +116,11 @@ class Picture:
         None where the arm does not reach, which JSON has no NaN for."""
         points = np.asarray(self._arms[user](ca.DM(handle))).T.tolist()
         return [p if np.isfinite(p).all() else None for p in points]
+
+
+def by_user(first: Device | None, others: Mapping[str, Device] | None) -> dict[str, Device]:
+    """The devices of all users by their points; the first one's name is empty."""
+    return ({"": first} if first else {}) | dict(others or {})
 
 
 def directions(P_c: list[float]) -> list[list[float]]:

@@ -11,7 +11,7 @@ import numpy as np
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.results import friction_speed
 from hapticlink.orchestrator.results.figure_axes import short
-from hapticlink.orchestrator.results.force_figure import WRENCHES, wrenches
+from hapticlink.orchestrator.results.force_figure import WRENCHES, all_wrenches
 from hapticlink.orchestrator.results.real_time_figure import finding
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import (
@@ -67,7 +67,7 @@ def numbers(results: Results) -> Iterator[str]:
         table = of_block(results, margin)
         if table and table[margin].min() < 0:
             yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
-    if found := wrenches(results):
+    if found := all_wrenches(results):
         peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())
         yield f"largest forces: {'; '.join(peaks)}"
     if port := user_port(results):
@@ -91,8 +91,9 @@ def numbers(results: Results) -> Iterator[str]:
 
 
 def lines(results: Results) -> Iterator[str]:
-    """One line for each warning: start poses, folded copy, held outputs, repeated steps,
-    contacts, convergence, lost samples, stability, and holds that did not fit."""
+    """One line for each warning, which begins so, and for each note: start poses, folded copy, held
+    outputs, repeated steps, contacts, convergence, lost samples, stability, and holds that did not
+    fit."""
     run = results.run
     yield from _start(results)
     off, frames = folded(results)
@@ -110,7 +111,7 @@ def lines(results: Results) -> Iterator[str]:
     if found := run.get("real_time"):
         yield from _real_time(found)
     if (found := run["iterations"]) and found["unconverged"]:
-        yield f"{found['unconverged']} of {found['steps']} iterated steps did not converge"
+        yield f"warning: {found['unconverged']} of {found['steps']} iterated steps did not converge"
     for fmu, errors in run.get("step_errors", {}).items():
         yield from long_steps(fmu, errors, run["fmus"][fmu].get("block"))
     yield from friction_speed.coarse(results)
@@ -120,13 +121,13 @@ def lines(results: Results) -> Iterator[str]:
     for clock, steps in run["controlled_steps"].items():
         if steps["forced"]:
             few = f"{steps['forced']} of {steps['taken']} steps were accepted at the smallest size"
-            yield f"{clock}: {few} although their error was too large"
+            yield f"warning: {clock}: {few} although their error was too large"
     for name, link in run["links"].items():
         if link["lost"] or link["overtaken"]:
             lost = f"{link['lost']} of {link['sent']} samples were lost"
             yield f"{name}: {lost}, {link['overtaken']} overtaken"
     if why := run.get("unstable"):
-        yield f"{why}: the loop is not passive"
+        yield f"warning: {why}: the loop is not passive"
     refused = sorted(run["holds_that_did_not_fit"].items(), key=lambda item: item[1]["hold"])
     for hold, group in groupby(refused, key=lambda item: item[1]["hold"]):
         found = list(group)
@@ -236,7 +237,7 @@ def replaced(found: Mapping[str, Any]) -> Iterator[str]:
 def _start(results: Results) -> Iterator[str]:
     device = of_block(results, MARGIN)
     if device and of_block(results, DEVICE, 3) and len(device["time"]) and device[MARGIN][0] < 0:
-        yield outside(device[DEVICE][0], device[MARGIN][0])
+        yield f"warning: {outside(device[DEVICE][0], device[MARGIN][0])}"
     linkage = results.run["scene"]["linkage"]
     if not linkage:
         return
@@ -259,7 +260,7 @@ def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
     """A line if assembly moved joints far from their start in [linkage]; q are the assembled joint
     coordinates."""
     if far := list(_far(linkage, q)):
-        yield f"the loops do not close at the given start; assembly moved {', '.join(far)}"
+        yield f"warning: the loops do not close at the given start; assembly moved {', '.join(far)}"
 
 
 def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -116,7 +117,7 @@ def _place(path: Path) -> Path:
 
 
 def load(folder: Path | str) -> Results:
-    """Reads a run's folder. Raises InputFault if it contains no run."""
+    """Reads a run's folder. Raises InputFault if it contains no run, or one that was changed."""
     folder = Path(folder)
     tables: dict[str, Table] = {}
     try:
@@ -134,14 +135,39 @@ def load(folder: Path | str) -> Results:
 
 def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
     """Reads one CSV of a run, or its rows where the run was killed; `others` are the run's other
-    tables."""
-    import csv
-
+    tables. Raises InputFault for a table that is not as a run writes it."""
     if (place := _place(path)) != path:
         return Table(*rows.read(place), {} if others is None else others)
-    with path.open(encoding="utf-8", newline="") as file:
-        columns = tuple(next(csv.reader([file.readline()])))
-        first = file.readline()
-        lines = chain([first], file)  # the text of all of them would take twice what they take
-        values = np.loadtxt(lines, delimiter=",", ndmin=2) if first else np.zeros((0, len(columns)))
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            columns = tuple(next(csv.reader([file.readline()])))
+            first = file.readline()
+            lines = chain([first], file)  # the text of all of them would take twice what they take
+            found = np.loadtxt(lines, delimiter=",", ndmin=2) if first else None
+    except (OSError, ValueError) as error:
+        raise InputFault(f"{path}: {_malformed(path) or error}: run the scene again") from error
+    values = np.zeros((0, len(columns))) if found is None else found
+    why = "" if values.shape[1] == len(columns) else _malformed(path)
+    if columns[:1] != ("time",):
+        why = f"line 1: its first column is {columns[0] if columns else ''!r}, not 'time'"
+    elif not (ordered := np.diff(values[:, 0]) >= 0).all():
+        line = int(ordered.argmin()) + 3
+        why = f"line {line}: time = {values[line - 2, 0]:g} s is before that of the line above"
+    if why:
+        raise InputFault(f"{path}: {why}: run the scene again")
     return Table(columns, values, {} if others is None else others)
+
+
+def _malformed(path: Path) -> str:
+    """The first line of a CSV that has a value too many or too few, or one that is no number."""
+    with path.open(encoding="utf-8", errors="replace", newline="") as file:
+        names, *lines = csv.reader(file)
+    for number, values in enumerate(lines, 2):
+        if len(values) != len(names):
+            return f"line {number} has {len(values)} values, not {len(names)}"
+        for name, value in zip(names, values, strict=True):
+            try:
+                float(value)
+            except ValueError:
+                return f"line {number}: {name} = {value!r} is no number"
+    return ""

@@ -10,7 +10,6 @@ import numpy as np
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 MECHANISM, DEVICE = "virtual_mechanism.x", "haptic_device.x_true"
-BOTH = (MECHANISM, DEVICE)
 BRANCH = "virtual_environment.branch_ok"
 COUNTS = ("virtual_environment.n_constraints", "virtual_mechanism.n_constraints")
 
@@ -31,7 +30,16 @@ def further_users(results: Results) -> list[str]:
 
 def poses(user: str = "") -> tuple[str, str]:
     """The poses of a user's point and handle; the first user's name is empty."""
-    return (f"virtual_mechanism.{user}.x", f"haptic_device_{user}.x_true") if user else BOTH
+    return of_user(MECHANISM, user), of_user(DEVICE, user)
+
+
+def of_user(signal: str, user: str) -> str:
+    """A first user's signal as that of another one, by the point's name: controller_left.F_drift,
+    virtual_mechanism.left.F_env."""
+    block, _, port = signal.partition(".")
+    if not user:
+        return signal
+    return f"{block}.{user}.{port}" if block == "virtual_mechanism" else f"{block}_{user}.{port}"
 
 
 def table_of(results: Results, signal: str) -> Table | None:

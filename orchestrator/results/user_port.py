@@ -11,7 +11,7 @@ displacement of the step that it acts over. A positive value is energy that the 
 without having put it in; friction makes it negative, drives positive. `port_blocks.py` tells which
 block it comes from.
 
-`works` are of single wrenches: on the handle of the hand, the motors, F_T, F_env; of F_env on the
+`works` are of single wrenches: on each handle of its hand, its motors, F_T, F_env; of F_env on the
 mechanism; and of what a mobility held from another rate adds to the motors' wrench,
 M_d (Lambda_held^-1 - Lambda^-1) (F_h + F_drift + F_env): no force crosses a rate there, but a held
 mobility modulates power. It needs the mechanism's own (`mechanism.directions`) and a hold of `zoh`.
@@ -38,6 +38,7 @@ from hapticlink.orchestrator.results.tracking import (
     MECHANISM,
     further_users,
     of_block,
+    of_user,
     poses,
     table_of,
 )
@@ -68,6 +69,7 @@ class UserPort(NamedTuple):
         return {k: float(v) for k, v in found.items()} | {"blocks": blocks, "works": self.works}
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
 def user_port(results: Results) -> UserPort | None:
     """The energy at the user's port; None without hand, handle and mechanism."""
     mechanism, device = of_block(results, ENERGY), of_block(results, DEVICE, 3)
@@ -103,7 +105,8 @@ def _of_hand(results: Results, name: str, position: str, time: Vector) -> Vector
 
 
 def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
-    """The works (J) of single wrenches on the handle, and of contacts on the mechanism."""
+    """The works (J) of single wrenches on the handles, those of further users named by their
+    points, and of contacts on the mechanism."""
     signals = {
         "hand": HAND,
         "motors": "controller.F_motor",
@@ -111,9 +114,11 @@ def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
         "F_env": CONTACT,
     }
     found = {
-        name: float(works(results, signal, DEVICE, time)[0][-1])
+        f"{user}: {name}" if user else name: float(works(results, at, handle, time)[0][-1])
+        for user in ("", *further_users(results))
         for name, signal in signals.items()
-        if of_block(results, signal, 3)
+        if of_block(results, at := of_user(signal, user), 3)
+        and of_block(results, handle := of_user(DEVICE, user), 3)
     }
     if contact := of_block(results, CONTACT, 3):
         on = ideal(contact[CONTACT], contact["time"], contact, MECHANISM, time)

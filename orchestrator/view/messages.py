@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -32,7 +33,7 @@ class Rate:
 
     __pydantic_config__ = STRICT
     type: Literal["rate"]
-    value: Annotated[Number, Field(gt=0, le=1e4)]
+    value: Annotated[Number, Field(ge=0.01, le=1e4)]
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,20 @@ class Time:
 
 
 Message = Hand | Rate | Jitter | Hold | Delay | Gain | Topology | Time
+OF = ("user", "connection", "name")
+"""What tells messages of a type apart."""
 _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Discriminator("type")])
+
+
+def newest(received: Sequence[Message]) -> list[Message]:
+    """The messages without those that a later one undoes: the newest of each control and user."""
+    kept: dict[object, Message] = {}
+    for i, message in enumerate(received):
+        of = next((v for k in OF if (v := getattr(message, k, None)) is not None), "")
+        key: object = i if isinstance(message, Time) else (message.type, of)
+        kept.pop(key, None)
+        kept[key] = message
+    return [*kept.values()]
 
 
 def parse(text: str | bytes) -> Message:

@@ -19,7 +19,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.episodes import episodes
-from hapticlink.orchestrator.results.picture import PORT, Picture
+from hapticlink.orchestrator.results.picture import PORT, Picture, by_user
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
     further_users,
@@ -52,9 +52,10 @@ class Recorded:
         self.folder = folder
         linkage: Linkage | None = scene_part(results, "linkage", Linkage)
         if linkage is None:
-            raise InputFault(f"{folder}: the run has no [linkage]: there is nothing to draw")
+            said = f"there is nothing to draw; `hapticlink report {folder}` has its figures"
+            raise InputFault(f"{folder}: the run has no [linkage]: {said}")
         self.linkage = linkage
-        self.device: Device | None = scene_part(results, "device", Device)
+        device = scene_part(results, "device", Device)
         self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)
         for signal, size in zip(NEEDED, (len(coordinate_units(linkage)), 3), strict=True):
             table = of_block(results, signal, size)
@@ -73,10 +74,10 @@ class Recorded:
         if not drawn.any():
             raise InputFault(f"{folder}: the run has no pose that is finite")
         self.times, self.left_out = self.times[drawn], int((~drawn).sum())
-        device = self.device if "handle" in self.signals else None
         self.users = further_users(results)
         others = scene_part(results, "devices", Mapping[str, Device]) if self.users else {}
-        self.picture = Picture(linkage, device, self.contacts, others)
+        devices = by_user(device if "handle" in self.signals else None, others)
+        self.picture = Picture(linkage, devices, self.contacts)
 
     @property
     def period(self) -> float:

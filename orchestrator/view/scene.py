@@ -17,12 +17,12 @@ def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scen
     """The scene with a spring hand for each user that pulls nowhere yet, of compiled FMUs if the
     options say nothing else, and without its end at the border of the workspace. Raises InputFault
     for a scene without a linkage, or one that has an FMU of the user's in place of a hand."""
-    read = open_scene.load(name, (*written({"packaging": "native"}), *written(options)))
-    if read.linkage is None:
+    if open_scene.load(name, options).linkage is None:
         raise InputFault(
             f"{name}: has no [linkage], so that there is nothing to take hold of; view shows "
             "mechanisms, for instance `hapticlink view closed-loop`"
         )
+    read = open_scene.load(name, (*written({"packaging": "native"}), *written(options)))
     hands = ("hand", *(f"hand_{user}" for user in read.devices))
     if any(fmu.replaces in hands for fmu in read.fmu):
         raise InputFault(

@@ -12,6 +12,7 @@ from hapticlink.orchestrator.api.real_time import RealTime
 from hapticlink.orchestrator.api.result import Run
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.results.picture import by_user
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.view import messages
 from hapticlink.orchestrator.view.controls import Controls, Settings, users
@@ -66,7 +67,8 @@ class Session:
         if self._controls is None:
             self._start(live)
         assert self._controls
-        for message in self._link.received():
+        changed = False
+        for message in messages.newest(self._link.received()):
             if isinstance(message, messages.Time):
                 self._time(message.do)
                 continue
@@ -74,8 +76,9 @@ class Session:
                 self._controls.apply(message)
             except InputFault as fault:
                 self._refuse(message, fault)
-            if not isinstance(message, messages.Hand):
-                self._tell_controls()
+            changed = changed or not isinstance(message, messages.Hand)
+        if changed:
+            self._tell_controls()
         self._require_server()
         if (now := time.monotonic()) - self._shown > FRAME:
             self._shown = now
@@ -102,7 +105,7 @@ class Session:
             {
                 "type": "scene",
                 "title": scene.title,
-                "picture": (scene.linkage, scene.device, scene.contacts, scene.devices),
+                "picture": (scene.linkage, by_user(scene.device, scene.devices), scene.contacts),
                 "users": [*users(scene)],
                 "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
                 "energies": [PORT, *live.energies()],

@@ -81,6 +81,7 @@ function arrow([x, y], force, perNewton) {
   const size = force ? Math.hypot(force[0], force[1]) : 0, length = Math.min(perNewton * size, LONGEST);
   if (!(length > SHORTEST)) return [];
   const ux = force[0] / size, uy = -force[1] / size, tip = [x + length * ux, y + length * uy];
-  const head = [5, -5].map((w) => [tip[0] - 10 * ux + w * uy, tip[1] - 10 * uy - w * ux]);
-  return [[[x, y], [tip[0] - 6 * ux, tip[1] - 6 * uy]], [tip, ...head]];
+  const long = Math.min(10, length), wide = long / 2;
+  const head = [wide, -wide].map((w) => [tip[0] - long * ux + w * uy, tip[1] - long * uy - w * ux]);
+  return [[[x, y], [tip[0] - long * ux, tip[1] - long * uy]], [tip, ...head]];
 }

@@ -18,6 +18,7 @@ import hapticlink as hl
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.compare import numbers, overlay, page, settings
 from hapticlink.orchestrator.compare.again import scene_file
+from hapticlink.orchestrator.results.figures import figures as run_figures
 from hapticlink.orchestrator.results.whole_run import named
 
 
@@ -153,6 +154,15 @@ def test_dollar_signs_of_a_scene_are_no_formula(tmp_path: Path) -> None:
     assert [text.get_text() for text in legend.get_texts()] == [r"\$a\$_{", "_b"]
 
 
+@pytest.mark.filterwarnings("error")
+def test_letters_that_no_font_has_are_replaced(tmp_path: Path) -> None:
+    hl.run("closed-loop", {"duration": 0.05, "title": "闭环 Механизм"}, out=tmp_path / "环")
+    (name, run), *_ = named([tmp_path / "环"]).items()
+    assert "闭环" in page.page({name: run})
+    title = run_figures(run)["mechanism"].axes[0].get_title()
+    assert title.startswith("\N{REPLACEMENT CHARACTER}\N{REPLACEMENT CHARACTER} Механизм at the")
+
+
 @pytest.mark.parametrize(
     ("keys", "value"),
     [
@@ -181,6 +191,45 @@ def test_a_run_json_that_was_changed_is_bad_input(
     (folder / "run.json").write_text(json.dumps(run))
     assert called("report", str(folder), "--out", str(tmp_path / "page.html")) == 2
     assert "run.json: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "\n0.001953125,",
+            "\n0.001953125,7,",
+            "haptics.csv: line 3 has 67 values, not 66: run the",
+        ),
+        ("\n0.001953125,", "\nabc,", "haptics.csv: line 3: time = 'abc' is no number: run the"),
+        ("\n0.00390625,", "\n0.001,", "line 4: time = 0.001 s is before that of the line above"),
+        ("time,", "t,", "haptics.csv: line 1: its first column is 't', not 'time'"),
+    ],
+)
+def test_a_table_that_was_changed_is_bad_input(
+    root: Path, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    table = Path(shutil.copytree(root / "fast", tmp_path / "run")) / "haptics.csv"
+    table.write_text(table.read_text().replace(old, new, 1))
+    with pytest.raises(hl.InputFault, match=re.escape(said)):
+        named([tmp_path / "run"])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_run_without_a_finite_value_has_a_page(root: Path, tmp_path: Path) -> None:
+    run = shutil.copytree(root / "fast", tmp_path / "run")
+    lines = (run / "haptics.csv").read_text().splitlines()
+    lines[1:] = [f"{line.partition(',')[0]}{',nan' * line.count(',')}" for line in lines[1:]]
+    (run / "haptics.csv").write_text("\n".join(lines) + "\n")
+    assert 'alt="mechanism"' not in page.page(named([run]))
+
+
+def test_warnings_alone_are_red(root: Path) -> None:
+    found = named([root / "fast"])
+    found["fast"].run["warnings"] = ["one: 7 steps were repeated"]
+    assert 'class="bad"' not in page.page(found)
+    found["fast"].run["warnings"] += ["warning: a contact is too stiff"]
+    assert '<td class="bad">a contact is too stiff</td>' in page.page(found)
 
 
 def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -> None:

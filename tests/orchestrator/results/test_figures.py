@@ -3,10 +3,12 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import figure_axes, figures, tables
+from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.sweep import title
 
 
@@ -68,6 +70,21 @@ def test_every_hand_s_point_is_drawn(tmp_path: Path) -> None:
     assert left.get_label() == "point left"
     expected = found.haptics["virtual_mechanism.left.x"][:, 0] * 1e3
     assert left.get_xdata() == pytest.approx(expected)
+
+
+def test_both_users_are_drawn_and_their_works_are_told(tmp_path: Path) -> None:
+    """A held force times the displacement of the step over which it acts."""
+    found = run("two-users", tmp_path, "duration=0.5")
+    axes, r = drawn(found), found.haptics
+    apart = (r["virtual_mechanism.left.x"] - r["haptic_device_left.x_true"])[:, :2] * 1e3
+    assert axes["distance"].lines[1].get_ydata() == pytest.approx(np.hypot(*apart.T), abs=1e-12)
+    curves = {line.get_label(): line.get_ydata() for line in axes["forces"].lines}
+    F, x = r["hand_left.F"], r["haptic_device_left.x_true"]
+    assert curves["left: hand, F_hand"] == pytest.approx(np.hypot(*F[:, :2].T))
+    work = float((F[:-1] * np.diff(x, axis=0)).sum())
+    port = user_port(found)
+    assert port
+    assert port.works["left: hand"] == pytest.approx(work, rel=1e-9)
 
 
 def test_a_sampled_spring_shows_its_energy(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:
     }
     assert list(summary.lines(found))[1:] == [
         "one: 7 steps were discarded and repeated with smaller ones",
-        "2 of 5 iterated steps did not converge",
+        "warning: 2 of 5 iterated steps did not converge",
         "a.y -> b.u: 2 of 9 samples were lost, 1 overtaken",
         "zoh instead of the default hold passive for b.u, b.u: no power",
     ]

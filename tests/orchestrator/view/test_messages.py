@@ -12,7 +12,7 @@ import pytest
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.picture import directions
 from hapticlink.orchestrator.view.frames import light
-from hapticlink.orchestrator.view.messages import Hand, parse
+from hapticlink.orchestrator.view.messages import Gain, Hand, Time, newest, parse
 from hapticlink.orchestrator.view.scene import viewed
 
 
@@ -42,6 +42,7 @@ def test_a_pull_is_read() -> None:
         '{"type": "hand", "at": null, "user": 1}',
         '{"type": "jitter", "value": 1.0}',
         '{"type": "rate", "value": 0}',
+        '{"type": "rate", "value": 1e-320}',
         '{"type": "rate", "value": -3}',
         '{"type": "rate", "value": true}',
         '{"type": "delay", "connection": "a", "value": 2}',
@@ -96,3 +97,11 @@ def test_the_mouse_takes_the_place_of_the_hand() -> None:
     two = viewed("two-users")
     assert two.hands["left"] == two.hand
     assert viewed("closed-loop", ["packaging=python"]).packaging == "python"
+
+
+def test_of_many_messages_the_newest_of_each_control_is_kept() -> None:
+    gain = [Gain("gain", name, float(i)) for i in range(5) for name in "ab"]
+    step = [Time("time", "step")] * 2
+    pulls = [Hand("hand", at, user) for user in ("", "left") for at in ((0.0, 0.0), None)]
+    found = newest([*gain, *step, *pulls])
+    assert found == [*gain[-2:], *step, pulls[1], pulls[3]]
