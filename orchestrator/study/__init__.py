@@ -36,7 +36,7 @@ def study(
 ) -> Path:
     """Run what has no row in `room` yet, and write tables, figures and README.md to `folder`.
 
-    trained: the cases by which methods are chosen; kept_apart: those on which the advice is tried;
+    trained: the draws by which methods are chosen; kept_apart: those on which the advice is tried;
     by default all. `tell` is called with the stage, and the numbers of its finished and of all its
     jobs. Raises as `sweep` does.
     """
@@ -59,12 +59,15 @@ def study(
         for bias in BIAS:
             for rate in (*COLUMNS, KEPT_APART):
                 chosen = advice[arrangement, bias, "20" if rate == KEPT_APART else rate]
-                methods[arrangement, bias, rate] = chosen.method or chosen.nearest
+                methods[arrangement, bias, rate] = chosen.taken
     jobs = design.kept_apart_runs(apart, methods)
     tried = measure.compared(all_of("kept apart", jobs, measure.of_run))
     new = [x for x in dict.fromkeys(case.linkage for case in apart) if x not in linkages]
-    wanted = [(a, m, r) for (a, b, r), m in methods.items() if r in (*RATES, KEPT_APART)]
-    wanted = [w for w in dict.fromkeys(wanted) if design.mapped(w[1])]
+    wanted = dict.fromkeys(
+        (a, design.of_map(a, m), r)
+        for (a, _, r), m in methods.items()
+        if r in (*RATES, KEPT_APART) and design.mapped(m)
+    )
     rest_apart = all_of("maps kept apart", design.margins(new, wanted), measure.at_rest)
     for name, rows in (("runs", runs), ("maps", rest), ("kept-apart", [*tried, *rest_apart])):
         table.write(folder / f"{name}.csv", [measure.rounded(row) for row in rows])

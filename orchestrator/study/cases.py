@@ -1,7 +1,8 @@
 """The cases of the study: what is held, by which hand, with or without contact.
 
-A case is a block of the design: every hold is tried on the same cases, and holds are compared
-within a case. Hands draw their wrench or path by numpy's PCG64 with the case's seed.
+A case has several draws: its hand draws its wrench or path by numpy's PCG64 with the draw's seed,
+and so do the periods of a graphics rate that varies. A draw is a block of the design: every method
+is tried on the same draws, and methods are compared within a draw.
 """
 
 from __future__ import annotations
@@ -36,12 +37,15 @@ WALLS = {
 TRAINED = ("five-bar", "four-bar", "serial")
 FORCE, MOMENT, STEP = 0.5, 0.0025, 0.02
 """Wrenches are drawn up to these (N, N.m), steps of an arm's path up to STEP (m)."""
+SEEDS, STRIDE = 2, 3
+"""Draws of a case, and how far apart the first seeds of two cases are: with a third draw the others
+stay what they are."""
 AT_REST = "arm 300"
 
 
 @dataclass(frozen=True)
 class Case:
-    """A linkage in a hand (`arm 300` is an arm of 300 N/m)."""
+    """A draw of a linkage in a hand (`arm 300` is an arm of 300 N/m)."""
 
     linkage: str
     hand: str
@@ -70,14 +74,14 @@ class Case:
 
 
 def trained() -> list[Case]:
-    """The cases by which methods are chosen: 5 for each of three linkages."""
+    """The draws by which methods are chosen: of 5 cases for each of three linkages."""
     kinds = [("constant", False), ("profile", False), ("arm 100", False), ("arm 1000", False)]
     kinds += [("arm 300", True)]
     return list(_numbered(1, [(linkage, *kind) for linkage in TRAINED for kind in kinds]))
 
 
 def kept_apart() -> list[Case]:
-    """The cases that no choice has seen: another linkage, another hand, and both."""
+    """The draws that no choice has seen: of another linkage, another hand, and both."""
     kinds = [("constant", False), ("arm 300", False), ("profile", True)]
     found = [("slider-crank", *kind) for kind in kinds]
     found += [(each, "spring 200", False) for each in ("five-bar", "serial", "slider-crank")]
@@ -85,13 +89,14 @@ def kept_apart() -> list[Case]:
 
 
 def at_rest(linkage: str) -> Case:
-    """The case around whose equilibrium the lifted map is taken."""
+    """The draw around whose equilibrium the lifted map is taken."""
     return Case(linkage, AT_REST, False, 0)
 
 
 def _numbered(first: int, kinds: list[tuple[str, str, bool]]) -> Iterator[Case]:
-    for seed, kind in enumerate(kinds, first):
-        yield Case(*kind, seed)
+    for k, kind in enumerate(kinds):
+        for seed in range(SEEDS):
+            yield Case(*kind, first + STRIDE * k + seed)
 
 
 def _hand(case: Case) -> dict[str, Any]:

@@ -1,32 +1,39 @@
-"""The choice of a method in each cell of rate and model, by comparisons within cases.
+"""The choice of a method in each cell of rate and model, by comparisons within draws.
 
-A method is admitted to a cell if every case ends within its limits: stable, and with a peak of the
+A method is admitted to a cell if every draw ends within its limits: stable, and with a peak of the
 energy generated at the user's port of at most SHARE of the hand's work (less than LEAST is not
 counted). Where a lifted map vouches for it, that one must be stable on every linkage, too.
 
 Of two admitted methods one is better beyond the spread if its error is smaller in more than three
-quarters of the cases. The best one has the smallest median of log(error/mean of the case); those
+quarters of the draws. The best one has the smallest median of log(error/mean of the draw); those
 that it does not beat beyond the spread are ties, of which the simplest is advised.
+
+Where none is admitted nothing is advised. Then the best one keeps the limits in the most draws, and
+beats another beyond the spread if a sign test says so at LEVEL: of the n draws in which one of the
+two alone keeps them it has at least k, where P(at least k heads of n tosses) < LEVEL.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hapticlink.orchestrator.study.design import MOBILITY
-from hapticlink.orchestrator.study.measure import COUPLING, MARGIN, PEAK, WORK, stable
+from hapticlink.orchestrator.study.design import MOBILITY, of_map
+from hapticlink.orchestrator.study.measure import COUPLING, MARGIN, PEAK, WORK, draw, stable
 from hapticlink.orchestrator.study.methods import Method, order
 from hapticlink.orchestrator.sweep.row import METRIC, Row
 
 SHARE, LEAST = 0.25, 1e-3
 """Share of the hand's work, and energy (J): what moves the handle at 8 cm/s."""
+LEVEL = 0.05
 Cell = tuple[str, str, str]
 """Arrangement, bias and rate."""
 Cells = Mapping[Cell, Mapping[Method, Mapping[str, Row]]]
-"""The rows by cell, method and case."""
+"""The rows by cell, method and draw."""
 Margins = Mapping[tuple[str, Method, str], Mapping[str, Row]]
 """The rows at rest by (arrangement, method, rate) and linkage."""
 
@@ -39,7 +46,7 @@ def cells(rows: Iterable[Row]) -> Cells:
     found: dict[Cell, dict[Method, dict[str, Row]]] = {}
     for row in rows:
         by_method = found.setdefault((row["arrangement"], row["bias"], row["rate"]), {})
-        by_method.setdefault(method(row), {})[row["case"]] = row
+        by_method.setdefault(method(row), {})[draw(row)] = row
     return found
 
 
@@ -63,7 +70,7 @@ def within(row: Row, share: float = SHARE) -> bool:
 
 def margin(at: Margins, arrangement: str, of: Method, rate: str) -> float | None:
     """The smallest margin (1/s) over the linkages; None without maps."""
-    rows = at.get((arrangement, of, rate), {}).values()
+    rows = at.get((arrangement, of_map(arrangement, of), rate), {}).values()
     known = [row[MARGIN] for row in rows if MARGIN in row]
     return min(known) if known else None
 
@@ -76,16 +83,22 @@ def metric(arrangement: str) -> str:
 
 @dataclass(frozen=True)
 class Choice:
-    """The advice for a cell. method: None if none is admitted; then `most` of the `of` cases stay
-    within the limits with the method `nearest`. ties: all that the best does not beat."""
+    """The advice for a cell. method: None if none is admitted; best: that of the smallest error,
+    or which keeps the limits in the most draws; ties: all that it does not beat, from the simplest
+    on. `most` of the `of` draws stay within the limits with `best`, and `lost` are unstable."""
 
     cell: Cell
     method: Method | None
-    best: Method | None
+    best: Method
     ties: tuple[Method, ...]
-    nearest: Method
     most: int
     of: int
+    lost: int
+
+    @property
+    def taken(self) -> Method:
+        """What is advised, or the best where nothing is."""
+        return self.method or self.best
 
 
 def choice(
@@ -96,27 +109,33 @@ def choice(
 ) -> Choice:
     """The advice for a cell, with `share` as the limit of energy."""
     arrangement, _, rate = cell
-    counts = {m: sum(within(r, share) for r in rows.values()) for m, rows in by_method.items()}
-    of = max(len(rows) for rows in by_method.values())
     simple = sorted(by_method, key=order)
-    nearest = max(simple, key=counts.__getitem__)
-    able = [
-        m
-        for m in simple
-        if counts[m] == of and ((least := margin(at, arrangement, m, rate)) is None or least > 0)
-    ]
+    draws = sorted(by_method[simple[0]])
+    kept = {m: np.array([within(by_method[m][d], share) for d in draws]) for m in simple}
+    least = {m: margin(at, arrangement, m, rate) for m in simple}
+    sound = [m for m in simple if (known := least[m]) is None or known > 0]
+    able = [m for m in sound if kept[m].all()]
     if not able:
-        return Choice(cell, None, None, (), nearest, counts[nearest], of)
+        best = max(sound or simple, key=lambda m: int(kept[m].sum()))
+        ties = tuple(m for m in sound if not more(kept[best], kept[m]))
+        lost = sum(not stable(row) for row in by_method[best].values())
+        return Choice(cell, None, best, ties, int(kept[best].sum()), len(draws), lost)
     errors = {m: logs(by_method[m], metric(arrangement)) for m in able}
     mean = np.mean(list(errors.values()), axis=0)
     best = min(able, key=lambda m: float(np.median(errors[m] - mean)))
     ties = tuple(m for m in able if np.quantile(errors[m] - errors[best], 0.25) <= 0.0)
-    return Choice(cell, ties[0], best, ties, nearest, of, of)
+    return Choice(cell, ties[0], best, ties, len(draws), len(draws), 0)
+
+
+def more(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
+    """Whether `one` holds in more draws than `other` beyond the spread, by the sign test."""
+    k, n = int((one & ~other).sum()), int((one ^ other).sum())
+    return sum(comb(n, i) for i in range(k, n + 1)) < LEVEL * 2**n
 
 
 def logs(rows: Mapping[str, Row], of: str) -> np.ndarray:
-    """ln(error) by case, in the order of the cases' names."""
-    found: np.ndarray = np.log([max(rows[case][of], 1e-9) for case in sorted(rows)])
+    """ln(error) by draw, in the order of the draws' names."""
+    found: np.ndarray = np.log([max(rows[name][of], 1e-9) for name in sorted(rows)])
     return found
 
 
@@ -125,3 +144,12 @@ def quartiles(rows: Iterable[Row], of: str) -> Sequence[float]:
     values = [row[of] for row in rows if of in row] or [np.nan]
     found: Sequence[float] = np.quantile(values, [0.25, 0.5, 0.75, 1.0]).tolist()
     return found
+
+
+def over_seeds(rows: Iterable[Row], of: str) -> float:
+    """The largest by the smallest value of the draws of a case, median of the cases."""
+    by_case: dict[str, list[float]] = {}
+    for row in rows:
+        by_case.setdefault(row["case"], []).append(max(row[of], 1e-9))
+    ratios = [max(found) / min(found) for found in by_case.values() if len(found) > 1]
+    return float(np.median(ratios)) if ratios else float("nan")

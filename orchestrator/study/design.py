@@ -80,10 +80,10 @@ def references(cases: Iterable[Case]) -> Iterator[Job]:
 
 
 def methods(arrangement: str, bias: str) -> list[Method]:
-    """The methods that are compared: the report's gains and the integrators with the report's model
-    alone, which has no Coriolis compensation."""
+    """The methods that are compared. Of a mechanism at the graphics rate, the report's gains and
+    the integrators are tried with the report's model alone, which has no Coriolis compensation."""
     if arrangement == MOBILITY:
-        return [Method(hold, REPORT) for hold in OF_MATRICES]
+        return [Method(hold, gains) for hold, gains in product(OF_MATRICES, (REPORT, "medium"))]
     if bias == "full":
         return [Method(hold, gains) for hold, gains in product(HOLDS, GAINS) if gains != REPORT]
     found = [Method(hold, gains) for hold, gains in product(HOLDS, GAINS)]
@@ -130,9 +130,17 @@ def mapped(method: Method) -> bool:
 
 
 def all_margins() -> list[tuple[str, Method, str]]:
-    """Every hold that a map vouches for, with all gains, at all fixed rates."""
-    found = [Method(hold, gains) for hold, gains in product(HOLDS, GAINS)]
-    return [(DIRECT, m, rate) for m, rate in product(filter(mapped, found), RATES)]
+    """Every method with rk4 that a map vouches for, at all fixed rates."""
+    direct = filter(mapped, (Method(hold, gains) for hold, gains in product(HOLDS, GAINS)))
+    held = dict.fromkeys(of_map(MOBILITY, m) for m in methods(MOBILITY, "none"))
+    every = [(DIRECT, m) for m in direct] + [(MOBILITY, m) for m in held]
+    return [(arrangement, m, rate) for (arrangement, m), rate in product(every, RATES)]
+
+
+def of_map(arrangement: str, method: Method) -> Method:
+    """The method whose lifted map is that of `method`: of held mobilities `zoh`, since at rest
+    there is no force that they turn into motion, and no hold of them has a slope."""
+    return method._replace(hold="zoh") if arrangement == MOBILITY else method
 
 
 def kept_apart_runs(

@@ -71,7 +71,8 @@ def maps(
         each.set_title(heading, fontsize="medium")
     bar = figure.colorbar(ScalarMappable(norm, colours), ax=list(axes), label=unit)
     bar.ax.yaxis.set_major_formatter("{x:g}")
-    bar.ax.yaxis.set_minor_formatter("{x:g}")
+    narrow = 0 < norm.vmax < 20 * norm.vmin
+    bar.ax.yaxis.set_minor_formatter("{x:g}" if narrow else "")
     patches = [Patch(**HATCH, label=without)] if None in values else []
     if marked:
         patches.append(Patch(facecolor="white", edgecolor="black", linewidth=1.6, label=marked))

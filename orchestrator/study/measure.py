@@ -75,17 +75,22 @@ def stable(row: Row) -> bool:
     return whole and row[METRIC] < APART[0] and row["theta_max_rad"] < APART[1]
 
 
+def draw(row: Row) -> str:
+    """The name of the draw of a row, which is the same for all methods."""
+    return f"{row['case']}, seed {row['seed']}"
+
+
 def compared(rows: Sequence[Row]) -> list[Row]:
     """The rows with their coupling errors, without the paths."""
     continuous = {
-        (r["case"], r["bias"]): r
+        (draw(r), r["bias"]): r
         for r in rows
         if r["arrangement"] == CONTINUOUS and r["rate"] == str(REFERENCE)
     }
     found = []
     for r in rows:
         row = {k: v for k, v in r.items() if k not in (PATH, "message", "run_time_s")}
-        if PATH in r and PATH in (other := continuous[r["case"], r["bias"]]) and r is not other:
+        if PATH in r and PATH in (other := continuous[draw(r), r["bias"]]) and r is not other:
             a, b = (np.array(each[PATH]) for each in (r, other))
             apart = np.linalg.norm(a[: len(b)] - b[: len(a)], axis=1)
             row[COUPLING] = 1e3 * float(apart.max())
@@ -93,11 +98,11 @@ def compared(rows: Sequence[Row]) -> list[Row]:
     return found
 
 
-def floor(rows: Iterable[Row]) -> float:
-    """The largest coupling error (mm) of the runs at half the reference's rate: smaller errors
-    cannot be distinguished from zero."""
+def floor(rows: Iterable[Row]) -> list[float]:
+    """The coupling errors (mm) of the runs at half the reference's rate: smaller errors cannot be
+    distinguished from zero."""
     half = (r for r in rows if r["arrangement"] == CONTINUOUS and r["rate"] == str(FLOOR))
-    return max(r[COUPLING] for r in half)
+    return [r[COUPLING] for r in half]
 
 
 def rounded(row: Row) -> Row:

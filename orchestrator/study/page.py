@@ -1,26 +1,33 @@
-"""The page of the study: the answer, why, the cases kept apart, and what it leaves out."""
+"""The page of the study: the answer, why, the draws kept apart, and what it leaves out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from textwrap import fill
 
+import numpy as np
+
 from hapticlink.orchestrator.study import apart, why
+from hapticlink.orchestrator.study.cases import SEEDS
 from hapticlink.orchestrator.study.choose import (
     LEAST,
+    LEVEL,
     SHARE,
+    Choice,
     choice,
     energy,
     margin,
     metric,
+    over_seeds,
     quartiles,
 )
 from hapticlink.orchestrator.study.design import DIRECT, FLOOR, MOBILITY, REFERENCE, SUBSTEPS
 from hapticlink.orchestrator.study.figures import short
 from hapticlink.orchestrator.study.found import COMPENSATION, Found, both, named
 from hapticlink.orchestrator.study.measure import APART, COUPLING, floor, stable
-from hapticlink.orchestrator.study.methods import BIAS, COLUMNS, VARIABLE, Method
+from hapticlink.orchestrator.study.methods import BIAS, COLUMNS, VARIABLE
 
 WIDTH = 108
 
@@ -40,15 +47,20 @@ def paragraph(text: str) -> str:
 
 
 def _answer(found: Found) -> Iterator[str]:
-    at = {a: _median(found, a) for a in (DIRECT, MOBILITY)}
     yield paragraph(
-        "Run the mechanism at the haptic rate if you can, with gains that are stable there: then "
-        "only Lambda^-1 and P_c cross from the graphics rate, and with Coriolis compensation at 30 "
-        f"Hz the handle stays within {short(at[MOBILITY])} mm of the operational point (median of "
-        f"the stable cases; {short(at[DIRECT])} mm for a mechanism at 30 Hz, whose gains are "
-        "softer). If the mechanism itself runs at the graphics rate, take the row of your rate, or "
-        f"of the next lower one, from the first tables; {_where(found)}"
+        "Limits: the coupling stays stable, and sampling and holding generate at most "
+        f"{SHARE:.0%} of the hand's work at the user's port. A method is advised where it keeps "
+        "them in every draw; elsewhere nothing keeps them, and the best is named with what it does "
+        "keep."
     )
+    yield "\n".join(
+        paragraph(
+            f"- The mechanism at {place}, {COMPENSATION[bias]}: {_kept(found, arrangement, bias)}"
+        )
+        for arrangement, place in ((DIRECT, "the graphics rate"), (MOBILITY, "512 Hz"))
+        for bias in BIAS
+    )
+    yield paragraph(_where_to_run(found))
     yield "## The mechanism at the graphics rate"
     for bias in BIAS:
         yield from _table(found, DIRECT, bias)
@@ -57,59 +69,89 @@ def _answer(found: Found) -> Iterator[str]:
         "(5, 5, .002); medium (100, 100, .1) and (20, 20, .02), as in `closed-loop-direct`; stiff "
         "(100, 100, .5) and (70, 70, .375), the report's. `a, b` is hold `a` from slow to fast and "
         "`b` from fast to slow, without `b` the latest sample; `slope` is of the velocity from "
-        "slow to fast. Within the limits: cases that are stable and keep the limit of energy at "
-        "the user's port (below); where that is not all of them nothing is advised, and the "
-        "simplest of the methods with the most such cases is shown. Error: "
-        "the largest |x_S - x_D| of a run, median of the stable cases (quartiles; worst). "
+        "slow to fast. Within the limits: draws that are stable and keep the limit of energy at "
+        "the user's port (below). Error: "
+        "the largest |x_S - x_D| of a run, median of the stable draws (quartiles; worst); over "
+        f"seeds: the largest by the smallest of a case's {SEEDS} draws, median of the cases. "
         "Handle off: distance of the handle from that of the same blocks run "
         "continuously, within 1 s, median. Energy: the largest peak at the user's port, as a part "
         "of what is allowed (below). Margin: decay rate of the slowest mode of the lifted map, in "
         "an arm of 300 N/m, the smallest of the linkages; it is bounded by the arm's own modes. "
-        "An adaptive hold has no map. As good: other methods that the best one does not beat in "
-        "more than three quarters of the cases; the simplest of all these is advised."
+        "An adaptive hold has no map. As good: other methods that the best one does not beat "
+        "beyond the spread. Where one is advised, that is a smaller error in more than three "
+        "quarters of the draws, and the simplest of all these is taken; where none is, keeping the "
+        f"limits in more draws by a sign test at {LEVEL:.0%}."
     )
     yield "## The mechanism at 512 Hz, Lambda^-1 and P_c held (the report)"
     for bias in BIAS:
         yield from _table(found, MOBILITY, bias)
 
 
-def _median(found: Found, arrangement: str) -> float:
-    """Tracking error (mm) of the stable cases at 30 Hz with Coriolis compensation."""
-    cell = (arrangement, "full", "30")
-    rows = found.cells[cell][found.methods[cell]].values()
-    return quartiles(filter(stable, rows), metric(DIRECT))[1]
+def _kept(found: Found, arrangement: str, bias: str) -> str:
+    """At which rates a method is advised, and what the best one keeps at the others."""
+    chosen = {rate: found.advice[arrangement, bias, rate] for rate in COLUMNS}
+    advised = [rate for rate in COLUMNS if chosen[rate].method]
+    others = [f"{c.most} of {c.of} at {rate} Hz" for rate, c in chosen.items() if not c.method]
+    told = [f"advised at {both(advised)} Hz"] if advised else []
+    told += [f"nothing keeps the limits elsewhere, the best in {both(others)}"] if others else []
+    return "; ".join(told) + "."
 
 
-def _where(found: Found) -> str:
-    """At which rates a method is advised."""
-    told = []
+def _where_to_run(found: Found) -> str:
+    """Which arrangement keeps the limits in more draws, with the errors at 30 Hz."""
+    pairs = [
+        (found.advice[MOBILITY, b, r].most, found.advice[DIRECT, b, r].most)
+        for b, r in product(BIAS, COLUMNS)
+    ]
+    more, fewer = sum(m > d for m, d in pairs), sum(m < d for m, d in pairs)
+    text = (
+        "With the mechanism at the haptic rate only Lambda^-1 and P_c cross from the graphics "
+        f"rate. Its best method keeps the limits in more draws than the best at the graphics rate "
+        f"in {more} of {len(pairs)} rows, in fewer in {fewer}."
+    )
     for bias in BIAS:
-        rates = [r for r in COLUMNS if found.advice[DIRECT, bias, r].method]
-        at = f"at {both(rates)} Hz" if rates else "nowhere"
-        told.append(f"{at} with {COMPENSATION[bias]}")
-    return f"there, a method keeps the limits in every case {' and '.join(told)}."
+        at = []
+        for arrangement, place in ((MOBILITY, "512 Hz"), (DIRECT, "30 Hz")):
+            taken = found.methods[arrangement, bias, "30"]
+            rows = found.cells[arrangement, bias, "30"][taken].values()
+            error = short(quartiles(filter(stable, rows), metric(DIRECT))[1])
+            at.append(f"{error} mm for the mechanism at {place} ({named(taken)})")
+        text += f" Median error with graphics at 30 Hz, {COMPENSATION[bias]}: {both(at)}."
+    return text
 
 
 def _table(found: Found, arrangement: str, bias: str) -> Iterator[str]:
     lines = [
         f"| {COMPENSATION[bias]}: graphics rate (Hz) | take | within the limits | error (mm) "
-        "| handle off (mm) | energy | margin (1/s) | as good |\n|---|---|---|---|---|---|---|---|"
+        "| over seeds | handle off (mm) | energy | margin (1/s) | as good |",
+        "|---" * 9 + "|",
     ]
     for rate in COLUMNS:
         cell = (arrangement, bias, rate)
         chosen = found.advice[cell]
-        method = chosen.method or chosen.nearest
-        rows = [r for r in found.cells[cell][method].values() if stable(r)]
+        rows = [r for r in found.cells[cell][chosen.taken].values() if stable(r)]
         low, middle, high, worst = map(short, quartiles(rows, metric(DIRECT)))
         off = short(quartiles(rows, COUPLING)[1])
-        least = margin(found.margins, arrangement, method, rate)
-        ties = _ties(chosen.ties) if chosen.method else "-"
+        least = margin(found.margins, arrangement, chosen.taken, rate)
         lines.append(
-            f"| {rate} | {named(method)} | {chosen.most} of {chosen.of} | "
-            f"{middle} ({low} to {high}; {worst}) | {off} | "
-            f"{short(max(map(energy, rows), default=None))} | {short(least) or '-'} | {ties} |"
+            f"| {rate} | {_taken(chosen)} | {_within(chosen)} | "
+            f"{middle} ({low} to {high}; {worst}) | {short(over_seeds(rows, metric(DIRECT)))} | "
+            f"{off} | {short(max(map(energy, rows), default=None))} | {short(least) or '-'} | "
+            f"{_ties(chosen)} |"
         )
     yield "\n".join(lines)
+
+
+def _taken(chosen: Choice) -> str:
+    """What is advised, or that nothing is, and the best."""
+    return named(chosen.method) if chosen.method else f"nothing; best: {named(chosen.best)}"
+
+
+def _within(chosen: Choice) -> str:
+    """How many draws keep the limits, and why the others do not."""
+    over = chosen.of - chosen.most - chosen.lost
+    why = [f"{chosen.lost} unstable"] * (chosen.lost > 0) + [f"{over} by energy"] * (over > 0)
+    return f"{chosen.most} of {chosen.of}" + (f" ({', '.join(why)})" if why else "")
 
 
 SHARES = (0.1, SHARE, 0.5, 1.0)
@@ -135,12 +177,12 @@ def _other_limits(found: Found) -> Iterator[str]:
     yield "\n".join(lines)
     yield paragraph(
         "Columns: Coriolis compensation, graphics rate (Hz). Where nothing is advised: the most "
-        "cases within the limits."
+        "draws within the limits."
     )
 
 
-def _ties(ties: Sequence[Method]) -> str:
-    others = [named(m) for m in ties[1:]]
+def _ties(chosen: Choice) -> str:
+    others = [named(m) for m in chosen.ties if m != chosen.taken]
     if not others:
         return "none"
     return "; ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
@@ -155,28 +197,33 @@ def _limits(found: Found) -> Iterator[str]:
         "and slower. Gains in three steps, so that better ones may lie between them. Walls of 1000 "
         f"N/m and 10 N.s/m, with {SUBSTEPS} integration steps a frame where the mechanism runs at "
         f"the graphics rate. Three seconds. The rate {VARIABLE} draws each period between the "
-        "two, with the case's seed; it has no margin (`hapticlink stability` judges such rates by "
+        "two, with the draw's seed; it has no margin (`hapticlink stability` judges such rates by "
         "their own measures)."
     )
     yield "## How it was measured"
-    size = floor(found.runs)
+    sizes, of = floor(found.runs), next(iter(found.advice.values())).of
     yield paragraph(
         "`hapticlink study` makes this page, [runs.csv](runs.csv) (a row for each run, with the "
-        "seed of its hand), [maps.csv](maps.csv) (lifted maps) and "
-        "[kept-apart.csv](kept-apart.csv). A case is a linkage in a hand; every method runs on the "
-        "same cases, and errors are compared within a case. Graphics rates are whole haptic ticks "
-        "a frame: 51, 26, 17 and 9 of 1/512 s. A run is stable if it reaches its end with handle "
-        f"and operational point less than {APART[0]:g} mm and {APART[1]:g} rad apart. A method is "
-        "admitted to a cell if every case is stable, the energy at the user's port peaks at most "
+        "seed of its draw), [maps.csv](maps.csv) (lifted maps) and "
+        "[kept-apart.csv](kept-apart.csv). A case is a linkage in a hand, with or without contact; "
+        f"each has {SEEDS} draws, of the wrench or path of the hand and of the periods of a rate "
+        "that varies. Every method runs on the same draws, and methods are compared within a draw. "
+        f"Where all {of} draws keep the limits, up to {1 - LEVEL ** (1 / of):.0%} of further ones "
+        f"may not ({1 - LEVEL:.0%} confidence, if draws know nothing of each other). Graphics "
+        "rates are whole haptic ticks a frame: 51, 26, 17 and 9 of 1/512 s. A run is stable if it "
+        "reaches its end with handle and operational point less than "
+        f"{APART[0]:g} mm and {APART[1]:g} rad apart. A method is "
+        "advised if every draw is stable, the energy at the user's port peaks at most "
         f"at {SHARE:.0%} of the hand's work (its absolute values summed; peaks below "
         f"{1e3 * LEAST:g} mJ, which moves the handle at 8 cm/s, do not count), and the lifted map, "
         f"where it has one, is stable on {both(['five-bar', 'four-bar', 'serial arm'])}. A "
         "quarter: the continuous runs, which no hold disturbs, generate up to "
         f"{_continuous(found):.0%} without Coriolis compensation, and a limit below that would "
-        "refuse the ideal. The report's gains and the integrators were tried without Coriolis "
-        "compensation alone, to save runs. The continuous "
-        f"runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by up to {size:.1g} mm "
-        "within 1 s, so that smaller differences mean nothing."
+        "refuse the ideal. Of a mechanism at the graphics rate, the report's gains and the "
+        "integrators were tried without Coriolis compensation alone, to save runs. The continuous "
+        f"runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by "
+        f"{np.median(sizes):.1g} mm within 1 s (median; up to {max(sizes):.1g}), so that smaller "
+        "differences of the handle mean nothing."
     )
 
 

@@ -14,7 +14,7 @@ from hapticlink.orchestrator.study.choose import LEAST, SHARE, energy, margin, w
 from hapticlink.orchestrator.study.design import CONTINUOUS, DIRECT, MOBILITY, REFERENCE, mapped
 from hapticlink.orchestrator.study.figures import Panel, Square, maps, short
 from hapticlink.orchestrator.study.found import COMPENSATION, Found, both
-from hapticlink.orchestrator.study.measure import COUPLING, MARGIN, RUN, stable
+from hapticlink.orchestrator.study.measure import COUPLING, MARGIN, RUN, draw, stable
 from hapticlink.orchestrator.study.methods import (
     BIAS,
     COLUMNS,
@@ -29,7 +29,7 @@ from hapticlink.orchestrator.study.methods import (
 )
 from hapticlink.orchestrator.sweep.row import METRIC, Row
 
-UNSTABLE = "unstable in some case; number of stable cases"
+UNSTABLE = "unstable in some draw; number of stable draws"
 Rows = Mapping[str, Row]
 
 
@@ -50,7 +50,7 @@ def _all_stable(rows: Iterable[Row]) -> bool:
 
 
 def _square(rows: Rows, value: Callable[[Row], float], of: Callable[..., float]) -> Square:
-    """A number of the cases; where one is unstable, how many are not."""
+    """A number of the draws; where one is unstable, how many are not."""
     if not _all_stable(rows.values()):
         return Square(None, f"{sum(map(stable, rows.values()))}/{len(rows)}")
     return Square(float(of([value(r) for r in rows.values()])))
@@ -94,7 +94,7 @@ def _gains(folder: Path, found: Found) -> Iterator[str]:
 
 
 def _share(found: Found, bias: str, gains: str, rate: str) -> float | None:
-    """Runs within the limits (%), over holds and cases; None where there are none."""
+    """Runs within the limits (%), over holds and draws; None where there are none."""
     cell = found.cells[DIRECT, bias, rate]
     rows = [r for hold in HOLDS for r in cell.get(Method(hold, gains), {}).values()]
     return 100 * float(np.mean([within(r) for r in rows])) if rows else None
@@ -107,14 +107,26 @@ def _tracking(folder: Path, found: Found) -> Iterator[str]:
     none = [r for r in COLUMNS if all(by[r].value is None for _, p in panels for by in p.values())]
     title = f"zoh is what the answer takes in {first} of {len(cells)} columns"
     if none:
-        title += f"; at {both(none)} Hz no hold is stable in every case"
+        title += f"; at {both(none)} Hz no hold is stable in every draw"
     unit = "largest |x_S - x_D| (mm), median"
     made = maps(folder, "tracking.png", title, panels, unit, UNSTABLE, "advised")
     text = (
-        f"{title}. Each column has the gains that the answer takes for it. `foh` tracks as well as "
-        "`zoh` or better where both are stable in every case, and generates more energy (below)."
+        f"{title}. Each column has the gains that the answer takes for it. `foh` has a smaller "
+        f"median than `zoh` in {_fewer(panels)} columns in which both are stable in every draw."
     )
     yield _text(text, made, "Tracking error by hold and rate")
+
+
+def _fewer(panels: Iterable[Panel]) -> str:
+    """In how many columns `foh` has a smaller number than `zoh`, of those with both."""
+    both_known = [
+        (foh, zoh)
+        for _, squares in panels
+        for rate in COLUMNS
+        if (foh := squares["foh"][rate].value) is not None
+        and (zoh := squares["zoh"][rate].value) is not None
+    ]
+    return f"{sum(foh < zoh for foh, zoh in both_known)} of {len(both_known)}"
 
 
 def _energy(folder: Path, found: Found) -> Iterator[str]:
@@ -123,7 +135,7 @@ def _energy(folder: Path, found: Found) -> Iterator[str]:
     known = [s.value for s in squares if s.value is not None]
     over = sum(v > 100 for v in known)
     title = (
-        f"{over} of {len(known)} combinations that are stable in every case generate more "
+        f"{over} of {len(known)} combinations that are stable in every draw generate more "
         "energy at the user's port than is allowed"
     )
     unit = "peak generated (% of what is allowed)"
@@ -132,8 +144,9 @@ def _energy(folder: Path, found: Found) -> Iterator[str]:
     ]
     made = maps(folder, "energy.png", title, shown, unit, UNSTABLE, "advised")
     text = (
-        f"{title}: {SHARE:.0%} of the hand's work, and at least {1e3 * LEAST:g} mJ. A stable run "
-        "is not yet a passive one, which tracking errors do not show."
+        f"{title}: {SHARE:.0%} of the hand's work, and at least {1e3 * LEAST:g} mJ. `foh` "
+        f"generates less than `zoh` in {_fewer(panels)} columns. A stable run is not yet a passive "
+        "one, which tracking errors do not show."
     )
     yield _text(text, made, "Energy at the user's port by hold and rate")
 
@@ -181,7 +194,8 @@ def _signs(found: Found) -> str:
     largest = max(abs(r[MARGIN]) for r in wrong)
     return (
         f"{text}. The others: {listed}{'; ...' if len(where) > 6 else ''}, with margins of up to "
-        f"{short(largest)} 1/s (maps.csv)."
+        f"{short(largest)} 1/s (maps.csv). Growth that saturated motors end within the first "
+        "quarter of a run is not seen by it."
     )
 
 
@@ -212,66 +226,66 @@ def _integrators(folder: Path, found: Found) -> Iterator[str]:
     counts = {i: sum(s.value is not None for n, s in sound if n.endswith(i)) for i in INTEGRATORS}
     kept = ", ".join(f"{count} with {i}" for i, count in counts.items())
     text = (
-        f"{title} (medians within cases; quartiles {quarters}). Of {len(COMPARED) * len(COLUMNS)} "
-        f"cells, stable in every case: {kept}. The passive midpoint rule makes no energy of its "
+        f"{title} (medians within draws; quartiles {quarters}). Of {len(COMPARED) * len(COLUMNS)} "
+        f"cells, stable in every draw: {kept}. The passive midpoint rule makes no energy of its "
         "own; what the holds make is not its matter."
     )
     yield _text(text, made, "Tracking error by integrator")
 
 
 def _mobility(folder: Path, found: Found) -> Iterator[str]:
-    lost = _lost(found)
-    panels: list[Panel] = []
+    panels = _by_hold(found, MOBILITY, lambda r: r[COUPLING], np.median)
     ratios = []
-    for bias in BIAS:
-        squares: dict[str, dict[str, Square]] = {}
-        for hold, rate in product(OF_MATRICES, COLUMNS):
-            rows = _rows(found, MOBILITY, bias, rate, Method(hold, REPORT))
-            kept = {case: row for case, row in rows.items() if case not in lost}
-            squares.setdefault(hold, {})[rate] = _square(kept, lambda r: r[COUPLING], np.median)
-        for rate in COLUMNS:
-            values = [v for by in squares.values() if (v := by[rate].value) is not None]
-            if (own := squares["zoh"][rate].value) and values:
-                ratios.append(min(values) / own)
-        panels.append((COMPENSATION[bias], squares))
+    for (_, squares), rate in product(panels, COLUMNS):
+        values = [v for by in squares.values() if (v := by[rate].value) is not None]
+        if own := squares["zoh"][rate].value:
+            ratios.append(min(values) / own)
     gain = 100 * (1 - float(np.median(ratios))) if ratios else float("nan")
     title = (
-        "With Lambda^-1 held holds differ little: the best of a rate moves the handle off by "
+        "With Lambda^-1 and P_c held, the best hold of a rate moves the handle off by "
         f"{gain:.0f} % less than zoh"
     )
     unit = "handle off (mm), median"
-    made = maps(folder, "mobility.png", title, panels, unit, UNSTABLE)
+    made = maps(folder, "mobility.png", title, panels, unit, UNSTABLE, "advised")
     text = (
-        f"{title} (median of the columns). It is the distance from the continuous run within 1 s, "
-        "with the report's gains."
+        f"{title} (median of the columns). It is the distance from the continuous run within 1 s. "
+        "Each column has the gains that the answer takes for it."
     )
-    if lost:
-        text += (
-            f" Not counted: {both(sorted(lost))}, which are unstable with every hold at every "
-            "rate: not the graphics rate, but 512 Hz is too slow for the report's gains there; the "
-            f"same blocks at {REFERENCE} Hz are stable."
-        )
-    yield _text(text, made, "Coupling error with Lambda^-1 held")
+    yield _text(f"{text}{_lost(found)}", made, "Coupling error with Lambda^-1 held")
 
 
-def _lost(found: Found) -> set[str]:
-    """Cases that no hold and no rate keeps stable at the report's gains with Lambda^-1 held."""
+def _lost(found: Found) -> str:
+    """The draws that no hold and no rate keeps stable at the report's gains, and whether they are
+    where nothing is held."""
     every = [
         _rows(found, MOBILITY, bias, rate, Method(hold, REPORT))
         for bias, rate, hold in product(BIAS, COLUMNS, OF_MATRICES)
     ]
-    return {case for case in every[0] if not any(stable(rows[case]) for rows in every)}
+    lost = [name for name in every[0] if not any(stable(rows[name]) for rows in every)]
+    if not lost:
+        return ""
+    by_case = Counter(every[0][name]["case"] for name in lost)
+    where = "; ".join(f"{case} ({n})" for case, n in by_case.items())
+    alone = [r for r in found.runs if r["arrangement"] == CONTINUOUS and draw(r) in lost]
+    sound = sum(stable(r) for r in alone if r["rate"] == str(REFERENCE))
+    return (
+        f" With the report's gains, {len(lost)} of {len(every[0])} draws are unstable with every "
+        f"hold at every graphics rate: {where}. Of the same blocks at {REFERENCE} Hz {sound} of "
+        f"{len(lost) * len(BIAS)} runs are stable: where these are, it is not the graphics rate, "
+        "but 512 Hz that is too slow for these gains."
+    )
 
 
 def _modelling(found: Found) -> str:
     """What leaving out Coriolis and centrifugal terms costs where nothing is held."""
     rows = [r for r in found.runs if r["arrangement"] == CONTINUOUS and r["rate"] == str(REFERENCE)]
     by = {b: [r[METRIC] for r in rows if r["bias"] == b] for b in BIAS}
+    worst = max((r for r in rows if r["bias"] == "full"), key=lambda r: r[METRIC])
     text = (
         "The two models are ranked apart since they differ by more than the holds: where nothing "
         f"is held, the tracking error is {short(float(np.median(by['none'])))} mm (median; up to "
         f"{short(max(by['none']))}) without Coriolis compensation and "
-        f"{short(float(np.median(by['full'])))} mm with it (up to {short(max(by['full']))}, "
-        "where a stiff arm pulls the four-bar off its path)."
+        f"{short(float(np.median(by['full'])))} mm with it (up to {short(worst[METRIC])}, "
+        f"{worst['case']})."
     )
     return fill(text, 108, break_on_hyphens=False)
