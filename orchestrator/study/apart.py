@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from textwrap import fill
 
 import numpy as np
 
-from hapticlink.orchestrator.study.choose import cells, margin, metric, quartiles, within
+from hapticlink.orchestrator.study.choose import cells, margin, metric, within
 from hapticlink.orchestrator.study.design import CONTINUOUS, DIRECT, MOBILITY
 from hapticlink.orchestrator.study.figures import short
-from hapticlink.orchestrator.study.found import COMPENSATION, Found, named
+from hapticlink.orchestrator.study.found import COMPENSATION, Found, errors, named
 from hapticlink.orchestrator.study.measure import stable
 from hapticlink.orchestrator.study.methods import BIAS, COLUMNS, KEPT_APART, Method
-from hapticlink.orchestrator.sweep.row import Row
 
 HEAD = (
     "| mechanism, Coriolis compensation, rate (Hz) | method | within the limits | `zoh` | error "
@@ -47,7 +46,7 @@ def section(found: Found) -> Iterator[str]:
             better[0] += len(good)
             better[1] += sum(map(within, by_zoh.values()))
             better[2] += len(rows)
-        error = _error([r for r in rows.values() if stable(r)])
+        error = errors([r for r in rows.values() if stable(r)])
         where = "512 Hz" if arrangement == MOBILITY else "graphics"
         lines.append(
             f"| {where}, {COMPENSATION[bias][22:]}, {rate} | "
@@ -69,14 +68,6 @@ def section(found: Found) -> Iterator[str]:
     )
     yield fill(text, 108, break_on_hyphens=False)
     yield HEAD + "\n".join(lines)
-
-
-def _error(rows: Sequence[Row]) -> str:
-    """Median, quartiles and largest tracking error of the stable runs."""
-    if not rows:
-        return ""
-    low, middle, high, worst = map(short, quartiles(rows, metric(DIRECT)))
-    return f"{middle} ({low} to {high}; {worst})"
 
 
 def _advised(found: Found, cell: tuple[str, str, str]) -> bool:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from hapticlink.orchestrator.study.choose import Cell, Cells, Choice, Margins
+from hapticlink.orchestrator.study.choose import Cell, Cells, Choice, Margins, quartiles
+from hapticlink.orchestrator.study.figures import short
 from hapticlink.orchestrator.study.methods import Method
-from hapticlink.orchestrator.sweep.row import Row
+from hapticlink.orchestrator.sweep.row import METRIC, Row
 
 COMPENSATION = {"none": "Coriolis compensation off", "full": "Coriolis compensation on"}
 
@@ -31,6 +32,14 @@ def named(method: Method) -> str:
     """A method as text."""
     own = "" if method.integrator == "rk4" else f", {method.integrator}"
     return f"`{method.hold}`, {method.gains}{own}"
+
+
+def errors(rows: Sequence[Row]) -> str:
+    """Median, quartiles and largest tracking error (mm) of some runs."""
+    if not rows:
+        return "-"
+    low, middle, high, worst = map(short, quartiles(rows, METRIC))
+    return f"{middle} ({low} to {high}; {worst})"
 
 
 def both(names: Sequence[str]) -> str:

@@ -25,7 +25,7 @@ from hapticlink.orchestrator.study.choose import (
 )
 from hapticlink.orchestrator.study.design import DIRECT, FLOOR, MOBILITY, REFERENCE, SUBSTEPS
 from hapticlink.orchestrator.study.figures import short
-from hapticlink.orchestrator.study.found import COMPENSATION, Found, both, named
+from hapticlink.orchestrator.study.found import COMPENSATION, Found, both, errors, named
 from hapticlink.orchestrator.study.measure import APART, COUPLING, floor, stable
 from hapticlink.orchestrator.study.methods import BIAS, COLUMNS, VARIABLE
 
@@ -130,12 +130,11 @@ def _table(found: Found, arrangement: str, bias: str) -> Iterator[str]:
         cell = (arrangement, bias, rate)
         chosen = found.advice[cell]
         rows = [r for r in found.cells[cell][chosen.taken].values() if stable(r)]
-        low, middle, high, worst = map(short, quartiles(rows, metric(DIRECT)))
         off = short(quartiles(rows, COUPLING)[1])
         least = margin(found.margins, arrangement, chosen.taken, rate)
         lines.append(
             f"| {rate} | {_taken(chosen)} | {_within(chosen)} | "
-            f"{middle} ({low} to {high}; {worst}) | {short(over_seeds(rows, metric(DIRECT)))} | "
+            f"{errors(rows)} | {short(over_seeds(rows, metric(DIRECT)))} | "
             f"{off} | {short(max(map(energy, rows), default=None))} | {short(least) or '-'} | "
             f"{_ties(chosen)} |"
         )
