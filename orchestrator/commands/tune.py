@@ -13,6 +13,7 @@ Margin = Annotated[
     float, Parameter(help="Factor on all stiffnesses, 1 or more, at which the map is unstable.")
 ]
 Hertz = Annotated[float, Parameter(help="Frequency (Hz) of pressing at which stiffness is felt.")]
+Count = Annotated[int, Parameter(help="Poses along the scene's own run in which gains are judged.")]
 Neighbours = Annotated[bool, Parameter(help="Margins at neighbouring rates, as well.")]
 
 
@@ -24,32 +25,55 @@ def tune(
     set: Set = None,
     margin: Margin = 2.0,
     hertz: Hertz = 2.0,
+    poses: Count = 5,
     neighbours: Neighbours = True,
 ) -> int:
-    """Find gains up to a margin of stability for the scene's rates and holds, at its start pose and
-    at a contact, if there is one; both shall feel equally stiff.
+    """Find gains with which contact and joint constraint feel equally stiff, as stiff as a margin
+    of stability allows for the scene's rates and holds, in poses of its own run.
 
-    Prints gains, felt stiffnesses and margins. Writes tune.json, tune.png and tuned.toml, a scene
-    that extends SCENE with the gains, to OUT (default tuned/SCENE). What has been confirmed by
-    runs, and what has not: results/tune/README.md.
+    Prints gains, felt stiffnesses and margins. Writes tuned.toml, the scene with the gains,
+    tune.json and tune.png to OUT (default tuned/SCENE), at once whenever it has found better ones,
+    so that Ctrl-C leaves the best so far. What has been confirmed by runs, and what has not:
+    results/tune/README.md.
 
     For example:
 
-        hapticlink tune closed-loop --set sensing=encoders --set graphics.rate=32
+        hapticlink tune closed-loop --set sensing=encoders
     """
+    from hapticlink.orchestrator.base.faults import Interrupted
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.figure_axes import png, write
     from hapticlink.orchestrator.results.files import write_json
-    from hapticlink.orchestrator.tune import figure
+    from hapticlink.orchestrator.tune import Tuned, figure
     from hapticlink.orchestrator.tune import tune as find
-    from hapticlink.orchestrator.tune.scene_file import tuned_scene
 
     given = options(set, None)
-    found = find(scene, given, margin=margin, hertz=hertz, neighbours=neighbours, tell=say)
-    folder = folders.ensure(out or default_folder("tuned", scene))
-    write_json(folder / "tune.json", found.record())
-    (folder / "tuned.toml").write_text(tuned_scene(scene, found), encoding="utf-8")
-    write([("tune", png(figure.draw(found)))], folder)
+    folder = out or default_folder("tuned", scene)
+
+    kept = False
+
+    def keep(found: Tuned) -> None:
+        nonlocal kept
+        folders.ensure(folder)
+        write_json(folder / "tune.json", found.record())
+        (folder / "tuned.toml").write_text(found.scene(), encoding="utf-8")
+        write([("tune", png(figure.draw(found)))], folder)
+        kept = True
+
+    try:
+        found = find(
+            scene,
+            given,
+            margin=margin,
+            hertz=hertz,
+            count=poses,
+            neighbours=neighbours,
+            tell=say,
+            keep=keep,
+        )
+    except Interrupted:
+        say(f"interrupted: {f'{folder}/ has' if kept else 'no'} gains found so far")
+        return 1
     say(*(f"  {line}" for line in found.lines()), sep="\n")
-    say(f"  {folder}/: tune.json, tune.png, tuned.toml")
+    say(f"  {folder}/: tuned.toml, tune.json, tune.png")
     return 0

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hapticlink.orchestrator.compare import numbers, overlay, settings
-from hapticlink.orchestrator.compare.again import scene_file
 from hapticlink.orchestrator.compare.numbers import Row
 from hapticlink.orchestrator.results import figures as of_a_run
+from hapticlink.orchestrator.results.again import scene_file
 from hapticlink.orchestrator.results.figure_axes import plain
 from hapticlink.orchestrator.results.tables import Results
 

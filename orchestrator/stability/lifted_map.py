@@ -157,6 +157,10 @@ class LiftedMap:
         self._template = self._state.save()
         self._tangent.forget({fmu for fmu, _, _ in values})
 
+    def forget(self) -> None:
+        """Slopes of FMUs that were found so far are not taken again."""
+        self._tangent.forget(self.system.fmu)
+
     def directions(self, point: Vector) -> Iterator[Vector]:
         """Orthonormal directions in which the state can be moved from `point`, that of the
         coordinates that are no switches."""

@@ -16,7 +16,7 @@ COLOURS = {"constraint": "tab:blue", "contact": "tab:orange"}
 
 
 def draw(tuned: Tuned) -> Figure:
-    """Bars of the felt stiffnesses (none where nothing gives way), and of the margins."""
+    """Bars of the felt stiffnesses and of the margins."""
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
@@ -32,18 +32,18 @@ def _felt(axes: Axes, tuned: Tuned) -> None:
     width = 0.8 / len(tuned.felt)
     for i, name in enumerate(tuned.felt):
         values = np.array([felt[name] for felt in sets])
-        said = [f"{v:.0f}" if np.isfinite(v) else "rigid" for v in values]
-        heights = np.where(np.isfinite(values), values, 0.0)
-        bars = axes.bar(np.arange(2) + i * width, heights, width, label=name, color=COLOURS[name])
-        axes.bar_label(bars, said, fontsize="small")
+        bars = axes.bar(np.arange(2) + i * width, values, width, label=name, color=COLOURS[name])
+        axes.bar_label(bars, fmt="%.0f", fontsize="small")
     axes.set_xticks(np.arange(2) + 0.4 - width / 2, ["the scene's gains", "tuned"])
     axes.set_ylabel(f"felt stiffness at {tuned.hertz:g} Hz (N/m)")
     axes.margins(y=0.15)
-    axes.legend(fontsize="small")
+    axes.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
 def _margins(axes: Axes, tuned: Tuned) -> None:
-    margins = {"the scene's gains": tuned.own, "tuned": tuned.margin, **tuned.neighbours}
+    margins = {"the scene's gains": tuned.own, **tuned.neighbours}
+    if np.isfinite(tuned.margin):
+        margins = {"the scene's gains": tuned.own, "tuned": tuned.margin, **tuned.neighbours}
     bars = axes.barh([fill(name, 24) for name in margins], list(margins.values()), 0.6, color="0.6")
     axes.bar_label(bars, fmt="%.3g", fontsize="small", padding=2)
     axes.axvline(1.0, color="tab:red", lw=1.0, label="unstable below")
@@ -51,4 +51,4 @@ def _margins(axes: Axes, tuned: Tuned) -> None:
     axes.set_xlabel("margin: factor on all stiffnesses up to instability")
     axes.margins(x=0.12)
     axes.invert_yaxis()
-    axes.legend(fontsize="small", loc="lower right")
+    axes.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)

@@ -29,7 +29,6 @@ class Law:
 LAWS = (
     Law("drift", "controller", "K_pc", "B_pc", "controller.teleoperation"),
     Law("topology", "controller", "k_j", "b_j", "controller.topology"),
-    Law("contact", "virtual_mechanism", "k_contact", "b_contact", "contacts"),
     Law("graphics", "virtual_environment", "K_g", "B_g", "graphics"),
 )
 Scales = Mapping[str, float]

@@ -19,43 +19,57 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.plan.operations import Get
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability import frozen
 from hapticlink.orchestrator.stability.closures import Closures
-from hapticlink.orchestrator.stability.equilibrium import COARSE, equilibrium, rests
+from hapticlink.orchestrator.stability.equilibrium import NEUTRAL, rests
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
-from hapticlink.orchestrator.stability.linearise import Linear
+from hapticlink.orchestrator.stability.linearise import Linear, linearised
 from hapticlink.orchestrator.stability.modes import modes
 from hapticlink.orchestrator.stability.state_vector import SIGNALS
-from hapticlink.orchestrator.stability.tangent import SAME, Columns, Instruction
+from hapticlink.orchestrator.stability.tangent import Columns, Instruction
 from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.tune.gains import Gains, Scales
 
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 DEVICE, HAND = "haptic_device", "hand"
-STEPS = 3
-"""Newton steps from the equilibrium of other gains."""
-SETTLING = 3.0
-RESTLESS = 1e-3
-"""Seconds to settle; change over a period of what has not come to rest."""
+STEPS = 12
+"""Newton steps to rest."""
+SHARED, NEARBY = 1e-4, 1e-2
+"""Relative difference of numbers that share slopes: on the way to rest, and about the rest of the
+scene's own gains, next to which that of others is."""
 UNSTABLE = 50.0
 """Growth (1/s) that counts for gains with which the FMUs diverge at once."""
 
 
 class Held:
-    """A scene at rest. gains: those of its laws."""
+    """A scene at rest in a spring hand, looked for from a `start`, such as the `rest` of the same
+    scene at other rates. gains: those of its laws. Raises InputFault where it comes to no rest."""
 
-    def __init__(self, map_: LiftedMap, system: System, T: float, seconds: float) -> None:
+    def __init__(
+        self, map_: LiftedMap, system: System, T: float, start: Vector | None = None
+    ) -> None:
         self._map, self._system, self.T = map_, system, T
-        map_.start = _settling(map_, map_.start)
-        self._home = self._at = equilibrium(map_, seconds)
         self.gains = Gains.of(system)
-        self._scales: dict[str, float] = {}
-        self._hand = 0.0
+        if start is not None and len(start) != len(map_.start):  # holds keep more or fewer samples
+            start = None
+        self._at = linearised(map_, map_.start if start is None else start, SHARED)
+        self._rest(SHARED)
+        map_.forget()  # slopes of the states on the way, which may touch less
+        self._home = self._at = linearised(map_, self._at.point, SHARED)
+        self._set: tuple[Scales, float] = {}, 0.0
+
+    @property
+    def rest(self) -> Vector:
+        """The state at rest with the scene's gains."""
+        return self._home.point
 
     def growth(self, scales: Scales, hand: float) -> float:
         """The growth rate (1/s) of the leading mode, neutral ones aside, with gains scaled by
@@ -64,14 +78,15 @@ class Held:
             at = self._settled(scales, hand)
         except _GrownError as grown:
             return grown.rate
-        except FmuFault:
+        except (FmuFault, InputFault):
             return UNSTABLE
         found = modes(at, self._map.period)  # an error as large as z says nothing of z = 1
         counted = [mode for mode in found if not (mode.neutral and mode.uncertainty < SURE)]
-        return counted[0].growth if counted else UNSTABLE
+        return counted[0].growth if counted and np.isfinite(counted[0].growth) else UNSTABLE
 
     def signal(self, port: str) -> NDArray[np.float64]:
-        """The value of an output `fmu.port` at rest, with the scene's gains."""
+        """The values of an output `fmu.port` at rest, with the scene's gains; none where there is
+        no such output."""
         found = [
             float(self._home.image[i])
             for i, c in enumerate(self._map.coordinates)
@@ -80,12 +95,12 @@ class Held:
         return np.array(found)
 
     def compliance(self, scales: Scales, hand: float, hertz: float) -> Complex:
-        """The handle's pose of unit wrenches of the hand, (3, 3), at a frequency; not a number with
-        gains that are far from stable."""
+        """The handle's pose of unit wrenches of the hand, (3, 3), at a frequency. Raises InputFault
+        where it comes to no rest with these gains."""
         try:
             at = self._settled(scales, hand)
-        except (_GrownError, FmuFault):
-            return np.full((3, 3), np.nan + 0j)
+        except FmuFault as fault:
+            raise InputFault(str(fault)) from None
         signals = SignalVector(self._system)
         F = signals.port(self._system.fmu[HAND], "F")
         x = signals.port(self._system.fmu[DEVICE], "x_true")
@@ -115,30 +130,30 @@ class Held:
         return found
 
     def _settled(self, scales: Scales, hand: float) -> Linear:
-        """The map at its equilibrium with these gains; the search starts from that of the scene's
-        own, so that the result does not depend on what was asked before."""
-        if scales != self._scales or hand != self._hand:
-            values = [*self.gains.parameters(scales), *self._held(hand)]
-            self._map.set_parameters(values)
-            self._hand = 0.0  # until all is done
-            moved = scales.get("contact", 1.0) != 1.0  # other laws do nothing at rest
-            if moved:
-                self._at = self._linear(_settling(self._map, self._home.point), COARSE)
-                for _ in range(STEPS):
-                    if rests(self._at):
-                        break
-                    left = np.eye(len(self._at.A)) - self._at.A
-                    step = np.linalg.lstsq(left, self._at.change, rcond=1e-9)[0]
-                    self._at = self._linear(self._at.moved(np.asarray(step, float)), COARSE)
-                if not np.abs(self._at.change).max() < RESTLESS:
-                    raise _GrownError(UNSTABLE)
-            self._at = self._linear(self._at.point if moved else self._home.point)
-            self._scales, self._hand = dict(scales), hand
+        """The map at rest with these gains, found from the rest of the scene's own, so that the
+        result does not depend on what was asked before."""
+        if (scales, hand) != self._set:
+            self._map.set_parameters([*self.gains.parameters(scales), *self._held(hand)])
+            self._set = {}, 0.0  # until all is done
+            self._at = self._linear(self._home.point, NEARBY)
+            self._rest(NEARBY)
+            self._set = dict(scales), hand
         return self._at
 
-    def _linear(self, point: NDArray[np.float64], same: float = SAME) -> Linear:
-        """The map along the directions of the first equilibrium, whatever the gains; slopes are
-        shared by numbers that differ by `same`."""
+    def _rest(self, same: float) -> None:
+        """Newton's method from where the map is."""
+        for _ in range(STEPS):
+            if rests(self._at):
+                return
+            d = self._at.scales
+            left = np.eye(len(d)) - self._at.A * d / d[:, None]
+            step = d * np.linalg.lstsq(left, self._at.change / d, rcond=NEUTRAL)[0]
+            self._at = self._linear(self._at.moved(np.asarray(step, float)), same)
+        if not rests(self._at):
+            raise InputFault("it comes to no rest in a hand that holds it")
+
+    def _linear(self, point: Vector, same: float) -> Linear:
+        """The map along the directions of the first linearisation, whatever the gains."""
         V = self._at.V
         image, M, D = self._map.slopes(point, V, same, after=_Bounded(self.T))
         return Linear(point, image, V, V.T @ M, V.T @ D)
@@ -152,19 +167,6 @@ class Held:
         for i, stiff in enumerate((stiffness, stiffness, stiffness * LEVER)):
             yield HAND, named[f"stiffness[{i + 1}]"], stiff
             yield HAND, named[f"target[{i + 1}]"], float(x[i] + F[i] / stiff)
-
-
-def _settling(map_: LiftedMap, state: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The state SETTLING seconds after `state`, next to the equilibrium that the scene settles to,
-    so that Newton's method begins on the side of a contact where there is one. As it is where the
-    scene diverges."""
-    start = state
-    try:
-        for _ in range(round(SETTLING / map_.period)):
-            state = map_.image(state)
-    except FmuFault:
-        return start
-    return state if np.isfinite(state).all() else start
 
 
 class _Bounded:
@@ -185,11 +187,11 @@ class _Bounded:
             raise _GrownError(float(np.log(MOST)) / (self._ticks * self._T))
 
 
-class _GrownError(Exception):
+class _GrownError(InputFault):
     """Perturbations grow at a `rate` (1/s)."""
 
     def __init__(self, rate: float) -> None:
-        super().__init__(rate)
+        super().__init__(f"unstable: small motions grow at {rate:.3g} 1/s")
         self.rate = rate
 
 
@@ -216,11 +218,11 @@ def spring(pose: Sequence[float], wrench: Sequence[float], stiffness: float) -> 
 
 
 @contextmanager
-def held(read: Scene) -> Iterator[Held]:
-    """A scene with a spring for a hand, at rest. Raises InputFault where it comes to none."""
+def held(read: Scene, start: Vector | None = None) -> Iterator[Held]:
+    """A scene whose hand is a `spring`, at rest."""
     if read.haptics is None:
         raise InputFault("[haptics]: no rate")
     with built(read) as whole:
         system = long_enough(read, frozen.without(whole)[0])
         with opened(system, 0.0, Closures(read)) as map_:
-            yield Held(map_, system, 1 / float(read.haptics.rate), read.duration)
+            yield Held(map_, system, float(1 / exact(read.haptics.rate)), start)

@@ -1,140 +1,106 @@
-"""The search of gains: limits of stability over poses and hands, and laws that feel alike."""
+"""Limits of stability over poses and hands, what is felt, and the search for a largest scale."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq
 
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.tune.held import UNSTABLE, Complex, Held
+from hapticlink.orchestrator.tune.gains import Scales
+from hapticlink.orchestrator.tune.held import Complex, Held, Vector
 
 HANDS = (100.0, 1000.0)
 """Stiffnesses (N/m) of the hands that a margin is for: a light touch and a firm grip."""
-STRIDE, WIDEST = np.log(2.0), 20 * np.log(2.0)
-"""Of the logarithm of a scale: steps on the way to a limit, and where the way ends."""
-FINE, COARSE = 0.01, 0.1
+FINE = 0.01
 """Of the logarithm of a scale."""
 RIGID = 1e7
-"""Felt stiffness (N/m) above which nothing gives way: the hand's own wrench is cancelled."""
-EQUAL = 0.02
-"""Difference of felt stiffnesses, relative, that is equal."""
-SPARE, ROUNDS = 0.05, 4
-"""Of a margin, relative, that is left over; rounds of making laws alike and scaling all."""
+"""Felt stiffness (N/m) above which nothing gives way."""
+DOUBLINGS = 10
+"""How often a scale is doubled or halved on the way to a limit."""
 
 
-class Search:
-    """Limits of stability over the poses `at`, and stiffnesses along their wrenches."""
+class Judge:
+    """Stability in the poses `at` and what is felt in one of them along unit wrenches, by name."""
 
     def __init__(
-        self, at: Mapping[str, Held], along: Mapping[str, tuple[float, ...]], hertz: float
+        self, at: Mapping[str, Held], felt_at: str, along: Mapping[str, Vector], hertz: float
     ) -> None:
-        self._at, self._along, self._hertz = at, along, hertz
-        self.laws = list(dict.fromkeys(law.name for h in at.values() for law in h.gains.laws))
+        self._at, self.along, self._hertz = at, along, hertz
+        self._felt_at = at[felt_at]
+        self.gains = self._felt_at.gains
+        self.laws = [law.name for law in self.gains.laws]
         if not self.laws:
-            raise InputFault("no coupling, topology controller or contact: no gains to tune")
+            raise InputFault("no virtual coupling and no topology controller: no gains to tune")
+        self._order = [(pose, hand) for hand in HANDS[::-1] for pose in at]
 
-    def alone(self, law: str) -> float:
-        """The scale at which a law is unstable in a firm grip, the others as in the scene, to a
-        tenth: it sets ratios alone."""
-        places = [h for h in self._at.values() if any(each.name == law for each in h.gains.laws)]
-        pose = places[-1] if law == "contact" else places[0]
-        return _limit(lambda s: pose.growth({law: s}, HANDS[-1]), law, COARSE)
+    def unstable(self, scales: Scales, factor: float) -> str | None:
+        """The pose and hand in which all gains times a factor are unstable, None where they are
+        stable in all. The one that was found last is judged first."""
+        for place in self._order:
+            if not self._stable(place, scales, factor):
+                self._order.sort(key=lambda each: each != place)
+                return f"the margin in the pose at {place[0]}, in a hand of {place[1]:g} N/m"
+        return None
 
-    def common(self, scales: Mapping[str, float]) -> float:
-        """The factor on all scales at which the scene is unstable in the worst pose and hand."""
-        limit = np.inf
-        for hand in HANDS[::-1]:
-            for place in self._at.values():
+    def _stable(self, place: tuple[str, float], scales: Scales, factor: float) -> bool:
+        times = {law: scales.get(law, 1.0) * factor for law in self.laws}
+        return self._at[place[0]].growth(times, place[1]) <= 0.0
 
-                def growth(factor: float, place: Held = place, hand: float = hand) -> float:
-                    tried = {law: scales.get(law, 1.0) * factor for law in self.laws}
-                    return place.growth(tried, hand)
-
-                if not np.isfinite(limit) or growth(limit) > 0.0:
-                    limit = _limit(growth, "all gains", FINE)
-        return float(limit)
-
-    def compliances(self, scales: Mapping[str, float]) -> dict[str, Complex]:
-        """The compliance (3, 3) at the handle in each pose."""
-        return {
-            name: place.compliance(scales, HANDS[-1], self._hertz)
-            for name, place in self._at.items()
-        }
-
-    def felt(self, scales: Mapping[str, float]) -> dict[str, float]:
-        """The felt stiffness (N/m) in each pose; infinite where nothing gives way."""
-        found = {}
-        for name, X in self.compliances(scales).items():
-            n = np.array(self._along[name])
-            given_way = float(abs(n @ X @ n))
-            found[name] = np.inf if given_way < 1.0 / RIGID else 1.0 / given_way
+    def margin(self, scales: Scales, fine: float = FINE) -> float:
+        """The largest factor on all gains with which no pose and hand is unstable, to `fine` of its
+        logarithm."""
+        found = np.inf
+        for place in list(self._order):
+            if found == np.inf or not self._stable(place, scales, found):
+                found = largest(partial(self._stable, place, scales), fine)
         return found
 
-    def equal(self, scales: Mapping[str, float]) -> dict[str, float]:
-        """`scales` with the law of what feels stiffer softened until both feel alike; as they are
-        where that law does not make the difference."""
-        felt = self.felt(scales)
-        if len(felt) < 2 or not np.isfinite([*felt.values()]).all():
-            return dict(scales)
-        stiff = max(felt, key=lambda name: felt[name])
-        soft = min(felt, key=lambda name: felt[name])
-        law = {"constraint": "topology", "contact": "contact"}[stiff]
-        if law not in scales or felt[stiff] <= felt[soft] * (1 + EQUAL):
-            return dict(scales)
+    def compliance(self, scales: Scales) -> Complex:
+        """The compliance (3, 3) of the handle where stiffness is felt."""
+        return self._felt_at.compliance(scales, HANDS[-1], self._hertz)
+
+    def felt(self, scales: Scales) -> dict[str, float]:
+        """The felt stiffness (N/m) along each wrench; infinite where nothing gives way."""
+        X = self.compliance(scales)
+        gives = {name: float(abs(n @ X @ n)) for name, n in self.along.items()}
+        return {name: 1.0 / x if x * RIGID > 1.0 else np.inf for name, x in gives.items()}
+
+    def alike(self, scales: Scales) -> dict[str, float]:
+        """`scales` with the topology's one with which the constraint feels like the contact.
+        Raises InputFault where there is none."""
 
         def apart(logarithm: float) -> float:
-            tried = self.felt({**scales, law: float(np.exp(logarithm))})
-            return float(np.log(tried[stiff] / tried[soft]))
+            felt = self.felt({**scales, "topology": float(np.exp(logarithm))})
+            return float(np.log(felt["constraint"] / felt["contact"]))
 
-        top = float(np.log(scales[law]))
-        bottom = top - 10.0
-        if apart(bottom) > 0.0:
-            return dict(scales)
-        return {**scales, law: float(np.exp(brentq(apart, bottom, top, xtol=FINE)))}
-
-    def balanced(
-        self, scales: Mapping[str, float], margin: float
-    ) -> tuple[dict[str, float], float]:
-        """Scales that feel alike at the margin asked for, and their margin: what the softer law
-        gives back of it goes to all laws."""
-        for _ in range(ROUNDS):
-            softened = self.equal(scales)
-            reached = self.common(softened)
-            if softened == scales or reached <= margin * (1 + SPARE):
-                break
-            scales = {law: scale * reached / margin for law, scale in softened.items()}
-        return softened, reached
-
-    def tables(self, scales: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-        found: dict[str, dict[str, Any]] = {}
-        for place in self._at.values():
-            found |= place.gains.tables(scales)
-        return found
+        end = float(np.log(scales["topology"]))
+        way = -np.sign(apart(end)) * np.log(2.0)
+        for _ in range(DOUBLINGS):
+            start, end = end, end + way
+            if apart(end) * way >= 0.0:
+                root = brentq(apart, start, end, xtol=FINE)
+                return {**scales, "topology": float(np.exp(root))}
+        raise InputFault("no stiffness of the topology controller feels like the contact")
 
 
-def _limit(growth: Callable[[float], float], what: str, fine: float) -> float:
-    """The least scale found at which `growth` (1/s) of a scale crosses 0, its logarithm to `fine`;
-    that of WIDEST where there is none."""
-    known: dict[float, float] = {}
-
-    def at(logarithm: float) -> float:
-        if logarithm not in known:
-            found = growth(float(np.exp(logarithm)))
-            known[logarithm] = found if np.isfinite(found) else UNSTABLE
-        return known[logarithm]
-
+def largest(holds: Callable[[float], bool], fine: float) -> float:
+    """The largest scale that holds on the way from 1, found by doubling or halving it and then to
+    `fine` of its logarithm. Raises InputFault where none does."""
     low = high = 0.0
-    if at(0.0) > 0.0:
-        while at(low := low - STRIDE) > 0.0:
-            if low < -WIDEST:
-                raise InputFault(f"{what}: unstable however low the gains are")
-        high = low + STRIDE
+    if holds(1.0):
+        while holds(np.exp(high := high + np.log(2.0))):
+            low = high
+            if low > DOUBLINGS * np.log(2.0):
+                return float(np.exp(low))
     else:
-        while at(high := high + STRIDE) <= 0.0:
-            if high > WIDEST:
-                return float(np.exp(WIDEST))
-        low = high - STRIDE
-    return float(np.exp(brentq(at, low, high, xtol=fine)))
+        while not holds(np.exp(low := low - np.log(2.0))):
+            high = low
+            if low < -DOUBLINGS * np.log(2.0):
+                raise InputFault(f"none holds down to {np.exp(low):.1g} times the scene's")
+    while high - low > fine:
+        middle = (low + high) / 2
+        low, high = (middle, high) if holds(float(np.exp(middle))) else (low, middle)
+    return float(np.exp(low))

@@ -2,90 +2,122 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from hapticlink.orchestrator.results.again import scene_file
+from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.tune.held import Complex
 from hapticlink.orchestrator.tune.poses import Pose
-from hapticlink.orchestrator.tune.search import EQUAL, FINE, HANDS
+from hapticlink.orchestrator.tune.search import HANDS
+
+OF = {"scene": "the scene's gains", "tuned": "tuned"}
+EQUAL = 0.03
+"""Difference of felt stiffnesses, relative, that is equal."""
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """given: the options of the scene that was tuned. tables: its tables with the gains. scales: of
-    its own gains, by law. margin: g of the tuned gains, and `own` that of the scene's. felt:
-    stiffness (N/m) by "constraint" and "contact", and `felt_before` that with the scene's own
-    gains. neighbours: margins by a rate's key and value. limits: of each law alone. compliances:
-    (3, 3) of the handle in each pose, at `hertz`, in a firm grip."""
+    """run: of the scene with its own gains, without its tables. gains: tables of the scene with the
+    tuned ones. scales: of its own gains, by law. margin: g of the tuned gains, not a number before
+    it is known, and `own` that of the scene's. limited_by: why larger gains do not hold. felt:
+    stiffness (N/m) along the wrenches `along`, "constraint" and "contact", in the pose `felt_at`,
+    and `felt_before` that with the scene's own gains; compliance (3, 3) of the handle there, at
+    `hertz`. motion: of the runs with the gains of the "scene" and the "tuned" ones, the largest
+    "distance" of handle and operational point (m) and "energy_peak", the largest energy generated
+    at the user's port (J). neighbours: margins by a rate's key and value."""
 
-    title: str
-    given: tuple[str, ...]
-    tables: dict[str, dict[str, Any]]
+    run: Results
+    gains: dict[str, dict[str, Any]]
     scales: dict[str, float]
     margin: float
+    limited_by: str | None
     own: float
     felt: dict[str, float]
     felt_before: dict[str, float]
+    felt_at: str
+    along: dict[str, tuple[float, ...]]
     poses: tuple[Pose, ...]
-    limits: dict[str, float]
     asked: float
     hertz: float
-    compliances: dict[str, Complex]
+    compliance: Complex | None
+    motion: dict[str, dict[str, float]]
     neighbours: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        return str(self.run.run["scene"]["title"])
 
     def record(self) -> dict[str, Any]:
         """The content of tune.json."""
+        X = self.compliance
         return {
             "title": self.title,
-            "options": list(self.given),
-            "gains": self.tables,
+            "gains": self.gains,
             "scales": self.scales,
-            "limits_alone": self.limits,
             "margin_asked": self.asked,
-            "margin": self.margin,
+            "margin": None if np.isnan(self.margin) else self.margin,
+            "limited_by": self.limited_by,
             "margin_of_scene": self.own,
             "frequency": self.hertz,
             "felt_stiffness": self.felt,
             "felt_stiffness_of_scene": self.felt_before,
-            "compliance": {
-                name: np.stack([X.real, X.imag], axis=-1).tolist()
-                for name, X in self.compliances.items()
-            },
+            "felt_at": self.felt_at,
+            "along": self.along,
+            "compliance": None if X is None else np.stack([X.real, X.imag], axis=-1).tolist(),
+            "motion": self.motion,
             "margins_at_neighbouring_rates": self.neighbours,
             "poses": [asdict(pose) for pose in self.poses],
             "hands": list(HANDS),
         }
 
+    def scene(self) -> str:
+        """The scene with the tuned gains, as a file that stands alone."""
+        scene = deepcopy(self.run.run["scene"])
+        scene["title"] = f"{self.title}, gains tuned to a margin of {self.asked:g}"
+        for key, gains in self.gains.items():
+            table = scene
+            for name in key.split("."):
+                if not isinstance(table[name], Mapping):  # true: all by default
+                    table[name] = {}
+                table = table[name]
+            table.update(gains)
+        return scene_file(replace(self.run, run={**self.run.run, "scene": scene}))
+
     @property
     def finding(self) -> str:
         """What contact and constraint feel like, or the one of them that there is."""
-        said = f"at a margin of {self.margin:.3g}"
+        said = "margin not judged yet" if np.isnan(self.margin) else f"margin {self.margin:.3g}"
         if len(self.felt) == 1:
             ((name, value),) = self.felt.items()
-            if not np.isfinite(value):
-                return f"the {name} feels rigid whatever the gains, {said}"
             times = value / self.felt_before[name]
-            return f"the {name} feels {times:.2g} times as stiff as with the scene's gains, {said}"
+            return f"the {name} feels {times:.2g} times as stiff as with the scene's gains; {said}"
         stiff, soft = sorted(self.felt, key=lambda name: self.felt[name], reverse=True)
-        if not np.isfinite(self.felt[stiff]):
-            return f"the {stiff} feels rigid whatever its gain, {said}"
         times = self.felt[stiff] / self.felt[soft]
-        if times > 1 + EQUAL + FINE:
-            return f"the {stiff} feels {times:.2g} times as stiff as the {soft}, {said}"
-        return f"{stiff} and {soft} feel alike to {100 * (times - 1):.1f} %, {said}"
+        if times > 1 + EQUAL:
+            return f"the {stiff} feels {times:.2g} times as stiff as the {soft}; {said}"
+        return f"{stiff} and {soft} both feel like {self.felt[soft]:.3g} N/m; {said}"
 
     def lines(self) -> Iterator[str]:
         """The result as text."""
         yield self.finding
         yield f"margin {self.margin:.3g}; with the gains of the scene {self.own:.3g}"
+        yield f"limited by {self.limited_by}"
         for name, value in self.felt.items():
             yield (
-                f"{name} feels like {_stiffness(value)} at {self.hertz:g} Hz; with the gains of "
-                f"the scene {_stiffness(self.felt_before[name])}"
+                f"{name} feels like {value:.4g} N/m at {self.hertz:g} Hz; with the gains of the "
+                f"scene {self.felt_before[name]:.4g} N/m"
+            )
+        for gains, run in self.motion.items():
+            yield (
+                f"along the run, {gains} gains: handle at most "
+                f"{1e3 * run['distance']:.3g} mm off, at most {1e3 * run['energy_peak']:.3g} mJ "
+                "generated at the user's port"
             )
         for rate, margin in self.neighbours.items():
             yield f"margin at {rate}: {margin:.3g}" + (" (unstable)" if margin < 1.0 else "")
@@ -96,13 +128,9 @@ class Tuned:
         """The gains as options of a scene, `key=value`."""
         return tuple(
             f"{key}.{name}={overrides.text(value, key)}"
-            for key, table in self.tables.items()
+            for key, table in self.gains.items()
             for name, value in table.items()
         )
-
-
-def _stiffness(value: float) -> str:
-    return f"{value:.4g} N/m" if np.isfinite(value) else "a rigid body"
 
 
 def _quoted(option: str) -> str:

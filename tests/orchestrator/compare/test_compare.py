@@ -17,7 +17,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.compare import numbers, overlay, page, settings
-from hapticlink.orchestrator.compare.again import scene_file
+from hapticlink.orchestrator.results.again import scene_file
 from hapticlink.orchestrator.results.figures import figures as run_figures
 from hapticlink.orchestrator.results.whole_run import named
 
@@ -249,9 +249,20 @@ def test_a_run_without_a_linkage_and_one_that_failed_have_a_page(tmp_path: Path)
     assert f'<td class="bad">{failed.fault.splitlines()[0]}' in html
 
 
-@pytest.mark.parametrize("name", ["closed-loop", "virtual-wall", "two-hands", "push-disc"])
-def test_the_scene_of_a_page_gives_the_same_tables(tmp_path: Path, name: str) -> None:
-    first = hl.run(name, {"duration": 0.2}, out=tmp_path / "first", figures=False)
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("closed-loop", {"sensing": "encoders"}),
+        ("virtual-wall", {}),
+        ("two-hands", {}),
+        ("two-users", {"sensing": "encoders"}),
+        ("push-disc", {}),
+    ],
+)
+def test_the_scene_of_a_page_gives_the_same_tables(
+    tmp_path: Path, name: str, options: dict[str, str]
+) -> None:
+    first = hl.run(name, {"duration": 0.2} | options, out=tmp_path / "first", figures=False)
     text = scene_file(first)
     assert tomllib.loads(text)["title"] == first.run["scene"]["title"]
     (tmp_path / "scene.toml").write_text(text)
