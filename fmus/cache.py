@@ -123,6 +123,9 @@ def _found(place: Path) -> Path | None:
     return None
 
 
+_held: set[Path] = set()
+
+
 @contextmanager
 def _alone(place: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
     """No other process of this machine builds for `place` within the context."""
@@ -139,11 +142,20 @@ def _alone(place: Path, name: str, poll: Callable[[], object]) -> Iterator[None]
     with ExitStack() as stack:
         with suppress(PermissionError):  # the file of another user, who has another cache
             stack.enter_context(lock.held(path, wait))
+            _held.add(path)
         try:
             yield
         finally:
+            _held.discard(path)
             with suppress(OSError):
                 path.unlink()
+
+
+def remove_locks() -> None:
+    """Removes the files of the locks that this process holds; for a process that ends at once."""
+    while _held:
+        with suppress(OSError):
+            _held.pop().unlink()
 
 
 def _made(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from hapticlink.fmus.blocks import Starts, build_block
+from hapticlink.fmus.cache import remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
@@ -31,7 +32,20 @@ def fmu_files(
     rates. Raises InputFault where no FMU can be built from
     the settings (a loop that does not close), Fault where the compiler fails.
     """
-    files = {}
+    interrupt.add(remove_locks)
+    try:
+        return dict(_files(scene, timeline, room, platforms, starts))
+    finally:
+        interrupt.remove(remove_locks)
+
+
+def _files(
+    scene: Scene,
+    timeline: Timeline,
+    room: Path,
+    platforms: Sequence[str],
+    starts: Mapping[str, Starts] | None,
+) -> Iterator[tuple[str, Path]]:
     for block in blocks(scene):
         interrupt.check()
         given: Starts = {}
@@ -44,7 +58,7 @@ def fmu_files(
             }
             experiment = {"stop_time": scene.duration, "step_size": steps[STEP_SIZE]}
         try:
-            files[block.name] = build_block(
+            file = build_block(
                 block.made_by,
                 block.settings,
                 room / block.name,  # two hands are two files of one name
@@ -59,4 +73,4 @@ def fmu_files(
             raise Fault(str(error)) from error
         except FmuError as error:
             raise InputFault(str(error)) from error
-    return files
+        yield block.name, file

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 import threading
 import time
 from contextlib import nullcontext
@@ -178,6 +179,21 @@ def test_whoever_waits_can_be_interrupted(place, room):
     with pytest.raises(KeyboardInterrupt):
         cached(MATERIAL, build, room)
     assert cached(MATERIAL, Builder(), room).exists()
+
+
+def test_a_process_that_ends_at_once_removes_its_locks(place, room, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    found = []
+
+    def ended(folder: Path) -> Path:
+        found.append(len([*(tmp_path / "temporary").iterdir()]))
+        cache.remove_locks()
+        found.append(len([*(tmp_path / "temporary").iterdir()]))
+        return Builder()(folder)
+
+    cached(MATERIAL, ended, room)
+    assert found == [1, 0]
 
 
 def test_off_builds_every_time_and_keeps_nothing(monkeypatch, room):
