@@ -78,7 +78,7 @@ class Joint:
     """A joint of the tree.
 
     Stiffness, damping, friction and a drive act on the one coordinate of a revolute or prismatic
-    joint: -stiffness (q - rest) - damping q' + friction + drive.
+    joint: -stiffness (q - rest) - damping q' - friction + drive.
     """
 
     name: str

@@ -70,6 +70,7 @@ def numbers(results: Results) -> Iterator[str]:
     if found := all_wrenches(results):
         peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())
         yield f"largest forces: {'; '.join(peaks)}"
+        yield from _saturated(results)
     if port := user_port(results):
         told = port.told
         yield (
@@ -88,6 +89,16 @@ def numbers(results: Results) -> Iterator[str]:
     table = of_block(results, CLOSURE)
     if table and len(table["time"]):
         yield f"loops close within {table[CLOSURE].max():.2g} m"
+
+
+def _saturated(results: Results) -> Iterator[str]:
+    """A line for each user whose motors were at their torque limit, and for how long."""
+    from hapticlink.orchestrator.results.episodes import episodes
+
+    found = (episode for episode in episodes(results) if episode.kind == "saturated")
+    for said, spans in groupby(found, key=lambda episode: episode.said):
+        seconds = sum(span.end - span.begin for span in spans)
+        yield f"{said} for {short(seconds)} s: the hand felt less than the controller asked for"
 
 
 def lines(results: Results) -> Iterator[str]:

@@ -73,7 +73,8 @@ def draw(device: Device, start: Pose, title: str) -> Figure:
     handles += [Patch(color=shade) for _, shade, _ in shades]
     labels += [text for _, _, text in shades]
     figure.legend(handles, labels, fontsize="small", ncols=3, loc="outside lower center")
-    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    axes.set_aspect("equal", adjustable="datalim")  # a box would cut the title of a tall one
     axes.set_title(plain(fill(title, 70)), fontsize="medium")
     axes.grid(alpha=0.3)
     return figure

@@ -76,6 +76,8 @@ def _word(kind: Any, quantity: Quantity | None) -> str:
     entries = typing.get_args(kind)
     many = "a list of" if Ellipsis in entries else _COUNTS[len(entries)]
     inner = words(entries[0])
+    if typing.get_origin(entries[0]) is typing.Literal:
+        return f"{many} {inner}"
     if typing.get_origin(entries[0]) is tuple:
         return f"{many} rows of {inner}"
     return f"{many} " + {"a table": "tables", "a text": "texts"}.get(inner, "numbers")

@@ -62,7 +62,8 @@ export class Controls {
         (s) => ({ type: "gain", name: gain.name, factor: s < -1 ? 0 : 10 ** s }),
         (f) => {
           const { factor, value, units } = f.gains[i];
-          return [factor ? Math.log10(factor) : -1.05, text(factor * value[0], units[0])];
+          const k = value.reduce((best, v, j) => (Math.abs(v) > Math.abs(value[best]) ? j : best), 0);
+          return [factor ? Math.log10(factor) : -1.05, text(factor * value[k], units[k])];
         });
     });
   }
