@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results.figures import figures
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.user_port import user_port
 
@@ -147,3 +148,29 @@ def test_contacts_have_an_account_on_both_sides(tmp_path: Path) -> None:
 def test_without_a_handle_there_is_none(tmp_path: Path) -> None:
     found: Results = simulate("five-bar", tmp_path, ["duration=0.01"]).results
     assert user_port(found) is None
+
+
+LACKING = [
+    (["virtual_mechanism", "hand.F", "haptic_device"], False),
+    (["virtual_mechanism", "hand", "haptic_device", "controller", "hand_left"], False),
+    (["virtual_mechanism", "hand", "haptic_device", "hand_left", "haptic_device_left"], True),
+]
+
+
+@pytest.mark.parametrize(("signals", "found"), LACKING)
+def test_what_is_not_recorded_is_nobodys_energy(
+    tmp_path: Path, signals: list[str], found: bool
+) -> None:
+    """Without another hand's work there is no energy at the port, which would be the work's size;
+    without a block's wrench no block, since others would have its energy."""
+    options = ["duration=0.2", f"record.signals={signals}"]
+    results = simulate("two-users", tmp_path, options).results
+    port = user_port(results)
+    assert bool(port) == found
+    if port:
+        whole = user_port(simulate("two-users", tmp_path, options[:1]).results)
+        assert whole
+        np.testing.assert_array_equal(port.generated_J, whole.generated_J)
+        assert whole.blocks_J
+        assert not port.blocks_J
+        figures(results)["user_port"]
