@@ -156,15 +156,25 @@ def works(
     if not (table and moved):
         raise KeyError(f"work needs the signals {signal} and {position}")
     force, stamps, booked = sign * table[signal], table["time"], meters(results)
-    source = ideal(force, stamps, moved, position, at)
     start = f"{signal} -> {position.partition('.')[0]}."
     name = connection or next((n for n in booked if n.startswith(start)), None)
     if name is None:
-        return work(force, stamps, moved, position, at), source
+        return (
+            work(force, stamps, moved, position, at),
+            ideal(force, stamps, moved, position, at),
+        )
     late = results.run["delays"].get(name, {}).get("max", 0.0) if table is moved else 0.0
-    acts, meter = work(force, stamps + late, moved, position, at), booked[name]
+    meter = booked[name]
     until = meter["until"]
-    return _passing(acts, at, until, meter["held"]), _passing(source, at, until, meter["ideal"])
+    to = np.append(at, max(until, at[-1]))  # the meter may have gone on after the last of the times
+    acts, source = (
+        _passing(series, to, until, meter[kind])[:-1]
+        for kind, series in (
+            ("held", work(force, stamps + late, moved, position, to)),
+            ("ideal", ideal(force, stamps, moved, position, to)),
+        )
+    )
+    return acts, source
 
 
 def _passing(series: Vector, at: Vector, until: float, value: float) -> Vector:

@@ -99,6 +99,21 @@ def test_a_run_that_ends_beside_a_frame(tmp_path: Path) -> None:
     assert lost == pytest.approx(energy[-1] - energy[0] - work, abs=1e-9)
 
 
+def test_a_meter_that_goes_on_after_the_last_frame(tmp_path: Path) -> None:
+    """The hand's work until the mechanism's last frame is that of its constant wrench until then,
+    without that of the ticks after it, which the meter has."""
+    options = ["duration=0.6", "graphics.rate=60", "hand.wrench=[-0.5, 0.0, 0.0]"]
+    found = simulate("closed-loop-direct", tmp_path, options).results
+    port, frames, ticks = user_port(found), found.graphics, found.haptics
+    assert port
+    assert found.run["energies_within_a_rate"]["hand.F -> haptic_device.F_hand"]["until"] > (
+        port.time_s[-1] + 0.01
+    )
+    x = np.interp(frames["time"], ticks["time"], ticks["haptic_device.x_true"][:, 0])
+    energy = frames["virtual_mechanism.energy"]
+    np.testing.assert_allclose(port.generated_J, energy - energy[0] + 0.5 * (x - x[0]), atol=1e-12)
+
+
 def test_a_hold_of_its_drift_force_is_that_of_the_meter(tmp_path: Path) -> None:
     results = simulate("closed-loop-direct", tmp_path, ["duration=1.0"]).results
     port = user_port(results)
