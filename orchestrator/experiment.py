@@ -13,7 +13,6 @@ import numpy as np
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault
-from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.run_folder import RunFolder
@@ -68,10 +67,12 @@ def _columns(system: System) -> dict[str, list[str]]:
 
 
 def _left_out(every: System, system: System) -> list[str]:
-    """The outputs `fmu.port` of which no entry is written."""
-    written = None if system.recorded is None else {entry_of(name)[0] for name in system.recorded}
-    outputs = [f"{u.name}.{s.port}" for u in every.fmus for s in u.description.outputs]
-    return [] if written is None else [n for n in dict.fromkeys(outputs) if n not in written]
+    """The outputs `fmu.port` of which an entry is not written."""
+    if system.recorded is None:
+        return []
+    outputs = ((u.name, s) for u in every.fmus for s in u.description.outputs)
+    left_out = (f"{u}.{s.port}" for u, s in outputs if f"{u}.{s.name}" not in system.recorded)
+    return [*dict.fromkeys(left_out)]
 
 
 def simulate(

@@ -244,9 +244,9 @@ def _constraints(results: Results, table: Table, name: str) -> Figure:
 
 def _port(results: Results, port: UserPort) -> Figure:
     peak = 1e3 * port.told["peak"]
-    largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
     title = f"The rendering generates at most {short(peak)} mJ"
-    if peak > 0:
+    if peak > 0 and port.blocks_J:
+        largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
         title += f"; its largest source is the {SOURCES.get(largest, largest)}"
     label = "energy generated at the user's port (mJ)"
     figure, axes = titled(results, title, "time (s)", label)

@@ -26,7 +26,7 @@ the meter's last sample alone, and reached there in proportion to that of the sa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -65,6 +65,14 @@ def user(name: str = "") -> User:
         contact=f"{inputs}F_env",
         inputs=inputs,
     )
+
+
+def needed(results: Results, users: Iterable[str]) -> set[str]:
+    """The signals from which the blocks of these users are found, as far as a run has them."""
+    found: set[str] = set()
+    for each in map(user, users):
+        found |= {*each[:-1], *(source for source, _ in _sources(results, each))}
+    return found
 
 
 def by_block(
@@ -111,14 +119,20 @@ def _into_mechanism(results: Results, each: User, time: Vector) -> dict[str, tup
     """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
     from, by that signal."""
     found = {}
-    for name in meters(results):
-        source, _, target = name.partition(" -> ")
-        if target not in (f"{each.inputs}F_hand", f"{each.inputs}F_drift"):
-            continue
+    for source, target in _sources(results, each):
         if table_of(results, source) and of_block(results, each.point, 3):
             sign = -1.0 if target.endswith("F_drift") else 1.0
+            name = f"{source} -> {target}"
             found[source] = works(results, source, each.point, time, sign, name)
     return found
+
+
+def _sources(results: Results, each: User) -> Iterator[tuple[str, str]]:
+    """Where F_hand and F_drift of the mechanism come from, and that input."""
+    for name in meters(results):
+        source, _, target = name.partition(" -> ")
+        if target in (f"{each.inputs}F_hand", f"{each.inputs}F_drift"):
+            yield source, target
 
 
 def meters(results: Results) -> dict[str, dict[str, float]]:
@@ -142,15 +156,25 @@ def works(
     if not (table and moved):
         raise KeyError(f"work needs the signals {signal} and {position}")
     force, stamps, booked = sign * table[signal], table["time"], meters(results)
-    source = ideal(force, stamps, moved, position, at)
     start = f"{signal} -> {position.partition('.')[0]}."
     name = connection or next((n for n in booked if n.startswith(start)), None)
     if name is None:
-        return work(force, stamps, moved, position, at), source
+        return (
+            work(force, stamps, moved, position, at),
+            ideal(force, stamps, moved, position, at),
+        )
     late = results.run["delays"].get(name, {}).get("max", 0.0) if table is moved else 0.0
-    acts, meter = work(force, stamps + late, moved, position, at), booked[name]
+    meter = booked[name]
     until = meter["until"]
-    return _passing(acts, at, until, meter["held"]), _passing(source, at, until, meter["ideal"])
+    to = np.append(at, max(until, at[-1]))  # the meter may have gone on after the last of the times
+    acts, source = (
+        _passing(series, to, until, meter[kind])[:-1]
+        for kind, series in (
+            ("held", work(force, stamps + late, moved, position, to)),
+            ("ideal", ideal(force, stamps, moved, position, to)),
+        )
+    )
+    return acts, source
 
 
 def _passing(series: Vector, at: Vector, until: float, value: float) -> Vector:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby, islice
 from typing import Any
 
@@ -22,10 +22,11 @@ from hapticlink.orchestrator.results.tracking import (
     further_users,
     has_tracking,
     of_block,
+    of_user,
     pose_error,
 )
 from hapticlink.orchestrator.results.tracking import MECHANISM as TRACKED
-from hapticlink.orchestrator.results.user_port import user_port
+from hapticlink.orchestrator.results.user_port import ENERGY, HAND, user_port
 
 MECHANISM = "virtual_mechanism"
 MARGIN = "haptic_device.workspace_margin"
@@ -114,7 +115,12 @@ def lines(results: Results) -> Iterator[str]:
             "Lambda_inv, P_c and contacts: take graphics.sync = 'exact'"
         )
     yield from replaced(run.get("replaced", {}))
-    yield from unrecorded(run.get("not_recorded", ()))
+    yield from unrecorded(run.get("not_recorded", ()), run["fmus"])
+    if (every := run["scene"]["record"]["every"]) > 1:
+        yield (
+            f"told and drawn from one row in {every} (record.every): what happens between them, "
+            "such as larger forces and energies, is not seen"
+        )
     for fmu, count in run["held_outputs"].items():
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
     for fmu, count in run["smaller_steps"].items():
@@ -207,13 +213,18 @@ USED = {
     "folded frames": (BRANCH,),
     "depth of contacts": ("virtual_mechanism.contact_gap",),
     "friction": (friction_speed.RATES,),
+    "energy at the user's port": (HAND, DEVICE, ENERGY),
 }
 """The signals of what a run tells and draws."""
 
 
-def unrecorded(left_out: Collection[str]) -> Iterator[str]:
-    """A line if what a run tells and draws misses signals that are not recorded."""
-    missing = {what: [s for s in signals if s in left_out] for what, signals in USED.items()}
+def unrecorded(left_out: Collection[str], fmus: Iterable[str] = ()) -> Iterator[str]:
+    """A line if what a run of these FMUs tells and draws misses signals that are not recorded."""
+    users = ["", *(name.removeprefix("hand_") for name in fmus if name.startswith("hand_"))]
+    missing = {
+        what: [s for user in users for name in names if (s := of_user(name, user)) in left_out]
+        for what, names in USED.items()
+    }
     said = [f"{what} ({', '.join(signals)})" for what, signals in missing.items() if signals]
     if said:
         yield f"not recorded, and so not told or drawn in full: {'; '.join(said)} (record.signals)"

@@ -29,6 +29,7 @@ from hapticlink.orchestrator.results.port_blocks import (
     HAND,
     by_block,
     ideal,
+    needed,
     work,
     works,
 )
@@ -39,7 +40,6 @@ from hapticlink.orchestrator.results.tracking import (
     further_users,
     of_block,
     of_user,
-    poses,
     table_of,
 )
 
@@ -71,7 +71,8 @@ class UserPort(NamedTuple):
 
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
 def user_port(results: Results) -> UserPort | None:
-    """The energy at the user's port; None without hand, handle and mechanism."""
+    """The energy at the user's port; None without hand, handle and mechanism, or where the work of
+    another hand is not recorded. Without all signals that its blocks need there are none."""
     mechanism, device = of_block(results, ENERGY), of_block(results, DEVICE, 3)
     if mechanism is None or device is None or of_block(results, HAND, 3) is None:
         return None
@@ -82,26 +83,28 @@ def user_port(results: Results) -> UserPort | None:
     energy = mechanism[ENERGY][: len(time)]
     stored = energy - energy[0]
     put_in = {"": works(results, HAND, DEVICE, time)[0]}
-    users = further_users(results)
-    for name in users:
-        put_in[name] = np.zeros(len(time)) + _of_hand(results, name, poses(name)[1], time)
     further = np.zeros(len(time))
     for name in results.run["connections"]:
-        source, _, target = name.partition(" -> ")
+        hand, _, target = name.partition(" -> ")
         point = target.removesuffix(".F_hand").removeprefix(f"{BLOCK}.")
-        if source == f"hand_{point}.F" and point not in users:
-            further += _of_hand(results, point, f"{BLOCK}.{point}.x", time)
-    blocks = by_block(results, time, stored - further, put_in)
+        if target != f"{BLOCK}.{point}.F_hand":
+            continue
+        if with_device := f"haptic_device_{point}" in results.run["fmus"]:
+            hand, position = of_user(HAND, point), of_user(DEVICE, point)
+        else:
+            position = f"{BLOCK}.{point}.x"
+        moved, pushing = of_block(results, position, 3), table_of(results, hand)
+        if moved is None or pushing is None or pushing[hand].shape[1:] != (3,):
+            return None
+        done = works(results, hand, position, time)[0]
+        if with_device:
+            put_in[point] = done
+        else:
+            further += done
     generated = stored - further - sum(put_in.values())
+    lacks = needed(results, put_in) & {*results.run.get("not_recorded", ())}
+    blocks = {} if lacks else by_block(results, time, stored - further, put_in)
     return UserPort(time, generated, blocks, _works(results, device, time))
-
-
-def _of_hand(results: Results, name: str, position: str, time: Vector) -> Vector | float:
-    """The work (J) of the hand at a further point on a position; 0 where they are not recorded."""
-    hand = f"hand_{name}.F"
-    if not (of_block(results, position, 3) and table_of(results, hand)):
-        return 0.0
-    return works(results, hand, position, time)[0]
 
 
 def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:

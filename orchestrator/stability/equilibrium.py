@@ -24,6 +24,8 @@ PATIENCE = 3
 """Steps of Newton in a row without halving the smallest residual that end a search."""
 COARSE = 0.03
 """Largest relative difference of numbers for which Newton's method shares slopes."""
+HALVINGS = 6
+"""Of a step of Newton's method that changes more over a period than where it begins."""
 NEUTRAL = 1e-7
 """Singular values of the balanced I - A, relative to the largest, that count as 0."""
 
@@ -93,10 +95,26 @@ def _newton(map_: LiftedMap, state: Vector) -> Linear:
         step = d * np.linalg.lstsq(balanced, at.change / d, rcond=NEUTRAL)[0]
         same = SAME if idle else max(SAME, min(COARSE, 0.1 * left))
         try:
-            at = linearised(map_, at.moved(step), same)
+            at = linearised(map_, _nearer(map_, at, step), same)
         except FmuFault:  # far from where it is linear
             break
     return linearised(map_, at.point) if rests(at) else at
+
+
+def _nearer(map_: LiftedMap, at: Linear, step: Vector) -> Vector:
+    """The end of a step, or of the part of it that changes less over a period than where it begins:
+    a step that begins off a contact would end deep in it, where there may be a rest of another
+    kind."""
+    least = _unrest(at).max()
+    for part in 0.5 ** np.arange(HALVINGS):
+        there = at.moved(part * step)
+        try:
+            change = at.V.T @ (map_.image(there) - there)
+        except FmuFault:
+            continue
+        if (np.abs(change) / np.maximum(1.0, np.abs(at.V.T @ there))).max() < least:
+            return there
+    return at.moved(step)
 
 
 def _why_none(map_: LiftedMap, nearest: Linear | None, ended: FmuFault | None) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results.figures import figures
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.user_port import user_port
 
@@ -98,6 +99,21 @@ def test_a_run_that_ends_beside_a_frame(tmp_path: Path) -> None:
     assert lost == pytest.approx(energy[-1] - energy[0] - work, abs=1e-9)
 
 
+def test_a_meter_that_goes_on_after_the_last_frame(tmp_path: Path) -> None:
+    """The hand's work until the mechanism's last frame is that of its constant wrench until then,
+    without that of the ticks after it, which the meter has."""
+    options = ["duration=0.6", "graphics.rate=60", "hand.wrench=[-0.5, 0.0, 0.0]"]
+    found = simulate("closed-loop-direct", tmp_path, options).results
+    port, frames, ticks = user_port(found), found.graphics, found.haptics
+    assert port
+    assert found.run["energies_within_a_rate"]["hand.F -> haptic_device.F_hand"]["until"] > (
+        port.time_s[-1] + 0.01
+    )
+    x = np.interp(frames["time"], ticks["time"], ticks["haptic_device.x_true"][:, 0])
+    energy = frames["virtual_mechanism.energy"]
+    np.testing.assert_allclose(port.generated_J, energy - energy[0] + 0.5 * (x - x[0]), atol=1e-12)
+
+
 def test_a_hold_of_its_drift_force_is_that_of_the_meter(tmp_path: Path) -> None:
     results = simulate("closed-loop-direct", tmp_path, ["duration=1.0"]).results
     port = user_port(results)
@@ -147,3 +163,29 @@ def test_contacts_have_an_account_on_both_sides(tmp_path: Path) -> None:
 def test_without_a_handle_there_is_none(tmp_path: Path) -> None:
     found: Results = simulate("five-bar", tmp_path, ["duration=0.01"]).results
     assert user_port(found) is None
+
+
+LACKING = [
+    (["virtual_mechanism", "hand.F", "haptic_device"], False),
+    (["virtual_mechanism", "hand", "haptic_device", "controller", "hand_left"], False),
+    (["virtual_mechanism", "hand", "haptic_device", "hand_left", "haptic_device_left"], True),
+]
+
+
+@pytest.mark.parametrize(("signals", "found"), LACKING)
+def test_what_is_not_recorded_is_nobodys_energy(
+    tmp_path: Path, signals: list[str], found: bool
+) -> None:
+    """Without another hand's work there is no energy at the port, which would be the work's size;
+    without a block's wrench no block, since others would have its energy."""
+    options = ["duration=0.2", f"record.signals={signals}"]
+    results = simulate("two-users", tmp_path, options).results
+    port = user_port(results)
+    assert bool(port) == found
+    if port:
+        whole = user_port(simulate("two-users", tmp_path, options[:1]).results)
+        assert whole
+        np.testing.assert_array_equal(port.generated_J, whole.generated_J)
+        assert whole.blocks_J
+        assert not port.blocks_J
+        figures(results)["user_port"]

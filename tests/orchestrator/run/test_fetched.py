@@ -60,6 +60,8 @@ def test_recorded_columns_are_those_of_the_whole_table(
     assert (not columns(tmp_path)) == (signals == "none")
     assert {k: found.run[k] for k in TOLD} == {k: whole[0].run[k] for k in TOLD}
     assert bool([*summary.unrecorded(found.run["not_recorded"])]) == (signals != "all")
+    said = " ".join(summary.lines(found.results))
+    assert ("one row in 7" in said) == (every > 1)
 
 
 def test_only_what_is_used_is_fetched(tmp_path: Path) -> None:

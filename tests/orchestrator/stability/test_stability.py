@@ -100,6 +100,40 @@ def test_baumgarte_is_stable_up_to_its_limit_off_the_closures(share: float, verd
     assert len(found.neutral) >= 2  # it moves freely
 
 
+def test_the_equilibrium_at_a_contact_is_that_at_which_a_run_rests() -> None:
+    """A bar that falls on a disc, which Newton's method from its start steps through, to a rest
+    within the disc; a run settles on it, with the growth and frequency of the mode found."""
+    bar = {"name": "bar", "mass": 0.5, "inertia": 1e-3, "center": [0.1, 0.0], "radius": 0.01,
+           "capsule": [[0.15, 0.0]]}  # fmt: skip
+    scene = hl.scene("pendulum", {
+        "duration": 1.0,
+        "haptics.rate": 1024,
+        "linkage": {
+            "gravity": [0.0, -5.0],
+            "body": [bar],
+            "joint": [{"name": "hinge", "child": "bar"}],
+            "operational_point": {"body": "bar", "at": [0.15, 0.0]},
+            "start": {"hinge": 0.1},
+        },
+        "contacts": {
+            "disc": [{"center": [0.15, -0.05], "radius": 0.04}],
+            "stiffness": 4000.0, "damping": 10.0, "detection": "haptics",
+        },
+        "hand": {
+            "type": "spring", "stiffness": [50.0, 50.0, 0.0], "damping": [0.2, 0.2, 0.0],
+            "target": [[0.0, 0.15, -0.01, 0.0]],
+        },
+    })  # fmt: skip
+    found = hl.stability(scene)
+    run = hl.run(scene, figures=False)
+    q = run["virtual_mechanism.q"][:, 0]
+    assert found.equilibrium["virtual_mechanism.q[1]"] == pytest.approx(q[-1], abs=1e-8)
+    near = np.diff(q[600:800])  # q'_{k+1} = a q'_k + b q'_{k-1}
+    a, b = np.linalg.lstsq(np.column_stack([near[1:-1], near[:-2]]), near[2:])[0]
+    assert found.verdict == "stable"
+    assert found.modes[0].z == pytest.approx(max(np.roots([1.0, -a, -b]), key=np.imag), abs=1e-4)
+
+
 def test_growth_and_frequency_are_those_of_a_run_across_rates() -> None:
     """closed-loop-direct in a hand that is a spring: unstable at 30 Hz, with a period of half a
     second that has more than one turn of its mode."""
