@@ -15,6 +15,7 @@ import numpy as np
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
 from hapticlink.orchestrator.stability.linearise import Linear, linearised
+from hapticlink.orchestrator.stability.modes import counted, modes
 from hapticlink.orchestrator.stability.tangent import SAME
 
 TOLERANCE = 1e-9
@@ -32,20 +33,27 @@ NEUTRAL = 1e-7
 
 def equilibrium(map_: LiftedMap, seconds: float) -> Linear:
     """The map linearised at its equilibrium; the search starts from the start of the scene, and
-    then from states that are passed within `seconds`.
+    then from states that are passed within `seconds`. One that the scene leaves without oscillation
+    is taken unless another one, nearer to the start, is found on the way.
 
     Raises InputFault where none is found, naming what does not come to rest.
     """
     state, passed, ahead = map_.start, 0, 1
     nearest: Linear | None = None
+    left: Linear | None = None
     ended: FmuFault | None = None
     while passed * map_.period <= seconds:
         try:
             found = _newton(map_, state)
             if rests(found):
-                _require_rest(map_, found)
-                return found
-            if nearest is None or _unrest(found).max() < _unrest(nearest).max():
+                if left is None or not _leaves(found, map_.period):
+                    _require_rest(map_, found)
+                    if left is not None:
+                        return min(left, found, key=lambda at: _way(map_, at))
+                    if not _leaves(found, map_.period):
+                        return found
+                    left = found
+            elif nearest is None or _unrest(found).max() < _unrest(nearest).max():
                 nearest = found
             for _ in range(ahead):
                 state = map_.image(state)
@@ -53,7 +61,21 @@ def equilibrium(map_: LiftedMap, seconds: float) -> Linear:
             ended = fault
             break
         passed, ahead = passed + ahead, 1 + passed // 2
+    if left is not None:
+        return left
     raise InputFault(_why_none(map_, nearest, ended))
+
+
+def _leaves(at: Linear, period: float) -> bool:
+    """Whether a motion grows without oscillation, as from a standing pendulum."""
+    first = counted(modes(at, period))[:1]
+    return any(not m.z.imag and m.z.real - 1.0 > m.uncertainty for m in first)
+
+
+def _way(map_: LiftedMap, at: Linear) -> float:
+    """How far the start is, relative, along the directions in which the map moves."""
+    way = np.abs(at.V.T @ (at.point - map_.start))
+    return float((way / np.maximum(1.0, np.abs(at.V.T @ at.point))).max())
 
 
 def _require_rest(map_: LiftedMap, at: Linear) -> None:

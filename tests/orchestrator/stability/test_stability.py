@@ -100,9 +100,15 @@ def test_baumgarte_is_stable_up_to_its_limit_off_the_closures(share: float, verd
     assert len(found.neutral) >= 2  # it moves freely
 
 
-def test_the_equilibrium_at_a_contact_is_that_at_which_a_run_rests() -> None:
-    """A bar that falls on a disc, which Newton's method from its start steps through, to a rest
-    within the disc; a run settles on it, with the growth and frequency of the mode found."""
+@pytest.mark.parametrize(("start", "at", "pull"), [(0.1, 0.0, 50.0), (1.0, 0.95, 1.0)])
+def test_the_equilibrium_at_a_contact_is_that_at_which_a_run_rests(
+    start: float, at: float, pull: float
+) -> None:
+    """A bar that falls on a disc at an angle, where a run settles with the growth and frequency of
+    the mode found. Newton's method from its start would step through the disc, to a rest within
+    it, or up to where the bar stands."""
+    along, below = np.exp(1j * at), np.exp(1j * (at - np.pi / 2))
+    center = 0.15 * along + 0.05 * below
     bar = {"name": "bar", "mass": 0.5, "inertia": 1e-3, "center": [0.1, 0.0], "radius": 0.01,
            "capsule": [[0.15, 0.0]]}  # fmt: skip
     scene = hl.scene("pendulum", {
@@ -113,14 +119,14 @@ def test_the_equilibrium_at_a_contact_is_that_at_which_a_run_rests() -> None:
             "body": [bar],
             "joint": [{"name": "hinge", "child": "bar"}],
             "operational_point": {"body": "bar", "at": [0.15, 0.0]},
-            "start": {"hinge": 0.1},
+            "start": {"hinge": start},
         },
         "contacts": {
-            "disc": [{"center": [0.15, -0.05], "radius": 0.04}],
+            "disc": [{"center": [center.real, center.imag], "radius": 0.04}],
             "stiffness": 4000.0, "damping": 10.0, "detection": "haptics",
         },
         "hand": {
-            "type": "spring", "stiffness": [50.0, 50.0, 0.0], "damping": [0.2, 0.2, 0.0],
+            "type": "spring", "stiffness": [pull, pull, 0.0], "damping": [0.2, 0.2, 0.0],
             "target": [[0.0, 0.15, -0.01, 0.0]],
         },
     })  # fmt: skip
