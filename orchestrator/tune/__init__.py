@@ -105,24 +105,22 @@ def tune(
                 tell(f"  {', '.join(felt)}: gains times {', '.join(times)}")
                 keep(result)
 
-            def holds(scales: dict[str, float]) -> bool:
-                why = judge.unstable(scales, margin)
-                if why is None:
-                    moved = motion(simulated(scene, given, feel.gains.options(scales)), end)
-                    if moved["distance"] <= within:
-                        result.motion["tuned"] = moved
-                        take(feel, scales)
-                        return True
-                    why = f"the run: the handle may leave its point by {1e3 * within:.3g} mm"
-                result.limited_by = why
-                return False
+            def require(scales: dict[str, float]) -> None:
+                if why := judge.unstable(scales, margin):
+                    raise InputFault(why)
+                moved = motion(simulated(scene, given, feel.gains.options(scales)), end)
+                if not moved["distance"] <= within:
+                    raise InputFault(
+                        f"the run: the handle may leave its point by {1e3 * within:.3g} mm"
+                    )
+                result.motion["tuned"] = moved
+                take(feel, scales)
 
             tell("gains that keep the margin and the run")
             try:
-                scales = search(start, feel, holds)
+                scales, result.limited_by = search(start, feel, require)
             except InputFault as fault:
-                why = result.limited_by or "an equal feel"
-                raise InputFault(f"no gains keep {why}: {fault}; {REMEDY}") from None
+                raise InputFault(f"{fault}; {REMEDY}") from None
         tell("the margin at the scene's own rates")
         with at_rest(scene, given, found, tell, rests) as at:
             judge = Judge(at)

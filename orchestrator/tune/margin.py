@@ -42,9 +42,12 @@ class Judge:
 
     def margin(self, scales: Scales, fine: float = FINE) -> float:
         """The largest factor on all gains with which no pose and hand is unstable, to `fine` of its
-        logarithm."""
+        logarithm. Raises InputFault where there is none."""
         found = np.inf
         for place in list(self._order):
             if found == np.inf or not self._stable(place, scales, found):
-                found = largest(partial(self._stable, place, scales), fine)
+                try:
+                    found = largest(partial(self._stable, place, scales), fine)
+                except InputFault:
+                    raise InputFault(f"unstable with any gains in the pose at {place[0]}") from None
         return found

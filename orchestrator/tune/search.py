@@ -6,33 +6,49 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.tune.feel import Feel
-from hapticlink.orchestrator.tune.largest import largest
+from hapticlink.orchestrator.tune.largest import DOUBLINGS, largest
 
 COARSE = 0.05
 """Of the logarithm of a scale, how well the largest is found."""
 Scales = dict[str, float]
 
 
-def search(scales: Scales, feel: Feel, holds: Callable[[Scales], bool]) -> Scales:
-    """The largest scales that hold, by law, from given ones on. Raises InputFault where none do."""
+def search(scales: Scales, feel: Feel, require: Callable[[Scales], None]) -> tuple[Scales, str]:
+    """The largest scales that hold, by law, from given ones on, and why larger ones do not.
+    `require` raises InputFault with the reason, and so does this where none hold."""
     if {"drift", "topology"} <= {*scales} and {"constraint", "contact"} <= {*feel.along}:
-        return _raised("drift", scales, feel.alike, holds)
+        return _raised("drift", scales, feel.alike, require)
+    why = ""
     for law in ("topology", "drift"):
         if law in scales:
-            scales = _raised(law, scales, dict, holds)
-    return scales
+            scales, why = _raised(law, scales, dict, require)
+    return scales, why
 
 
 def _raised(
     law: str,
     scales: Scales,
     completed: Callable[[Scales], Scales],
-    holds: Callable[[Scales], bool],
-) -> Scales:
+    require: Callable[[Scales], None],
+) -> tuple[Scales, str]:
     """The scales, `completed`, with the largest one of a law."""
+    why = f"nothing up to {2**DOUBLINGS} times the scene's"
 
     def at(times: float) -> Scales:
         return completed({**scales, law: times * scales[law]})
 
-    return at(largest(lambda times: holds(at(times)), COARSE))
+    def holds(times: float) -> bool:
+        nonlocal why
+        try:
+            require(at(times))
+        except InputFault as fault:
+            why = str(fault)
+            return False
+        return True
+
+    try:
+        return at(largest(holds, COARSE)), why
+    except InputFault as fault:
+        raise InputFault(f"limited by {why}: {fault}") from None
