@@ -12,9 +12,6 @@ from hapticlink.orchestrator.commands.options import Out, Scene, Set, default_fo
 Margin = Annotated[
     float, Parameter(help="Factor on all stiffnesses, 1 or more, at which the map is unstable.")
 ]
-Hertz = Annotated[float, Parameter(help="Frequency (Hz) of pressing at which stiffness is felt.")]
-Count = Annotated[int, Parameter(help="Poses along the scene's own run in which gains are judged.")]
-Neighbours = Annotated[bool, Parameter(help="Margins at neighbouring rates, as well.")]
 
 
 def tune(
@@ -24,9 +21,6 @@ def tune(
     out: Out = None,
     set: Set = None,
     margin: Margin = 2.0,
-    hertz: Hertz = 2.0,
-    poses: Count = 5,
-    neighbours: Neighbours = True,
 ) -> int:
     """Find gains with which contact and joint constraint feel equally stiff, as stiff as a margin
     of stability allows for the scene's rates and holds, in poses of its own run.
@@ -61,16 +55,7 @@ def tune(
         kept = True
 
     try:
-        found = find(
-            scene,
-            given,
-            margin=margin,
-            hertz=hertz,
-            count=poses,
-            neighbours=neighbours,
-            tell=say,
-            keep=keep,
-        )
+        found = find(scene, given, margin=margin, tell=say, keep=keep)
     except Interrupted:
         say(f"interrupted: {f'{folder}/ has' if kept else 'no'} gains found so far")
         return 1

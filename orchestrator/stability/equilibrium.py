@@ -102,6 +102,14 @@ def _unrest(at: Linear) -> Vector:
     return found
 
 
+def newton_step(at: Linear) -> Vector:
+    """d along each direction, of least norm in balanced coordinates."""
+    d = at.scales
+    left = np.eye(len(d)) - at.A * d / d[:, None]
+    found: Vector = d * np.linalg.lstsq(left, at.change / d, rcond=NEUTRAL)[0]
+    return found
+
+
 def _newton(map_: LiftedMap, state: Vector) -> Linear:
     """Newton's method from `state`: the last point where the FMUs can be evaluated. Slopes are
     shared by numbers as different as the residual allows, as long as it shrinks with them."""
@@ -112,12 +120,9 @@ def _newton(map_: LiftedMap, state: Vector) -> Linear:
         if left <= TOLERANCE or idle == PATIENCE:
             break
         least = min(least, left)
-        d = at.scales
-        balanced = np.eye(len(d)) - at.A * d / d[:, None]
-        step = d * np.linalg.lstsq(balanced, at.change / d, rcond=NEUTRAL)[0]
         same = SAME if idle else max(SAME, min(COARSE, 0.1 * left))
         try:
-            at = linearised(map_, _nearer(map_, at, step), same)
+            at = linearised(map_, _nearer(map_, at, newton_step(at)), same)
         except FmuFault:  # far from where it is linear
             break
     return linearised(map_, at.point) if rests(at) else at

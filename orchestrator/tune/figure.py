@@ -10,9 +10,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from hapticlink.orchestrator.results.figure_axes import plain
+from hapticlink.orchestrator.tune.feel import HERTZ
 from hapticlink.orchestrator.tune.tuned import Tuned
 
 COLOURS = {"constraint": "tab:blue", "contact": "tab:orange"}
+NAMES = {"scene": "the scene's gains", "tuned": "tuned"}
 
 
 def draw(tuned: Tuned) -> Figure:
@@ -28,23 +30,21 @@ def draw(tuned: Tuned) -> Figure:
 
 
 def _felt(axes: Axes, tuned: Tuned) -> None:
-    sets = (tuned.felt_before, tuned.felt)
-    width = 0.8 / len(tuned.felt)
-    for i, name in enumerate(tuned.felt):
-        values = np.array([felt[name] for felt in sets])
-        bars = axes.bar(np.arange(2) + i * width, values, width, label=name, color=COLOURS[name])
+    width = 0.8 / len(tuned.along)
+    for i, name in enumerate(tuned.along):
+        values = np.array([felt[name] for felt in tuned.felt.values()])
+        places = np.arange(len(values)) + i * width
+        bars = axes.bar(places, values, width, label=name, color=COLOURS[name])
         axes.bar_label(bars, fmt="%.0f", fontsize="small")
-    axes.set_xticks(np.arange(2) + 0.4 - width / 2, ["the scene's gains", "tuned"])
-    axes.set_ylabel(f"felt stiffness at {tuned.hertz:g} Hz (N/m)")
+    axes.set_xticks(np.arange(2) + 0.4 - width / 2, list(NAMES.values()))
+    axes.set_ylabel(f"felt stiffness at {HERTZ:g} Hz (N/m)")
     axes.margins(y=0.15)
     axes.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
 def _margins(axes: Axes, tuned: Tuned) -> None:
-    margins = {"the scene's gains": tuned.own, **tuned.neighbours}
-    if np.isfinite(tuned.margin):
-        margins = {"the scene's gains": tuned.own, "tuned": tuned.margin, **tuned.neighbours}
-    bars = axes.barh([fill(name, 24) for name in margins], list(margins.values()), 0.6, color="0.6")
+    names = [fill(NAMES.get(at, at), 24) for at in tuned.margins]
+    bars = axes.barh(names, list(tuned.margins.values()), 0.6, color="0.6")
     axes.bar_label(bars, fmt="%.3g", fontsize="small", padding=2)
     axes.axvline(1.0, color="tab:red", lw=1.0, label="unstable below")
     axes.axvline(tuned.asked, color="0.2", lw=1.0, ls="--", label="asked for")

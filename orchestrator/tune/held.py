@@ -1,18 +1,17 @@
-"""A scene at rest in a pose, in a hand: its lifted map under changed gains, and what a hand feels.
+"""A scene at rest in a pose, in a hand: its lifted map under changed gains, and its compliance.
 
-The hand is cut off, and a wrench n cos(w t) + i n sin(w t) is held over each haptic period T in its
-place, wherever the hand's goes. With z' = A z + b and the handle's pose x_k = C_k z + d_k over a
-hyperperiod of N periods, the steady response and its part at w are
+With the hand cut off (stability/cut.py), the displacements dx of the handle over each of the N
+haptic periods T of a hyperperiod answer to its stacked wrenches by dx = G u. The wrench n exp(i w
+kT), held over each period, moves it at w by
 
-    z = (exp(i w N T) - A)^-1 b,   X = 1/N sum_k exp(-i w k T) x_k
+    X n = W' G W n / (exp(i w T) - 1),   W_k = exp(i w kT)/sqrt(N)
 
-X of the unit wrenches are the columns of the compliance; along n it is n' X n, and the dynamic
-stiffness 1/|n' X n| (N/m for a wrench with a unit force).
+the compliance X (3, 3).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -21,20 +20,17 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.plan.operations import Get
-from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability import frozen
 from hapticlink.orchestrator.stability.closures import Closures
-from hapticlink.orchestrator.stability.equilibrium import NEUTRAL, rests
+from hapticlink.orchestrator.stability.cut import hand_port, response
+from hapticlink.orchestrator.stability.equilibrium import newton_step, rests
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear, linearised
 from hapticlink.orchestrator.stability.modes import modes
-from hapticlink.orchestrator.stability.state_vector import SIGNALS
-from hapticlink.orchestrator.stability.tangent import Columns, Instruction
 from hapticlink.orchestrator.system.built import built
-from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.tune.gains import Gains, Scales
+from hapticlink.orchestrator.tune.spring_hand import LEVER
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -45,22 +41,23 @@ STEPS = 12
 SHARED, NEARBY = 1e-4, 1e-2
 """Relative difference of numbers that share slopes: on the way to rest, and about the rest of the
 scene's own gains, next to which that of others is."""
-UNSTABLE = 50.0
-"""Growth (1/s) that counts for gains with which the FMUs diverge at once."""
+SURE = 0.01
+"""Uncertainty of an eigenvalue below which it may count as 1."""
+GROWN = 1e7
+"""Growth over a period with which rounding errors move the state that is linearised."""
 
 
 class Held:
     """A scene at rest in a spring hand, looked for from a `start`, such as the `rest` of the same
-    scene at other rates. gains: those of its laws. Raises InputFault where it comes to no rest."""
+    scene at other rates. T: the haptic period (s). gains: those of its laws. Raises InputFault
+    where it comes to no rest."""
 
-    def __init__(
-        self, map_: LiftedMap, system: System, T: float, start: Vector | None = None
-    ) -> None:
-        self._map, self._system, self.T = map_, system, T
-        self.gains = Gains.of(system)
-        if start is not None and len(start) != len(map_.start):  # holds keep more or fewer samples
-            start = None
-        self._at = linearised(map_, map_.start if start is None else start, SHARED)
+    def __init__(self, map_: LiftedMap, T: float, start: Vector | None = None) -> None:
+        self._map, self._T = map_, T
+        self.gains = Gains(map_.system)
+        if start is None or len(start) != len(map_.start):  # holds keep more or fewer samples
+            start = map_.start
+        self._at = linearised(map_, start, SHARED)
         self._rest(SHARED)
         map_.forget()  # slopes of the states on the way, which may touch less
         self._home = self._at = linearised(map_, self._at.point, SHARED)
@@ -71,18 +68,16 @@ class Held:
         """The state at rest with the scene's gains."""
         return self._home.point
 
-    def growth(self, scales: Scales, hand: float) -> float:
-        """The growth rate (1/s) of the leading mode, neutral ones aside, with gains scaled by
-        `scales` in a spring hand of the stiffness `hand` (N/m)."""
+    def stable(self, scales: Scales, hand: float) -> bool:
+        """Whether no mode grows, neutral ones aside, with gains scaled by `scales` in a spring hand
+        of the stiffness `hand` (N/m)."""
         try:
             at = self._settled(scales, hand)
-        except _GrownError as grown:
-            return grown.rate
-        except (FmuFault, InputFault):
-            return UNSTABLE
+        except (FmuFault, InputFault):  # diverges at once
+            return False
         found = modes(at, self._map.period)  # an error as large as z says nothing of z = 1
         counted = [mode for mode in found if not (mode.neutral and mode.uncertainty < SURE)]
-        return counted[0].growth if counted and np.isfinite(counted[0].growth) else UNSTABLE
+        return bool(counted) and counted[0].growth <= 0.0
 
     def signal(self, port: str) -> NDArray[np.float64]:
         """The values of an output `fmu.port` at rest, with the scene's gains; none where there is
@@ -95,39 +90,17 @@ class Held:
         return np.array(found)
 
     def compliance(self, scales: Scales, hand: float, hertz: float) -> Complex:
-        """The handle's pose of unit wrenches of the hand, (3, 3), at a frequency. Raises InputFault
-        where it comes to no rest with these gains."""
+        """The compliance (3, 3) of the handle at a frequency. Raises InputFault where it comes to
+        no rest with these gains."""
         try:
             at = self._settled(scales, hand)
         except FmuFault as fault:
             raise InputFault(str(fault)) from None
-        signals = SignalVector(self._system)
-        F = signals.port(self._system.fmu[HAND], "F")
-        x = signals.port(self._system.fmu[DEVICE], "x_true")
-        k, wT = at.V.shape[1], 2 * np.pi * hertz * self.T
-        seen: list[NDArray[np.float64]] = []
-
-        def inject(operation: Instruction, M: Columns) -> None:
-            if not (isinstance(operation, Get) and operation.fmu == HAND):
-                return
-            signal = M[SIGNALS].copy()
-            signal[F] = 0.0
-            turn = wT * len(seen)
-            for i, row in enumerate(F):
-                signal[row, k + i], signal[row, k + 3 + i] = np.cos(turn), np.sin(turn)
-            seen.append(signal[x].copy())
-            M[SIGNALS] = signal
-
-        start = np.hstack([at.V, np.zeros((len(at.V), 6))])
-        _, M, _ = self._map.slopes(at.point, start, after=inject)
-        N = len(seen)
-        end, poses = at.V.T @ M, np.stack(seen)
-        b = end[:, k : k + 3] + 1j * end[:, k + 3 :]
-        z = np.linalg.solve(np.exp(1j * wT * N) * np.eye(k) - end[:, :k], b)
-        turned = np.exp(-1j * wT * np.arange(N))[:, None, None]
-        response = poses[:, :, :k] @ z + poses[:, :, k : k + 3] + 1j * poses[:, :, k + 3 :]
-        found: Complex = (turned * response).mean(axis=0)
-        return found
+        found = response(self._map, at, hand_port(self._map.system))
+        N, wT = found.forces // found.m, 2 * np.pi * hertz * self._T
+        W = np.kron(np.exp(1j * wT * np.arange(N))[:, None], np.eye(found.m)) / np.sqrt(N)
+        X: Complex = W.conj().T @ found.at(wT * N) @ W / (np.exp(1j * wT) - 1)
+        return X
 
     def _settled(self, scales: Scales, hand: float) -> Linear:
         """The map at rest with these gains, found from the rest of the scene's own, so that the
@@ -145,84 +118,35 @@ class Held:
         for _ in range(STEPS):
             if rests(self._at):
                 return
-            d = self._at.scales
-            left = np.eye(len(d)) - self._at.A * d / d[:, None]
-            step = d * np.linalg.lstsq(left, self._at.change / d, rcond=NEUTRAL)[0]
-            self._at = self._linear(self._at.moved(np.asarray(step, float)), same)
+            self._at = self._linear(self._at.moved(newton_step(self._at)), same)
         if not rests(self._at):
             raise InputFault("it comes to no rest in a hand that holds it")
 
     def _linear(self, point: Vector, same: float) -> Linear:
-        """The map along the directions of the first linearisation, whatever the gains."""
+        """The map along the directions of the first linearisation, whatever the gains. Raises
+        InputFault where it is too unstable."""
         V = self._at.V
-        image, M, D = self._map.slopes(point, V, same, after=_Bounded(self.T))
-        return Linear(point, image, V, V.T @ M, V.T @ D)
+        image, M, D = self._map.slopes(point, V, same)
+        found = Linear(point, image, V, V.T @ M, V.T @ D)
+        d = found.scales
+        if not np.abs(found.A * d / d[:, None]).max() < GROWN:
+            raise InputFault("unstable: small motions grow at once")
+        return found
 
     def _held(self, stiffness: float) -> Iterator[tuple[str, Scalar, float]]:
         """The hand's stiffness, the target moved so that it presses as before."""
-        x = self.signal(f"{DEVICE}.x_true")
-        scalars = self._system.fmu[HAND].description.scalars
+        x, F = self.signal(f"{DEVICE}.x_true"), self.signal(f"{HAND}.F")
+        scalars = self._map.system.fmu[HAND].description.scalars
         named = {s.name: s for s in scalars if s.causality == "parameter"}
-        F = self.signal(f"{HAND}.F")
         for i, stiff in enumerate((stiffness, stiffness, stiffness * LEVER)):
             yield HAND, named[f"stiffness[{i + 1}]"], stiff
             yield HAND, named[f"target[{i + 1}]"], float(x[i] + F[i] / stiff)
 
 
-class _Bounded:
-    """Ends a pass over a hyperperiod in which perturbations grow so much that rounding errors do,
-    too, and the state is no longer the one that was linearised."""
-
-    def __init__(self, T: float) -> None:
-        self._T, self._ticks, self._first = T, 0, 0.0
-
-    def __call__(self, operation: Instruction, M: Columns) -> None:
-        if not (isinstance(operation, Get) and operation.fmu == HAND):
-            return
-        self._ticks += 1
-        size = float(np.abs(M[SIGNALS]).max())
-        if self._ticks <= FIRST:
-            self._first = max(self._first, size)
-        elif not size < MOST * self._first:
-            raise _GrownError(float(np.log(MOST)) / (self._ticks * self._T))
-
-
-class _GrownError(InputFault):
-    """Perturbations grow at a `rate` (1/s)."""
-
-    def __init__(self, rate: float) -> None:
-        super().__init__(f"unstable: small motions grow at {rate:.3g} 1/s")
-        self.rate = rate
-
-
-FIRST, MOST = 4, 1e7
-"""Ticks whose largest perturbation is the size of all, and how much more is growth."""
-SURE = 0.01
-"""Uncertainty of an eigenvalue below which it may count as 1."""
-LEVER = 1 / 300
-"""Rotational stiffness of the hand (N.m/rad) over that of its translations (N/m)."""
-DAMPING = (5.0, 5.0, 0.01)
-"""Of the hand (N.s/m, N.m.s/rad)."""
-
-
-def spring(pose: Sequence[float], wrench: Sequence[float], stiffness: float) -> dict[str, object]:
-    """The [hand] table of a spring that presses with `wrench` on a handle at `pose`."""
-    stiff = [stiffness, stiffness, stiffness * LEVER]
-    target = [float(x + F / k) for x, F, k in zip(pose, wrench, stiff, strict=True)]
-    return {
-        "type": "spring",
-        "stiffness": stiff,
-        "damping": list(DAMPING),
-        "target": [[0.0, *target]],
-    }
-
-
 @contextmanager
 def held(read: Scene, start: Vector | None = None) -> Iterator[Held]:
     """A scene whose hand is a `spring`, at rest."""
-    if read.haptics is None:
-        raise InputFault("[haptics]: no rate")
     with built(read) as whole:
         system = long_enough(read, frozen.without(whole)[0])
         with opened(system, 0.0, Closures(read)) as map_:
-            yield Held(map_, system, float(1 / exact(read.haptics.rate)), start)
+            yield Held(map_, float(1 / exact(read.haptics.rate)), start)

@@ -3,22 +3,24 @@ contact with the median force of all that are."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import MECHANISM, table_of
 from hapticlink.orchestrator.scene import overrides
-from hapticlink.orchestrator.tune.held import Vector, spring
+from hapticlink.orchestrator.tune.held import Held, Vector, held
+from hapticlink.orchestrator.tune.spring_hand import FIRM, spring
 
 FORCE, JOINTS = "virtual_mechanism.F_env", "virtual_mechanism.q"
-FIRM = 1000.0
-"""Stiffness (N/m) of the hand in which a pose comes to rest."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,30 @@ def poses(run: Results, linkage: Linkage, count: int) -> list[Pose]:
         )
         for i in moments
     ]
+
+
+@contextmanager
+def at_rest(
+    scene: str | Path,
+    given: Sequence[str],
+    found: Sequence[Pose],
+    tell: Callable[[str], object],
+    starts: Mapping[str, Vector] = {},
+) -> Iterator[dict[str, Held]]:
+    """The scene at rest in each pose, by name, looked for from `starts`; poses without rest are
+    left out and told. Raises InputFault where none has any."""
+    with ExitStack() as stack:
+        at = {}
+        for pose in found:
+            try:
+                read = open_scene.load(scene, pose.options(given))
+                at[pose.name] = stack.enter_context(held(read, starts.get(pose.name)))
+            except (InputFault, FmuFault) as fault:
+                tell(f"  pose at {pose.name} is left out: {fault}")
+        tell(f"  {len(at)} poses at rest")
+        if not at:
+            raise InputFault("the scene comes to no rest in any pose of its run, in a firm grip")
+        yield at
 
 
 def _by_joint(linkage: Linkage, q: Vector) -> dict[str, float | list[float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -12,42 +12,36 @@ import numpy as np
 from hapticlink.orchestrator.results.again import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
-from hapticlink.orchestrator.tune.held import Complex
+from hapticlink.orchestrator.tune.feel import HERTZ
+from hapticlink.orchestrator.tune.held import Complex, Vector
 from hapticlink.orchestrator.tune.poses import Pose
-from hapticlink.orchestrator.tune.search import HANDS
+from hapticlink.orchestrator.tune.spring_hand import HANDS
 
-OF = {"scene": "the scene's gains", "tuned": "tuned"}
 EQUAL = 0.03
 """Difference of felt stiffnesses, relative, that is equal."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Tuned:
-    """run: of the scene with its own gains, without its tables. gains: tables of the scene with the
-    tuned ones. scales: of its own gains, by law. margin: g of the tuned gains, not a number before
-    it is known, and `own` that of the scene's. limited_by: why larger gains do not hold. felt:
-    stiffness (N/m) along the wrenches `along`, "constraint" and "contact", in the pose `felt_at`,
-    and `felt_before` that with the scene's own gains; compliance (3, 3) of the handle there, at
-    `hertz`. motion: of the runs with the gains of the "scene" and the "tuned" ones, the largest
-    "distance" of handle and operational point (m) and "energy_peak", the largest energy generated
-    at the user's port (J). neighbours: margins by a rate's key and value."""
+    """run: of the scene with its own gains, without its tables. asked: the margin. poses: where
+    gains were judged; felt_at: the one where stiffness is felt, along unit wrenches: "constraint",
+    "contact". With the gains of the "scene" and the "tuned" ones, margins: g, also at neighbouring
+    rates, once judged; felt: stiffness (N/m) along each wrench; motion: along the run, the largest
+    "distance" of handle and operational point (m), and "energy_peak", the largest energy generated
+    at the user's port (J). gains: the tuned ones, as options of the scene. compliance: (3, 3) of
+    the handle with them. limited_by: why larger gains do not hold."""
 
     run: Results
-    gains: dict[str, dict[str, Any]]
-    scales: dict[str, float]
-    margin: float
-    limited_by: str | None
-    own: float
-    felt: dict[str, float]
-    felt_before: dict[str, float]
-    felt_at: str
-    along: dict[str, tuple[float, ...]]
-    poses: tuple[Pose, ...]
     asked: float
-    hertz: float
-    compliance: Complex | None
+    poses: Sequence[Pose]
+    felt_at: str
+    along: Mapping[str, Vector]
+    margins: dict[str, float]
+    felt: dict[str, dict[str, float]]
     motion: dict[str, dict[str, float]]
-    neighbours: dict[str, float] = field(default_factory=dict)
+    gains: dict[str, float | list[float]] = field(default_factory=dict)
+    compliance: Complex | None = None
+    limited_by: str | None = None
 
     @property
     def title(self) -> str:
@@ -59,19 +53,15 @@ class Tuned:
         return {
             "title": self.title,
             "gains": self.gains,
-            "scales": self.scales,
             "margin_asked": self.asked,
-            "margin": None if np.isnan(self.margin) else self.margin,
+            "margins": self.margins,
             "limited_by": self.limited_by,
-            "margin_of_scene": self.own,
-            "frequency": self.hertz,
+            "frequency": HERTZ,
             "felt_stiffness": self.felt,
-            "felt_stiffness_of_scene": self.felt_before,
             "felt_at": self.felt_at,
-            "along": self.along,
+            "along": {name: n.tolist() for name, n in self.along.items()},
             "compliance": None if X is None else np.stack([X.real, X.imag], axis=-1).tolist(),
             "motion": self.motion,
-            "margins_at_neighbouring_rates": self.neighbours,
             "poses": [asdict(pose) for pose in self.poses],
             "hands": list(HANDS),
         }
@@ -80,58 +70,45 @@ class Tuned:
         """The scene with the tuned gains, as a file that stands alone."""
         scene = deepcopy(self.run.run["scene"])
         scene["title"] = f"{self.title}, gains tuned to a margin of {self.asked:g}"
-        for key, gains in self.gains.items():
+        for key, value in self.gains.items():
+            *names, last = key.split(".")
             table = scene
-            for name in key.split("."):
+            for name in names:
                 if not isinstance(table[name], Mapping):  # true: all by default
                     table[name] = {}
                 table = table[name]
-            table.update(gains)
+            table[last] = value
         return scene_file(replace(self.run, run={**self.run.run, "scene": scene}))
 
     @property
     def finding(self) -> str:
         """What contact and constraint feel like, or the one of them that there is."""
-        said = "margin not judged yet" if np.isnan(self.margin) else f"margin {self.margin:.3g}"
-        if len(self.felt) == 1:
-            ((name, value),) = self.felt.items()
-            times = value / self.felt_before[name]
+        judged = self.margins.get("tuned")
+        said = "margin not judged yet" if judged is None else f"margin {judged:.3g}"
+        before, felt = self.felt["scene"], self.felt["tuned"]
+        if len(felt) == 1:
+            ((name, value),) = felt.items()
+            times = value / before[name]
             return f"the {name} feels {times:.2g} times as stiff as with the scene's gains; {said}"
-        stiff, soft = sorted(self.felt, key=lambda name: self.felt[name], reverse=True)
-        times = self.felt[stiff] / self.felt[soft]
+        stiff, soft = sorted(felt, key=lambda name: felt[name], reverse=True)
+        times = felt[stiff] / felt[soft]
         if times > 1 + EQUAL:
             return f"the {stiff} feels {times:.2g} times as stiff as the {soft}; {said}"
-        return f"{stiff} and {soft} both feel like {self.felt[soft]:.3g} N/m; {said}"
+        return f"{stiff} and {soft} both feel like {felt[soft]:.3g} N/m; {said}"
 
     def lines(self) -> Iterator[str]:
         """The result as text."""
         yield self.finding
-        yield f"margin {self.margin:.3g}; with the gains of the scene {self.own:.3g}"
         yield f"limited by {self.limited_by}"
-        for name, value in self.felt.items():
-            yield (
-                f"{name} feels like {value:.4g} N/m at {self.hertz:g} Hz; with the gains of the "
-                f"scene {self.felt_before[name]:.4g} N/m"
-            )
+        for at, margin in self.margins.items():
+            yield f"margin, {at}: {margin:.3g}" + (" (unstable)" if margin < 1.0 else "")
+        for gains, felt in self.felt.items():
+            for name, value in felt.items():
+                yield f"{gains} gains: {name} feels like {value:.4g} N/m at {HERTZ:g} Hz"
         for gains, run in self.motion.items():
             yield (
-                f"along the run, {gains} gains: handle at most "
-                f"{1e3 * run['distance']:.3g} mm off, at most {1e3 * run['energy_peak']:.3g} mJ "
-                "generated at the user's port"
+                f"{gains} gains: along the run, handle at most {1e3 * run['distance']:.3g} mm off, "
+                f"at most {1e3 * run['energy_peak']:.3g} mJ generated at the user's port"
             )
-        for rate, margin in self.neighbours.items():
-            yield f"margin at {rate}: {margin:.3g}" + (" (unstable)" if margin < 1.0 else "")
-        yield from (f"--set {_quoted(option)}" for option in self.options)
-
-    @property
-    def options(self) -> tuple[str, ...]:
-        """The gains as options of a scene, `key=value`."""
-        return tuple(
-            f"{key}.{name}={overrides.text(value, key)}"
-            for key, table in self.gains.items()
-            for name, value in table.items()
-        )
-
-
-def _quoted(option: str) -> str:
-    return f"'{option}'" if "[" in option else option
+        for option in overrides.written(self.gains):
+            yield f"--set '{option}'" if "[" in option else f"--set {option}"

@@ -43,7 +43,7 @@ NOT_RUN = {
         "700 points; tests/orchestrator/test_maps.py",
     "hapticlink tune closed-loop --set sensing=encoders":
         "takes minutes; tests/orchestrator/test_tune.py",
-    "hapticlink tune enclosure --set sensing=encoders --margin 2 --poses 5 --out tuned/enclosure":
+    "hapticlink tune enclosure --set sensing=encoders --margin 2 --out tuned/enclosure":
         "takes minutes; tests/orchestrator/test_tune.py",
     "hapticlink --install-completion":
         "writes to the files of the user's shell; tests/orchestrator/commands/test_options.py",
