@@ -262,8 +262,7 @@ class RealTime:
     def _with(self, c: Connection, hold: str | None, delay: float | None) -> Connection:
         """The connection with another hold or latency."""
         system = self._simulation.system
-        latency = c.latency if delay is None else Latency(min=delay) if delay else None
-        new = replace(c, hold=hold or c.hold, latency=latency)
+        new = held_by(c, hold, delay)
         why = misfit(new.hold or "", new, system.fmu, system.power, False)
         if system.coupling == "iterated" or system.step_control:
             why = "steps are repeated"
@@ -281,3 +280,9 @@ class RealTime:
 
     def _note(self, text: str) -> None:
         self._run.changes.append((self.time, text))
+
+
+def held_by(c: Connection, hold: str | None, delay: float | None) -> Connection:
+    """The connection with another hold or another constant latency (s); None leaves either."""
+    latency = c.latency if delay is None else Latency(min=delay) if delay else None
+    return replace(c, hold=hold or c.hold, latency=latency)

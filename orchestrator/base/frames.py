@@ -25,6 +25,11 @@ class Frames(Sequence[int]):
             return tuple(map(self._at, range(self._count)[i]))
         return self._at(range(self._count)[i])
 
+    @property
+    def repeats(self) -> int:
+        """The ticks after which the spacing repeats, however many frames there are."""
+        return self._at(self.round + 1) - self._at(1)
+
     def times(self, factor: int) -> Frames:
         """The same instants in ticks that are shorter by `factor`."""
         at = self._at

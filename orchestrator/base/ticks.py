@@ -129,7 +129,7 @@ def aligned(period: Fraction, base: Fraction, end: int, first: Fraction | None =
     return Frames(
         lambda i: math.ceil((i * period - early) / base) if i else 0,
         frames + 2,
-        min((period / base).denominator, frames),
+        (period / base).denominator,
     )
 
 

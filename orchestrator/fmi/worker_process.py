@@ -25,7 +25,7 @@ WATCH = 0.05
 
 
 # Ctrl-C in the terminal goes to the caller alone, which ends the run and then this process.
-_APART: Any = (
+APART: Any = (
     {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
     if sys.platform == "win32"
     else {"start_new_session": True}
@@ -43,7 +43,7 @@ class Process:
         # -P: the worker's imports do not depend on the folder that the user stands in.
         command = [sys.executable, "-P", "-m", module]
         self._popen = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **_APART
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **APART
         )
         assert self._popen.stdin is not None
         assert self._popen.stdout is not None

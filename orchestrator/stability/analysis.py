@@ -28,6 +28,7 @@ from hapticlink.orchestrator.stability.varying import (
     varying_stability,
 )
 from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.system import System
 
 SHOWN = 6
 """Modes that are reported."""
@@ -131,10 +132,16 @@ def stability(
                 raise InputFault(f"at = {at:g}: a rate that varies is judged from the start on")
             return varying_stability(read)
         with built(read) as whole:
-            system, removed = frozen.without(whole)
-            with opened(long_enough(read, system, at), at, Closures(read)) as map_:
-                found = equilibrium(map_, read.duration)
-                return _result(read.title, map_, found, [*removed, *frozen.kept(system)])
+            return at_rest(read, whole, at, read.duration)
+
+
+def at_rest(scene: Scene, whole: System, at: float, seconds: float) -> Stability:
+    """The stability of a scene's system around the equilibrium that is found within `seconds` of
+    simulated time, as in `stability`."""
+    system, removed = frozen.without(whole)
+    with opened(long_enough(scene, system, at), at, Closures(scene)) as map_:
+        found = equilibrium(map_, seconds)
+        return _result(scene.title, map_, found, [*removed, *frozen.kept(system)])
 
 
 def _result(title: str, map_: LiftedMap, at: Linear, lines: list[str]) -> Stability:

@@ -42,7 +42,7 @@ def hyperperiod(time: Timeline) -> int:
 def _round(clock: Clock) -> int:
     starts = clock.starts
     if isinstance(starts, Frames):
-        return starts[starts.round + 1] - starts[1]
+        return starts.repeats
     if clock.period is None or clock.first != clock.period:
         raise InputFault(
             f"the period of {clock.name} varies: no period after which all repeats, and so no map; "

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.history import History
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.latency import Link
-from hapticlink.orchestrator.system.system import Fmu
+from hapticlink.orchestrator.system.system import Fmu, System
 
 Vector = NDArray[np.float64]
 Visit = Callable[[str, Vector], Vector]
@@ -167,6 +167,15 @@ def keepers(simulation: Simulation) -> dict[str, Any]:
     """The holds and the energy tanks of a simulation, by name."""
     tanks = {f"energy tank {i + 1}": tank for i, tank in enumerate(simulation.springs)}
     return {**simulation.holds, **tanks}
+
+
+def size(system: System) -> int:
+    """The numbers of the state of a system, without the samples that holds keep. Raises InputFault
+    as StateVector does."""
+    for fmu in system.fmus:
+        require_layout(fmu)
+    entries = [entry for fmu in system.fmus for entry in _entries(fmu)]
+    return len(entries) + sum(len(fmu.description.outputs) for fmu in system.fmus)
 
 
 def _signal(column: str) -> Coordinate:

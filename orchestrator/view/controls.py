@@ -118,15 +118,20 @@ class Controls:
         if name not in known:
             raise InputFault(unknown("control", name, known))
 
+    def parameters(self) -> dict[str, list[float]]:
+        """The gains as they are set, with all hands pulling."""
+        return {name: self._value(name).tolist() for name in self._gains}
+
+    def _value(self, name: str) -> NDArray[np.float64]:
+        """The multiple of a parameter that is set."""
+        off = name in self._topology and not self._settings.topology
+        return self._gains[name][0] * (0.0 if off else self._settings.gains.get(name, 1.0))
+
     def _set(self, name: str) -> None:
         """Set a parameter to its multiple; the hand's stiffness acts while it pulls."""
-        value, _ = self._gains[name]
-        factor = self._settings.gains.get(name, 1.0)
-        if name in self._topology and not self._settings.topology:
-            factor = 0.0
         springs = {stiffness(user): pulling for user, pulling in self._pulling.items()}
         if springs.get(name, True):
-            self._live.set(name, factor * value)
+            self._live.set(name, self._value(name))
 
     def _change_rate(self, rate: float | None, jitter: float) -> None:
         """Change the rate, that of the scene where it is None, with the jitter."""
@@ -138,7 +143,7 @@ class Controls:
     def _pull(self, user: str, at: tuple[float, float] | None) -> None:
         self._require(user, self._pulling)
         if at is not None:
-            self._live.set(stiffness(user).replace("stiffness", "target"), (*at, 0.0))
+            self._live.set(target(user), (*at, 0.0))
         pulling = at is not None
         if pulling != self._pulling[user]:
             self._pulling[user] = pulling
@@ -167,6 +172,11 @@ def block(name: str, user: str) -> str:
 def stiffness(user: str) -> str:
     """The stiffness with which a user's mouse pulls."""
     return f"{block('hand', user)}.stiffness"
+
+
+def target(user: str) -> str:
+    """The pose that a user's mouse pulls to."""
+    return f"{block('hand', user)}.target"
 
 
 def _gains(live: RealTime) -> dict[str, tuple[NDArray[np.float64], list[str]]]:

@@ -52,6 +52,11 @@ class Frames:
         self._past: deque[tuple[float, float, float]] = deque()
         self._energy: dict[str, float] = {}
 
+    def handles(self, live: RealTime) -> dict[str, list[float]]:
+        """The poses (3,) of the handles by user, "" for the first one."""
+        every = {"": self._outputs, **self._others}
+        return {user: live[outputs["handle"]].tolist() for user, outputs in every.items()}
+
     def frame(self, live: RealTime) -> dict[str, Any]:
         """The newest samples, `energy` (generated, J, at the user's port and by connection), and
         now and then `light` and the deadlines `missed`."""

@@ -12,17 +12,12 @@ from contextlib import suppress
 from typing import IO, Any
 
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.fmi.worker_process import APART
 
 MOST = 256
 """Messages that wait in either direction; of older ones frames are dropped."""
 ENDING = 3.0
 """Seconds that the server may take to end."""
-# Ctrl-C in the terminal goes to the loop alone, which ends the run and then the server.
-_APART: Any = (
-    {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
-    if sys.platform == "win32"
-    else {"start_new_session": True}
-)
 
 
 class Link:
@@ -31,7 +26,7 @@ class Link:
     def __init__(self, module: str, *arguments: str) -> None:
         command = [sys.executable, "-P", "-m", module, *arguments]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **_APART
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **APART
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

@@ -27,6 +27,7 @@ from hapticlink.orchestrator.results.marks import KINDS, SHAPES
 from hapticlink.orchestrator.results.picture import Picture
 from hapticlink.orchestrator.view import messages
 from hapticlink.orchestrator.view.link import read
+from hapticlink.orchestrator.view.map_beside import MapBeside
 
 PAGE = Path(__file__).parent / "page"
 TYPES = {
@@ -56,6 +57,7 @@ class Pages:
         self._holding: dict[str, ServerConnection | None] = {"": None}
         self._picture: Picture | None = None
         self._kept: dict[str, str] = {}
+        self._map = MapBeside(self.show)
         self._files = {p.name: p for p in PAGE.iterdir() if p.suffix in TYPES}
 
     # --- from the haptic loop -----------------------------------------------------------------
@@ -63,6 +65,9 @@ class Pages:
     def show(self, message: dict[str, Any]) -> None:
         """Send a message of the loop to all windows."""
         kind = message["type"]
+        if kind == "map" and "asked" in message:
+            self._map.ask(message["asked"])
+            return
         if kind == "scene":
             self._picture = Picture(*message.pop("picture"))
             message["marks"] = [mark._asdict() for mark in self._picture.marks]
@@ -75,6 +80,10 @@ class Pages:
             self._kept[kind] = text
         ready = [w for w in self._windows if w.transport.get_write_buffer_size() < BEHIND]
         broadcast(ready if kind == "frame" else self._windows, text)
+
+    async def end(self) -> None:
+        """End what is being computed."""
+        await self._map.end()
 
     # --- from the windows ---------------------------------------------------------------------
 
@@ -94,7 +103,7 @@ class Pages:
 
     async def window(self, connection: ServerConnection) -> None:
         """Serve a window until it is closed."""
-        for kind in ("scene", "controls", "state"):
+        for kind in ("scene", "controls", "state", "map"):
             if kind in self._kept:
                 await connection.send(self._kept[kind])
         self._windows.add(connection)
@@ -167,6 +176,7 @@ async def _served(host: str, port: int, token: str, out: IO[bytes]) -> None:
     threading.Thread(target=receive, daemon=True).start()
     async with server:
         await ended.wait()
+        await pages.end()
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import time
 from itertools import count
 from pathlib import Path
@@ -15,7 +16,7 @@ from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.results.picture import by_user
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.view import messages
-from hapticlink.orchestrator.view.controls import Controls, Settings, users
+from hapticlink.orchestrator.view.controls import Controls, Settings, target, users
 from hapticlink.orchestrator.view.frames import PORT, Frames
 from hapticlink.orchestrator.view.link import Link
 
@@ -100,6 +101,8 @@ class Session:
         self._frames, self._controls = Frames(live), Controls(live, self._settings)
         self._controls.restore()
         scene = self._scene
+        self._held = {target(user): at for user, at in self._frames.handles(live).items()}
+        self._pickled = pickle.dumps(scene)
         timeline = live.system.timeline
         self._link.send(
             {
@@ -157,6 +160,8 @@ class Session:
     def _tell_controls(self) -> None:
         assert self._controls
         self._link.send({"type": "controls"} | self._controls.described())
+        changes = pickle.dumps((self._settings, self._controls.parameters() | self._held))
+        self._link.send({"type": "map", "asked": self._pickled + changes})
 
     def _tell(self, **state: Any) -> None:
         self._state |= state

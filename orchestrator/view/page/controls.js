@@ -9,6 +9,9 @@ const NAMES = {
   "virtual_mechanism.k_contact": "Contact: stiffness", "virtual_mechanism.b_contact": "Contact: damping",
   "virtual_mechanism.hysteresis": "Constrained directions: hysteresis", "virtual_environment.hysteresis": "Constrained directions: hysteresis",
 };
+// Rates (Hz) of which whole numbers soon fit whole numbers of haptic periods, for which the map is quick.
+const RATES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 24, 25, 26, 28, 30, 32, 36, 40, 44, 48, 50, 56,
+  60, 64, 72, 75, 80, 90, 96, 100, 110, 120, 128, 144, 160, 180, 200];
 const named = (connection) => connection.split(" -> ")[0].split(".").slice(1).join(" ");
 // A gain's name, and the user's where it is of a further one: hand_left.damping.
 const titled = (gain) => {
@@ -36,9 +39,9 @@ export class Controls {
     this.host.replaceChildren();
     if (found.rate) {
       this.group("Graphics block");
-      this.slider("rate", "Rate", 0, Math.log10(Math.min(found.rate.max, 200)), 0.01,
-        (s) => ({ type: "rate", value: Math.round(10 ** s * 10) / 10 }),
-        (f) => (f.rate.value ? [Math.log10(f.rate.value), text(f.rate.value, "Hz")] : [0, "varying"]));
+      const rates = RATES.filter((rate) => rate <= found.rate.max);
+      this.slider("rate", "Rate", 0, rates.length - 1, 1, (i) => ({ type: "rate", value: rates[i] }),
+        ({ rate: { value } }) => (value ? [rates.findLastIndex((rate) => rate <= value), text(value, "Hz")] : [0, "varying"]));
       this.slider("jitter", "Jitter", 0, 90, 5, (share) => ({ type: "jitter", value: share / 100 }),
         (f) => [100 * f.rate.jitter, `${(100 * f.rate.jitter).toFixed(0)} % of a period`]);
     }

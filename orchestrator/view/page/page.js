@@ -29,7 +29,7 @@ const HANDLERS = {
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));
-    if (message.ended) $("light").classList.remove("green"); // a run that diverged at once never turned red
+    if (message.ended && view.energy === "green") show({ energy: null }); // a run that diverged at once never turned red
     $("record").textContent = message.recording ? "End recording" : "Record";
     note();
   },
@@ -38,9 +38,10 @@ const HANDLERS = {
     view.frame = message;
     view.frames += 1;
     if (first) note();
-    if (message.light) $("light").className = `light ${message.light}`;
+    if (message.light) show({ energy: message.light });
     charts.add(message);
   },
+  map: (message) => show({ map: message }),
   refused(message) {
     view.refused = message.why;
     refusedUntil = performance.now() + 4000;
@@ -48,6 +49,16 @@ const HANDLERS = {
     setTimeout(note, 4100);
   },
 };
+
+// The light, with what each of its two judges says.
+function show(judged) {
+  Object.assign(view, judged);
+  const said = { green: "none", amber: "little", red: "much" }[view.energy];
+  $("light").className = `light ${view.map?.verdict === "unstable" ? "red" : view.energy ?? ""}`;
+  $("energy").textContent = said ? `energy: ${said} generated` : "energy";
+  $("map").textContent = view.map ? `map: ${view.map.said}` : "";
+  $("map").title = `Lifted map of small motions about the start pose, in a hand that holds on there. ${view.map?.why ?? ""}`;
+}
 
 function note() {
   const { ended, recording } = view.state;

@@ -92,6 +92,7 @@ def test_steps_that_are_made_when_asked_for_tell_their_bounds(
     base, period = 1 / fast, 1 / (fast * ratio)
     first = max(phase * period, base)
     fine = common_base([period, first])
+    assert aligned(period, base, end, first).repeats == (period / base).numerator
     for frames in (aligned(period, base, end, first), periodic(period, fine, end, first)):
         steps = [b - a for a, b in pairwise(tuple(frames))]
         clock = Clock("graphics", frames)

@@ -44,7 +44,7 @@ def test_a_control_changes_the_run_and_is_seen_in_a_second_window(
     served: Served, browser: Any
 ) -> None:
     first, second = Page(browser, served.url), Page(browser, served.url)
-    first.page.fill("[data-control=rate]", "1")
+    first.page.fill("[data-control=rate]", "9")
     said = "document.querySelector('[data-control=rate]').parentNode.textContent"
     second.until(f"{said}.includes('10.0 Hz')")
     first.page.uncheck("[data-control=topology]")
