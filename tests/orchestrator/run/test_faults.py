@@ -182,6 +182,32 @@ def test_a_native_crash_and_an_endless_loop(tmp_path: Path) -> None:
         assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
 
 
+@pytest.mark.parametrize("end", ["pass", "if time > 0.2: __import__('os')._exit(3)"])
+def test_what_an_isolated_fmu_has_started_ends_with_it(tmp_path: Path, end: str) -> None:
+    told = tmp_path / "child"
+    body = f"""if self.steps == 1:
+            child = __import__('subprocess').Popen(['sleep', '600'])
+            with open({str(told)!r}, 'w') as file:
+                print(child.pid, file=file)
+        {end}"""
+    python_fmu(tmp_path, "Starts", body)
+    experiment, _ = run(tmp_path, ONE.format("Starts.fmu") + ISOLATED)
+    assert (experiment.outcome.fault is None) == (end == "pass")
+    deadline = time.monotonic() + 60
+    while _runs(int(told.read_text())) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not _runs(int(told.read_text()))
+
+
+def _runs(process: int) -> bool:
+    """Not where it has ended and nobody has asked how."""
+    stat = Path(f"/proc/{process}/stat")
+    try:
+        return stat.read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def test_isolated_runs_give_the_same_bytes(tmp_path: Path) -> None:
     python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
     wire = '[[connection]]\nfrom = "one.y"\nto = "two.u"\nfactor = 0.3\n'
