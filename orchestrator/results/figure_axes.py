@@ -103,8 +103,9 @@ def framed(figure: Figure, **margins: float) -> None:
 def legend_below(figure: Figure) -> None:
     """A legend of all that is labelled, below the axes."""
     legend = figure.legend(fontsize="x-small", ncols=COLUMNS, loc="lower center")
-    rows = -(-len(legend.get_texts()) // COLUMNS)
-    framed(figure, bottom=MARGINS["bottom"] + 0.15 + ROW * rows)
+    lines = [text.get_text().count("\n") + 1 for text in legend.get_texts()]
+    tallest = max((sum(column) for column in np.array_split(lines, COLUMNS)), default=0)
+    framed(figure, bottom=MARGINS["bottom"] + 0.15 + ROW * tallest)
 
 
 def legend_above_curves(axes: Axes, columns: int) -> None:

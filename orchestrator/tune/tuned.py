@@ -106,8 +106,11 @@ class Tuned:
             for name, value in felt.items():
                 yield f"{gains} gains: {name} feels like {value:.4g} N/m at {HERTZ:g} Hz"
         for gains, run in self.motion.items():
+            far = f"handle at most {1e3 * run['distance']:.3g} mm off"
+            if not np.isfinite(run["distance"]):
+                far = "a fault, or not passive"
             yield (
-                f"{gains} gains: along the run, handle at most {1e3 * run['distance']:.3g} mm off, "
+                f"{gains} gains: along the run, {far}, "
                 f"at most {1e3 * run['energy_peak']:.3g} mJ generated at the user's port"
             )
         for option in overrides.written(self.gains):
