@@ -1,12 +1,13 @@
 """A scene at rest in a pose, in a hand: its lifted map under changed gains, and its compliance.
 
-With the hand cut off (stability/cut.py), the displacements dx of the handle over each of the N
-haptic periods T of a hyperperiod answer to its stacked wrenches by dx = G u. The wrench n exp(i w
+With the hand cut off (stability/cut.py), the poses x of the handle at the N haptic periods T of a
+hyperperiod answer to its stacked wrenches u by z' = A z + B u, x = C z + D u. The wrench n exp(i w
 kT), held over each period, moves it at w by
 
-    X n = W' G W n / (exp(i w T) - 1),   W_k = exp(i w kT)/sqrt(N)
+    z = (exp(i w NT) - A)^-1 B W n,   X n = W' (C z + D W n),   W_k = exp(i w kT)/sqrt(N)
 
-the compliance X (3, 3).
+the sum over a hyperperiod first: where exp(i w NT) is 1, as the z of a neutral mode is, responses
+to single wrenches leave few digits. X is the compliance (3, 3).
 """
 
 from __future__ import annotations
@@ -99,7 +100,8 @@ class Held:
         found = response(self._map, at, hand_port(self._map.system))
         N, wT = found.forces // found.m, 2 * np.pi * hertz * self._T
         W = np.kron(np.exp(1j * wT * np.arange(N))[:, None], np.eye(found.m)) / np.sqrt(N)
-        X: Complex = W.conj().T @ found.at(wT * N) @ W / (np.exp(1j * wT) - 1)
+        left = np.exp(1j * wT * N) * np.eye(len(found.A)) - found.A
+        X: Complex = W.conj().T @ (found.C @ np.linalg.solve(left, found.B @ W) + found.D @ W)
         return X
 
     def _settled(self, scales: Scales, hand: float) -> Linear:
