@@ -21,9 +21,9 @@ from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.orchestrator.view.controls import Settings
 
-MOST = {"native": 2e8, "python": 2e7}
+MOST = {"native": 1e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map
-is computed, by the packaging of the FMUs; 1e7 take about 1 s of processor time with native ones."""
+is computed, by the packaging of the FMUs; 1e7 take about 2 s of processor time with native ones."""
 SEARCH = 0.25
 """Simulated time (s) within which an equilibrium is sought."""
 RATES = range(1, 201)
