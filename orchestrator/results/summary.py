@@ -26,7 +26,7 @@ from hapticlink.orchestrator.results.tracking import (
     pose_error,
 )
 from hapticlink.orchestrator.results.tracking import MECHANISM as TRACKED
-from hapticlink.orchestrator.results.user_port import ENERGY, HAND, user_port
+from hapticlink.orchestrator.results.user_port import ENERGY, HAND, pushed_by_others, user_port
 
 MECHANISM = "virtual_mechanism"
 MARGIN = "haptic_device.workspace_margin"
@@ -121,6 +121,8 @@ def lines(results: Results) -> Iterator[str]:
             f"told and drawn from one row in {every} (record.every): what happens between them, "
             "such as larger forces and energies, is not seen"
         )
+    for name in pushed_by_others(results):
+        yield f"no energy at the user's port: {name} is not the force of the handle's own hand"
     for fmu, count in run["held_outputs"].items():
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
     for fmu, count in run["smaller_steps"].items():

@@ -71,10 +71,13 @@ class UserPort(NamedTuple):
 
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
 def user_port(results: Results) -> UserPort | None:
-    """The energy at the user's port; None without hand, handle and mechanism, or where the work of
-    another hand is not recorded. Without all signals that its blocks need there are none."""
+    """The energy at the user's port; None without hand, handle and mechanism, where something else
+    than its hand pushes a handle, or where the work of another hand is not recorded. Without all
+    signals that its blocks need there are none."""
     mechanism, device = of_block(results, ENERGY), of_block(results, DEVICE, 3)
     if mechanism is None or device is None or of_block(results, HAND, 3) is None:
+        return None
+    if pushed_by_others(results):
         return None
     if not len(device["time"]) or not len(mechanism["time"]):
         return None
@@ -105,6 +108,17 @@ def user_port(results: Results) -> UserPort | None:
     lacks = needed(results, put_in) & {*results.run.get("not_recorded", ())}
     blocks = {} if lacks else by_block(results, time, stored - further, put_in)
     return UserPort(time, generated, blocks, _works(results, device, time))
+
+
+def pushed_by_others(results: Results) -> list[str]:
+    """The connections to handles from other sources than the hands of their users."""
+    return [
+        name
+        for name in results.run["connections"]
+        for user in ("", *further_users(results))
+        if name.endswith(f" -> {of_user(DEVICE, user).partition('.')[0]}.F_hand")
+        and not name.startswith(f"{of_user(HAND, user)} ")
+    ]
 
 
 def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:

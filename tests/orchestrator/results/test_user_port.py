@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.figures import figures
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.user_port import user_port
@@ -170,6 +171,15 @@ LACKING = [
     (["virtual_mechanism", "hand", "haptic_device", "controller", "hand_left"], False),
     (["virtual_mechanism", "hand", "haptic_device", "hand_left", "haptic_device_left"], True),
 ]
+
+
+def test_a_handle_that_something_else_pushes_has_none(tmp_path: Path) -> None:
+    """The work on it is not that of `hand.F`."""
+    other = "connection=[{from='hand_left.F', to='haptic_device.F_hand'}]"
+    results = simulate("closed-loop", tmp_path, ["duration=0.1", *SECOND, other]).results
+    assert user_port(results) is None
+    told = [line for line in summary.lines(results) if "no energy at the user's port" in line]
+    assert "hand_left.F -> haptic_device.F_hand" in told[0]
 
 
 @pytest.mark.parametrize(("signals", "found"), LACKING)
