@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 Vector = NDArray[np.float64]
+SAME = 1e-9
+"""Instants (s) that differ by less are one."""
 
 
 def solve(
@@ -31,6 +33,7 @@ def solve(
 
     pushing = [sides[i](y)[0] < 0 and push(i, y) > 0 for i in range(len(sides))]
     t, events = 0.0, 0
+    changed = [-np.inf] * len(sides)
     while t < t_end:
         on = tuple(pushing)
 
@@ -41,8 +44,9 @@ def solve(
         found = solve_ivp(f, (t, t_end), y, "DOP853", rtol=1e-12, atol=1e-13, events=functions)
         t, y = found.t[-1], found.y[:, -1]
         for i, times in enumerate(found.t_events):
-            # One that changes at the same instant may be past it by rounding, and is not found.
-            if len(times) or functions[i](t, y) < 0.0:
-                pushing[i] = not pushing[i]
+            # One that changes at the same instant may be past it by rounding, and is not found; nor
+            # is one that has just changed before it, by rounding, to change back.
+            if len(times) or (functions[i](t, y) < 0.0 and t - changed[i] > SAME):
+                pushing[i], changed[i] = not pushing[i], t
                 events += 1
     return y, events
