@@ -55,7 +55,7 @@ function show(judged) {
   Object.assign(view, judged);
   const said = { green: "none", amber: "little", red: "much" }[view.energy];
   $("light").className = `light ${view.map?.verdict === "unstable" ? "red" : view.energy ?? ""}`;
-  $("energy").textContent = said ? `energy: ${said} generated` : "energy";
+  $("energy").textContent = said ? `energy of sampling and holding: ${said}` : "energy";
   $("map").textContent = view.map ? `map: ${view.map.said}` : "";
   $("map").title = `Lifted map of small motions about the start pose, in a hand that holds on there. ${view.map?.why ?? ""}`;
 }
