@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,7 +92,7 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
         share = 100 * max(np.abs(tau).max() / limit for _, tau, limit in driven.values())
         title += f"; motors reach {short(share)} % of their torque limit"
     figure, axes = titled(results, title, "time (s)", *labels)
-    styles = {user: STYLES[i % len(STYLES)] for i, user in enumerate(devices or [""])}
+    styles = dict(zip(["", *further_users(results)], cycle(STYLES)))
     names = [*WRENCHES.values()]
     for name, (time, force, moment) in found.items():
         user, _, kind = name.rpartition(": ")

@@ -8,6 +8,7 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import figure_axes, figures, tables
+from hapticlink.orchestrator.results.force_figure import forces
 from hapticlink.orchestrator.results.user_port import user_port
 from hapticlink.orchestrator.sweep import title
 
@@ -85,6 +86,13 @@ def test_both_users_are_drawn_and_their_works_are_told(tmp_path: Path) -> None:
     port = user_port(found)
     assert port
     assert port.works["left: hand"] == pytest.approx(work, rel=1e-9)
+
+
+def test_both_users_forces_are_drawn_where_a_system_describes_no_device(tmp_path: Path) -> None:
+    """As that of an SSP, which has the blocks and not their descriptions."""
+    found = run("two-users", tmp_path, "duration=0.1")
+    styles = {line.get_linestyle() for line in forces(found, {}).axes[0].get_lines()}
+    assert styles == {"-", "--"}
 
 
 def test_a_sampled_spring_shows_its_energy(tmp_path: Path) -> None:
