@@ -77,9 +77,7 @@ def user_port(results: Results) -> UserPort | None:
     mechanism, device = of_block(results, ENERGY), of_block(results, DEVICE, 3)
     if mechanism is None or device is None or of_block(results, HAND, 3) is None:
         return None
-    if pushed_by_others(results):
-        return None
-    if not len(device["time"]) or not len(mechanism["time"]):
+    if pushed_by_others(results) or not (len(device["time"]) and len(mechanism["time"])):
         return None
     time = mechanism["time"]
     time = time[time <= device["time"][-1]]

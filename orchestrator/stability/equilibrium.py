@@ -46,12 +46,12 @@ def equilibrium(map_: LiftedMap, seconds: float) -> Linear:
         try:
             found = _newton(map_, state)
             if rests(found):
-                if left is None or not _leaves(found, map_.period):
+                leaves = _leaves(found, map_.period)
+                if left is None or not leaves:
                     _require_rest(map_, found)
-                    if left is not None:
-                        return min(left, found, key=lambda at: _way(map_, at))
-                    if not _leaves(found, map_.period):
-                        return found
+                    if not leaves:
+                        both = (found,) if left is None else (left, found)
+                        return min(both, key=lambda at: _way(map_, at))
                     left = found
             elif nearest is None or _unrest(found).max() < _unrest(nearest).max():
                 nearest = found
@@ -74,15 +74,14 @@ def _leaves(at: Linear, period: float) -> bool:
 
 def _way(map_: LiftedMap, at: Linear) -> float:
     """How far the start is, relative, along the directions in which the map moves."""
-    way = np.abs(at.V.T @ (at.point - map_.start))
-    return float((way / np.maximum(1.0, np.abs(at.V.T @ at.point))).max())
+    return float(_relative(at.V.T @ (at.point - map_.start), at.V.T @ at.point).max())
 
 
 def _require_rest(map_: LiftedMap, at: Linear) -> None:
     """Raises InputFault where the second period is another map than the first one, as under a
     target that moves."""
     once, again = map_.image(at.image)[at.taken], map_.second(at.point)[at.taken]
-    moved = np.abs(again - once) / np.maximum(1.0, np.abs(once))
+    moved = _relative(again - once, once)
     if moved.max() > 10 * TOLERANCE:
         raise InputFault(
             f"the equilibrium moves with time, as under a drive or target that does: by "
@@ -98,7 +97,12 @@ def rests(at: Linear) -> bool:
 
 def _unrest(at: Linear) -> Vector:
     """Along each direction, the change over a period, relative."""
-    found: Vector = np.abs(at.change) / np.maximum(1.0, np.abs(at.V.T @ at.point))
+    return _relative(at.change, at.V.T @ at.point)
+
+
+def _relative(change: Vector, z: Vector) -> Vector:
+    """|change| of coordinates z, relative to max(1, |z|)."""
+    found: Vector = np.abs(change) / np.maximum(1.0, np.abs(z))
     return found
 
 
@@ -139,7 +143,7 @@ def _nearer(map_: LiftedMap, at: Linear, step: Vector) -> Vector:
             change = at.V.T @ (map_.image(there) - there)
         except FmuFault:
             continue
-        if (np.abs(change) / np.maximum(1.0, np.abs(at.V.T @ there))).max() < least:
+        if _relative(change, at.V.T @ there).max() < least:
             return there
     return at.moved(step)
 
