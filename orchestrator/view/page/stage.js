@@ -5,22 +5,29 @@ import { Legend } from "./legend.js";
 import { paint, place, zigzag } from "./painter.js";
 
 const HAND = "#b85c00";
+const APART = 8; // ms at least between two targets that are sent, faster than frames come
 const FITTED = ["obstacle", "body", "handle"]; // roles of marks that the picture contains
 
 export class Stage {
   constructor(canvas, legend, pull) {
     this.canvas = canvas;
     this.legend = new Legend(legend);
-    this.pulls = new Map(); // by pointer: the user, the target, and when it was sent
+    this.pulls = new Map(); // by pointer: the user, the target, when it was sent, the next timer
     this.limits = null;
     this.bounds = null; // the part of the plane to show, in place of what the first frame has
     const at = (event) => {
       const box = canvas.getBoundingClientRect();
       return this.toWorld(event.clientX - box.left, event.clientY - box.top);
     };
+    const tell = (held) => {
+      held.sent = performance.now();
+      held.later = null;
+      pull(held.target, held.user);
+    };
     const release = ({ pointerId }) => {
       const held = this.pulls.get(pointerId);
       if (!held) return;
+      clearTimeout(held.later);
       this.pulls.delete(pointerId);
       canvas.classList.toggle("held", this.pulls.size > 0);
       pull(null, held.user);
@@ -30,17 +37,19 @@ export class Stage {
       const target = at(event), user = this.nearest(target);
       if (user === undefined) return;
       canvas.setPointerCapture(event.pointerId);
-      this.pulls.set(event.pointerId, { user, target, sent: event.timeStamp });
+      const held = { user, target };
+      this.pulls.set(event.pointerId, held);
       canvas.classList.add("held");
-      pull(target, user);
+      tell(held);
     });
     canvas.addEventListener("pointermove", (event) => {
       const held = this.pulls.get(event.pointerId);
       if (!held) return;
       held.target = at(event);
-      if (event.timeStamp - held.sent < 8) return;
-      held.sent = event.timeStamp;
-      pull(held.target, held.user);
+      if (held.later) return; // it sends the newest target, where the mouse stops, too
+      const wait = held.sent + APART - performance.now();
+      if (wait > 0) held.later = setTimeout(tell, wait, held);
+      else tell(held);
     });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
@@ -55,6 +64,7 @@ export class Stage {
     this.marks = marks;
     this.shapes = shapes;
     this.limits = this.frame = null;
+    for (const { later } of this.pulls.values()) clearTimeout(later);
     this.pulls.clear();
     this.canvas.classList.remove("held");
   }

@@ -40,6 +40,32 @@ def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
     page.page.close()
 
 
+MOVES = """{
+  const send = WebSocket.prototype.send, [id] = view.stage.pulls.keys();
+  window.sent = [];
+  WebSocket.prototype.send = function (text) {
+    sent.push(JSON.parse(text));
+    send.call(this, text);
+  };
+  for (const clientX of [300, 310, 320]) {
+    const move = { pointerId: id, clientX, clientY: 200 };
+    view.stage.canvas.dispatchEvent(new PointerEvent("pointermove", move));
+  }
+}"""
+"""Three moves of the pointer that pulls, at one instant."""
+
+
+def test_the_hand_pulls_to_where_the_mouse_has_stopped(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    page.pull(0.0, 0.0)
+    page.get(MOVES)
+    page.until("sent.length")
+    target = "[...view.stage.pulls.values()][0].target"
+    page.until(f"JSON.stringify(sent.at(-1).at) === JSON.stringify({target})")
+    page.page.mouse.up()
+    page.page.close()
+
+
 def test_a_control_changes_the_run_and_is_seen_in_a_second_window(
     served: Served, browser: Any
 ) -> None:

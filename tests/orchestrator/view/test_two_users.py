@@ -69,6 +69,8 @@ def test_in_two_browser_windows_the_nearest_handle_is_pulled(two: Served) -> Non
     with chromium() as browser:
         pages = {"": Page(browser, two.url), "left": Page(browser, two.url)}
         places = {"": "view.frame.handle", "left": "view.frame.others.left.handle"}
+        pages[""].get("document.getElementById('pause').click()")
+        pages["left"].until("view.state.paused")
         for user, page in pages.items():
             x, y = page.get(
                 f"(() => {{ const box = view.stage.canvas.getBoundingClientRect();"
@@ -77,8 +79,9 @@ def test_in_two_browser_windows_the_nearest_handle_is_pulled(two: Served) -> Non
             )
             page.page.mouse.move(x, y)
             page.page.mouse.down()
-            page.page.mouse.move(x, y + (-120 if user else 120), steps=5)
+            page.page.mouse.move(x + (-120 if user else 120), y, steps=5)
             assert page.get("[...view.stage.pulls.values()].map((p) => p.user)") == [user]
+        pages[""].get("document.getElementById('pause').click()")
         for page in pages.values():
             force = "Math.hypot(...{}.F_hand.slice(0, 2)) > 0.2"
             page.until(force.format("view.frame"))
