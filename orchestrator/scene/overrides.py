@@ -79,6 +79,17 @@ def parse(option: str) -> tuple[tuple[str, ...], Any]:
         return names, text.strip()
 
 
+def told(option: str) -> str:
+    """The option as it stands on a command line; `--swap` for an FMU that replaces a block."""
+    try:
+        names, value = parse(option)
+    except InputFault:
+        names, value = (), None
+    if names == ("fmu", "+") and isinstance(value, dict) and value.keys() == {"replaces", "path"}:
+        return f"--swap {value['replaces']}={value['path']}"
+    return f"--set {option}"
+
+
 def _key(option: str) -> tuple[tuple[str, ...], str, str]:
     """Names of the key, "=" or nothing, and text of the value."""
     if match := ASSIGNMENT.match(option):

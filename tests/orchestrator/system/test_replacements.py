@@ -10,6 +10,7 @@ from pythonfmu.builder import FmuBuilder
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.commands.options import options
 from tests.orchestrator.conftest import status
 
 SHORT = {"duration": 0.2, "graphics.rate": 40}
@@ -102,6 +103,15 @@ def test_what_replaces_no_block_is_refused(
     given = {**table, "path": str(spring(tmp_path))}
     with pytest.raises(SceneFault, match=message):
         hl.scene("closed-loop", {"fmu.+": given})
+
+
+def test_faults_of_a_swap_are_told_as_it_was_typed(tmp_path: Path) -> None:
+    given = options(None, [f"controler={tmp_path / 'missing.fmu'}"])
+    with pytest.raises(SceneFault) as raised:
+        hl.scene("closed-loop", given)
+    said = f"--swap controler={tmp_path / 'missing.fmu'}: fmu[0]"
+    assert f"{said}.path: there is no file" in str(raised.value)
+    assert f"{said}.replaces: no block 'controler'" in str(raised.value)
 
 
 def test_two_in_one_place_are_refused(tmp_path: Path) -> None:
