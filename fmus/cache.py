@@ -118,7 +118,7 @@ def cached(
 def _found(place: Path) -> Path | None:
     for path in place.glob("[!.]*.fmu"):
         stat = path.stat()
-        if _is_whole(path, stat.st_mtime_ns, stat.st_size):
+        if is_whole(path, stat.st_mtime_ns, stat.st_size):
             return path
     return None
 
@@ -202,8 +202,8 @@ def _clear(root: Path) -> None:
 
 
 @lru_cache(64)
-def _is_whole(path: Path, changed_ns: int, size: int) -> bool:
-    """Whether a file can be read to its end: asked once as long as it does not change."""
+def is_whole(path: Path, changed_ns: int, size: int) -> bool:
+    """Whether an FMU can be read to its end: asked once as long as the file does not change."""
     try:
         with zipfile.ZipFile(path) as archive:
             return archive.testzip() is None and "modelDescription.xml" in archive.namelist()

@@ -9,8 +9,9 @@ from hapticlink.orchestrator.base import interrupt, standard_streams
 
 def main() -> None:
     standard_streams.ensure()
-    # Modules and figures are many objects that stay: searching them for cycles takes 5 % of a run.
-    gc.set_threshold(50_000)
+    # Modules and figures are many objects that stay: searching them for cycles takes 5 % of a run,
+    # and as much again three times as the process ends.
+    gc.set_threshold(200_000)
     with interrupt.held(interrupt.end_process, after=signal.SIG_IGN):
         from hapticlink.orchestrator.base.process_end import leave_threads
         from hapticlink.orchestrator.commands import main as command
@@ -19,6 +20,7 @@ def main() -> None:
             command()
         except SystemExit as ended:
             leave_threads(int(ended.code or 0))
+            gc.freeze()
             raise
 
 

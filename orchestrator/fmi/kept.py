@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
-from fmpy import extract
+from fmpy import extract, platform
 
 from hapticlink.orchestrator.fmi.description import Description, describe
 
@@ -57,18 +57,27 @@ def unpacked_once() -> Iterator[None]:
 def unpack(found: Description, folder: str) -> str:
     """Unpacks an FMU into `folder`, which is empty; or removes that, and returns the folder in
     which it is unpacked already."""
-    if _folders is None or found.block is None:
+    if found.block is None:
         extract(found.path, folder)
+        return folder
+    if _folders is None:
+        extract(found.path, folder, _is_needed)
         return folder
     file = _file(found.path)
     kept = _folders.pop(file, None)
     if kept is None:
-        extract(found.path, folder)
+        extract(found.path, folder, _is_needed)
         kept = folder
     else:
         os.rmdir(folder)
     _folders[file] = kept  # the newest
     return kept
+
+
+def _is_needed(entry: str) -> bool:
+    """Whether a run needs an entry of an FMU of this project: no binary of another platform, which
+    is a third of a Python FMU."""
+    return entry.startswith(("modelDescription.xml", "resources/", f"binaries/{platform}/"))
 
 
 def leave(folder: str) -> None:

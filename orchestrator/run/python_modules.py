@@ -15,6 +15,7 @@ import sys
 import zlib
 from collections.abc import Iterable
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 from hapticlink.orchestrator.base.faults import InputFault
@@ -57,11 +58,21 @@ def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
         modules = bundled(fmu.description.path)
         other = next((n for n, files in modules.items() if not _is_mine(n, files)), None)
         if other is None:
+            if "pythonfmu" in modules:
+                _import_installed(modules["pythonfmu"])
             for name, files in modules.items():
                 _loaded.setdefault(name, files)
         else:
             found[fmu.name] = f"another module {other!r} is loaded in this process"
     return found
+
+
+def _import_installed(files: dict[str, int]) -> None:
+    """Imports the installed pythonfmu where its `files` are those of an FMU: its own would be
+    compiled in each process anew."""
+    found = find_spec("pythonfmu")
+    if found and _on_disk("pythonfmu", found.origin or "") == files:
+        import pythonfmu as pythonfmu
 
 
 def _is_mine(name: str, files: dict[str, int]) -> bool:
