@@ -13,6 +13,7 @@ from hapticlink.orchestrator.compare.settings import one_mechanism
 from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.figure_axes import last_time, short
 from hapticlink.orchestrator.results.force_figure import all_wrenches, torques
+from hapticlink.orchestrator.results.scene_part import scene_part
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import (
     MECHANISM,
@@ -24,7 +25,6 @@ from hapticlink.orchestrator.results.tracking import (
     pose_error,
 )
 from hapticlink.orchestrator.results.user_port import user_port
-from hapticlink.orchestrator.results.whole_run import scene_part
 
 NONE = "-"
 """Stands for a number that a run does not have."""

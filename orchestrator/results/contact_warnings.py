@@ -12,9 +12,9 @@ from hapticlink.components.contact.stiffness import STABLE, poles, sticking_pole
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 from hapticlink.orchestrator.results.figure_axes import short
+from hapticlink.orchestrator.results.scene_part import scene_part
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.results.tracking import of_block
-from hapticlink.orchestrator.results.whole_run import scene_part
 
 GAP, COORDINATES = "virtual_mechanism.contact_gap", "virtual_mechanism.q"
 ROWS = 500

@@ -5,20 +5,18 @@ Each is found in the samples as they are recorded, and lasts until the first sam
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.force_figure import torques, touching
-from hapticlink.orchestrator.results.marks import FELT, KINDS
-from hapticlink.orchestrator.results.picture import FULL, by_user
+from hapticlink.orchestrator.results.marks import FELT, FULL, KINDS
+from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.orchestrator.results.tracking import BRANCH, constrained, of_block
 from hapticlink.orchestrator.results.user_port import user_port
-from hapticlink.orchestrator.results.whole_run import scene_part
 
 MARGIN = "haptic_device.workspace_margin"
 
@@ -34,11 +32,16 @@ class Episode(NamedTuple):
 
 def episodes(results: Results) -> list[Episode]:
     """The episodes of a run, by kind and then by time. Signals that are not recorded have none."""
-    found = []
-    for kind, times, holds, said in _states(results):
-        meaning = said or KINDS[kind][1]
-        found += [Episode(kind, a, b, meaning) for a, b in spans(times, holds)]
-    return found
+    return [episode for state in _states(results) for episode in _spans(*state)]
+
+
+def saturations(results: Results) -> list[Episode]:
+    """The episodes of motors at their limit alone."""
+    return [episode for state in _saturated(results) for episode in _spans(*state)]
+
+
+def _spans(kind: str, times: Vector, holds: NDArray[np.bool_], said: str) -> list[Episode]:
+    return [Episode(kind, a, b, said or KINDS[kind][1]) for a, b in spans(times, holds)]
 
 
 def spans(times: Vector, holds: NDArray[np.bool_]) -> list[tuple[float, float]]:
@@ -48,16 +51,14 @@ def spans(times: Vector, holds: NDArray[np.bool_]) -> list[tuple[float, float]]:
     return [(float(times[a]), float(times[min(b, last)])) for a, b in edges.reshape(-1, 2)]
 
 
-def _states(results: Results) -> Iterator[tuple[str, Vector, NDArray[np.bool_], str]]:
-    """Kind, times (s) of samples, whether each has it, and what is said where it varies."""
+State = tuple[str, Vector, NDArray[np.bool_], str]
+"""Kind, times (s) of samples, whether each has it, and what is said where it varies."""
+
+
+def _states(results: Results) -> Iterator[State]:
     if branch := of_block(results, BRANCH):
         yield "folded", branch["time"], branch[BRANCH] == 0, ""
-    devices = scene_part(results, "devices", Mapping[str, Device])
-    for user, device in by_user(scene_part(results, "device", Device), devices).items():
-        if driven := torques(results, device, user):
-            most = np.abs(driven[1]).max(axis=1)
-            said = f"{KINDS['saturated'][1]}: {user}" if user else ""
-            yield "saturated", driven[0], most >= FULL * device.torque_limit, said
+    yield from _saturated(results)
     if port := user_port(results):
         yield "energy", port.time_s, port.generated_J > FELT, ""
     if counted := constrained(results):
@@ -71,3 +72,11 @@ def _states(results: Results) -> Iterator[tuple[str, Vector, NDArray[np.bool_], 
         yield "contacts", *contact, ""
     if margin := of_block(results, MARGIN):
         yield "outside", margin["time"], margin[MARGIN] < 0, ""
+
+
+def _saturated(results: Results) -> Iterator[State]:
+    for user, device in all_devices(results).items():
+        if driven := torques(results, device, user):
+            most = np.abs(driven[1]).max(axis=1)
+            said = f"{KINDS['saturated'][1]}: {user}" if user else ""
+            yield "saturated", driven[0], most >= FULL * device.torque_limit, said

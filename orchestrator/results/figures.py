@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
-from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.results import figure_axes, marks, mechanism_drawing
 from hapticlink.orchestrator.results.episodes import episodes
@@ -38,8 +37,8 @@ from hapticlink.orchestrator.results.force_figure import (
     touching,
     wrenches,
 )
-from hapticlink.orchestrator.results.picture import by_user
 from hapticlink.orchestrator.results.real_time_figure import real_time
+from hapticlink.orchestrator.results.scene_part import all_devices, scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
     DEVICE,
@@ -51,7 +50,6 @@ from hapticlink.orchestrator.results.tracking import (
     tracking,
 )
 from hapticlink.orchestrator.results.user_port import UserPort, user_port
-from hapticlink.orchestrator.results.whole_run import scene_part
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,7 +92,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
         if of_block(results, DEVICE, 3):
             found["distance"] = partial(_distance, results)
     if wrenches(results):
-        found["forces"] = partial(forces, results, _devices(results))
+        found["forces"] = partial(forces, results, all_devices(results))
     if contact := touching(results):
         found["contact"] = partial(_contact, results, *contact)
     if counted := constrained(results):
@@ -125,7 +123,7 @@ def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
 def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
     title = f"{results.run['scene']['title']} at the start and at {short(last_time(results))} s"
     figure, axes = titled(results, title, "x (mm)", "y (mm)")
-    contacts, devices = scene_part(results, "contacts", Contacts), _devices(results)
+    contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
     for label, style, path in _paths(results):
         axes.plot(*path.T, style, color=marks.RED, lw=0.8, label=plain(f"path of {label}"))
     _mark(results, axes)
@@ -133,11 +131,6 @@ def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
     figure.set_size_inches(7.4, 6.4)
     figure_axes.legend_below(figure)
     return figure
-
-
-def _devices(results: Results) -> dict[str, Device]:
-    others = scene_part(results, "devices", Mapping[str, Device])
-    return by_user(scene_part(results, "device", Device), others)
 
 
 def _mark(results: Results, axes: Axes) -> None:

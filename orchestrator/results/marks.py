@@ -37,6 +37,8 @@ KINDS = {
 """Colour and meaning of what can happen in a run."""
 FELT = 1e-3
 """Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
+FULL = 1 - 1e-6
+"""Share of their largest torque from which on motors are at their limit."""
 INK, GREY, RED = "#000000", "#666666", "#cc3311"
 FORCES = {
     "F_hand": ("hand", "#b85c00", "handle"),

@@ -27,7 +27,8 @@ from hapticlink.orchestrator.results.marks import (
     outlined,
     reach,
 )
-from hapticlink.orchestrator.results.picture import Picture, by_user
+from hapticlink.orchestrator.results.picture import Picture
+from hapticlink.orchestrator.results.scene_part import by_user
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,11 +15,9 @@ from hapticlink.components.linkage.poses import pose_function
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.results.marks import FELT, marks, point_of, reach, state
+from hapticlink.orchestrator.results.marks import FELT, FULL, marks, point_of, reach, state
 
 PORT = "user's port"
-FULL = 1 - 1e-6
-"""Share of their largest torque from which on motors are at their limit."""
 RAW = ("ghost", "q", "lambda", "P_c", "F_motor", "measured")
 """What frames have instead of what is drawn."""
 
@@ -116,11 +114,6 @@ class Picture:
         None where the arm does not reach, which JSON has no NaN for."""
         points = np.asarray(self._arms[user](ca.DM(handle))).T.tolist()
         return [p if np.isfinite(p).all() else None for p in points]
-
-
-def by_user(first: Device | None, others: Mapping[str, Device] | None) -> dict[str, Device]:
-    """The devices of all users by their points; the first one's name is empty."""
-    return ({"": first} if first else {}) | dict(others or {})
 
 
 def directions(P_c: list[float]) -> list[list[float]]:

@@ -26,7 +26,7 @@ from hapticlink.orchestrator.results.tracking import (
     pose_error,
 )
 from hapticlink.orchestrator.results.tracking import MECHANISM as TRACKED
-from hapticlink.orchestrator.results.user_port import ENERGY, HAND, pushed_by_others, user_port
+from hapticlink.orchestrator.results.user_port import ENERGY, HAND, pushed_by_others
 
 MECHANISM = "virtual_mechanism"
 MARGIN = "haptic_device.workspace_margin"
@@ -72,8 +72,7 @@ def numbers(results: Results) -> Iterator[str]:
         peaks = (f"{name} {short(force.max())} N" for name, (_, force, _) in found.items())
         yield f"largest forces: {'; '.join(peaks)}"
         yield from _saturated(results)
-    if port := user_port(results):
-        told = port.told
+    if told := results.run.get("user_port"):
         yield (
             f"energy at the user's port beyond what the hand put in: at most "
             f"{short(1e3 * told['peak'])} mJ at {told['time_of_peak']:.3g} s, "
@@ -94,10 +93,9 @@ def numbers(results: Results) -> Iterator[str]:
 
 def _saturated(results: Results) -> Iterator[str]:
     """A line for each user whose motors were at their torque limit, and for how long."""
-    from hapticlink.orchestrator.results.episodes import episodes
+    from hapticlink.orchestrator.results.episodes import saturations
 
-    found = (episode for episode in episodes(results) if episode.kind == "saturated")
-    for said, spans in groupby(found, key=lambda episode: episode.said):
+    for said, spans in groupby(saturations(results), key=lambda episode: episode.said):
         seconds = sum(span.end - span.begin for span in spans)
         yield f"{said} for {short(seconds)} s: the hand felt less than the controller asked for"
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.scene_part import first_error
 from hapticlink.orchestrator.results.tables import Results, load
 
 
@@ -99,32 +99,8 @@ def load_whole(folder: Path | str) -> Results:
     try:
         TypeAdapter(_Told).validate_python(results.run)
     except ValidationError as error:
-        raise InputFault(f"{folder}/run.json: {_first(error)}: run the scene again") from error
+        raise InputFault(f"{folder}/run.json: {first_error(error)}: run the scene again") from error
     return results
-
-
-def scene_part(results: Results, name: str, kind: Any) -> Any:
-    """The table `name` of a run's scene as a record of `kind`, None where the scene has none.
-    Raises InputFault where it is not as this version writes it."""
-    try:
-        return _adapter(kind).validate_python(results.run["scene"][name])
-    except KeyError:
-        why = "is missing"
-    except ValidationError as error:
-        why = _first(error)
-    raise InputFault(f"{results.folder}/run.json: scene.{name} {why}: run the scene again")
-
-
-@cache  # which takes longer to make than most figures take to draw
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind | None)
-
-
-def _first(error: ValidationError) -> str:
-    first = error.errors(include_url=False, include_input=False)[0]
-    table = first["type"] == "dataclass_type"
-    why = "input should be a valid dictionary" if table else first["msg"].lower()
-    return f"{'.'.join(map(str, first['loc'])) or 'its content'}: {why}"
 
 
 def named(folders: Sequence[Path | str]) -> dict[str, Results]:

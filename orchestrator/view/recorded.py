@@ -19,7 +19,8 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.episodes import episodes
-from hapticlink.orchestrator.results.picture import PORT, Picture, by_user
+from hapticlink.orchestrator.results.picture import PORT, Picture
+from hapticlink.orchestrator.results.scene_part import by_user, scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import (
     further_users,
@@ -28,7 +29,7 @@ from hapticlink.orchestrator.results.tracking import (
     table_of,
 )
 from hapticlink.orchestrator.results.user_port import user_port
-from hapticlink.orchestrator.results.whole_run import load_whole, scene_part
+from hapticlink.orchestrator.results.whole_run import load_whole
 from hapticlink.orchestrator.view.frames import of_user, shown
 
 PLACES = ("q", "x", "handle")

@@ -13,7 +13,7 @@ from hapticlink.orchestrator.api.real_time import RealTime
 from hapticlink.orchestrator.api.result import Run
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
-from hapticlink.orchestrator.results.picture import by_user
+from hapticlink.orchestrator.results.scene_part import by_user
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.view import messages
 from hapticlink.orchestrator.view.controls import Controls, Settings, target, users
