@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import tempfile
 import uuid
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 from hapticlink.components.component import Component
@@ -34,16 +35,11 @@ def entries(
 ) -> dict[str, bytes]:
     """All files of the FMU, with a binary for each of `platforms`, compiled in `folder`.
 
-    The GUID is a hash of the binaries' sources, so that a platform's binary does not depend on the
-    other platforms. Raises FmuError if no FMU can be built from the component, CompilerError if the
-    source does not compile.
+    The GUID is a hash of the binaries' sources (component.h has that of pieces), so that a
+    platform's binary does not depend on the other platforms. Raises FmuError if no FMU can be built
+    from the component, CompilerError if the source does not compile.
     """
     check_functions(component)
-
-    def describe(guid: str) -> bytes:
-        return model_description(
-            component, guid, stop_time=stop_time, step_size=step_size, needs_tool=False
-        )
 
     files = {
         "documentation/index.html": documentation(component),
@@ -54,22 +50,31 @@ def entries(
     content = {
         **files,
         "component.h": header.encode(),
-        **{f"piece{k}.c": piece.encode() for k, piece in enumerate(pieces)},
         "fmi2.c": WRAPPER.read_bytes(),
         "compiler": json.dumps(made_by).encode(),
-        "xml": describe(""),
+        "xml": model_description(
+            component, "", stop_time=stop_time, step_size=step_size, needs_tool=False
+        ),
     }
     guid = f"{{{uuid.UUID(digest(content)[:32])}}}"
-    files["modelDescription.xml"] = describe(guid)
+    files["modelDescription.xml"] = content["xml"].replace(b'guid=""', f'guid="{guid}"'.encode(), 1)
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
         head = f'#define GUID "{guid}"\n'.encode()
         (room / "component.h").write_bytes(head + content["component.h"])
-        sources = [room / name for name in content if name.endswith(".c")]
-        for source in sources:
-            source.write_bytes(content[source.name])
+        main = room / "fmi2.c"
+        main.write_bytes(content["fmi2.c"])
+        sources: Iterable[Path] = chain([main], _written(pieces, room))
         for platform in platforms:
-            library = compile_library(sources, room / "library", platform)
+            library = compile_library(sources if pieces else main, room / "library", platform)
+            sources = [main, *sorted(room.glob("piece*.c"))]
             entry = f"binaries/{platform}/{component.name}{SUFFIX[platform]}"
             files[entry] = library.read_bytes()
     return files
+
+
+def _written(pieces: Iterable[str], folder: Path) -> Iterator[Path]:
+    for k, piece in enumerate(pieces):
+        path = folder / f"piece{k:03}.c"
+        path.write_text(piece)
+        yield path

@@ -62,13 +62,13 @@ def compiler_version() -> str:
 
 
 def compile_library(
-    source: Path | str | Sequence[Path],
+    source: Path | str | Iterable[Path],
     library: Path | str,
     platform: str | None = None,
     options: Sequence[str] = (),
 ) -> Path:
     """Compile the C file `source` to the shared library `library` and return its path; several
-    files are compiled side by side.
+    files are compiled side by side, each from when it comes.
 
     platform: one of PLATFORMS, by default this machine's. The FMI headers are on the include path,
     and only functions declared FMI2_Export are exported. options: further arguments of the compiler
@@ -76,32 +76,37 @@ def compile_library(
     with the compiler's output if the source does not compile.
     """
     compiler_version()
-    several = [source] if isinstance(source, (Path, str)) else source
-    sources, library = [Path(s).resolve() for s in several], Path(library).resolve()
+    library = Path(library).resolve()
     targets = TARGETS.get(platform or host_platform())
     if targets is None:
         raise FmuError(f"no platform {platform!r}; there are {', '.join(PLATFORMS)}")
+    if len(targets) > 1 and not isinstance(source, (Path, str)):
+        source = [*source]
     with tempfile.TemporaryDirectory(dir=library.parent) as room:
-        slices = [_compiled(sources, Path(room), target, options) for target in targets]
+        slices = [_compiled(source, Path(room), target, options) for target in targets]
         library.write_bytes(slices[0] if len(slices) == 1 else universal(slices))
     return library
 
 
-def _compiled(sources: list[Path], room: Path, target: str, options: Sequence[str]) -> bytes:
+def _compiled(
+    source: Path | str | Iterable[Path], room: Path, target: str, options: Sequence[str]
+) -> bytes:
     made = room / target
     made.mkdir()
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     # A Mach-O file contains the path that it was written to, so this is the same everywhere.
-    if len(sources) == 1:
-        _zig([*link, *options, "-o", "library", str(sources[0])], made, target)
+    if isinstance(source, (Path, str)):
+        inputs = [str(Path(source).resolve())]
     else:
-        objects = [f"{k}.o" for k in range(len(sources))]
-        both = zip(sources, objects, strict=True)
-        commands = [[*options, "-c", "-o", o, str(source)] for source, o in both]
-        commands.reverse()  # the last includes all that is not in pieces, and takes longest
+        jobs = {}
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(lambda command: _zig(command, made, target), commands))
-        _zig([*link, *options, "-o", "library", *objects], made, target)
+            for each in source:
+                command = [*options, "-c", "-o", f"{each.stem}.o", str(each.resolve())]
+                jobs[f"{each.stem}.o"] = pool.submit(_zig, command, made, target)
+        for job in jobs.values():
+            job.result()
+        inputs = [*jobs]
+    _zig([*link, *options, "-o", "library", *inputs], made, target)
     return (made / "library").read_bytes()
 
 

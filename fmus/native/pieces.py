@@ -11,8 +11,10 @@ statement stays as it is, so that the results are the same, bit for bit.
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import islice
 
 LONGEST = 30_000
 """Statements that stay one function, which compiles in 3 s."""
@@ -28,20 +30,22 @@ _SLOT = re.compile(r"\ba\d+\b")
 _HELPER = re.compile(r"^(?=(?:casadi_real|casadi_int|void) casadi_)", re.MULTILINE)
 
 
-def split(text: str) -> tuple[str, tuple[str, ...]]:
-    """The C text with each long function replaced by calls of its pieces, and the files of pieces.
-    `text` is CasADi's, with static functions."""
-    pieces: list[str] = []
+def split(text: str) -> tuple[str, Iterable[str]]:
+    """The C text with each long function replaced by calls of its pieces, and the files of pieces,
+    each made when it is asked for, so that the ones before can be compiled meanwhile; () where no
+    function is long. `text` is CasADi's, with static functions."""
+    long: list[tuple[list[str], list[str]]] = []  # heads of the pieces, and statements
 
     def shortened(found: re.Match[str]) -> str:
         name, parameters, declared, body = found.groups()
         statements = body.splitlines(keepends=True)
         if len(statements) <= LONGEST:
             return found[0]
-        heads = []
-        for head, piece in _pieces(name, parameters, statements):
-            heads.append(head)
-            pieces.append(f"{head} {piece}")
+        heads = [
+            f"__attribute__((noinline)) int part{k}_{name}({parameters}, casadi_real* a)"
+            for k in range(-(-len(statements) // PIECE))
+        ]
+        long.append((heads, statements))
         size = 1 + max(int(slot[1:]) for slot in _SLOT.findall(declared))
         calls = (f"  if (part{k}_{name}(arg, res, iw, w, mem, a)) return 1;\n"
                  for k in range(len(heads)))  # fmt: skip
@@ -51,14 +55,20 @@ def split(text: str) -> tuple[str, tuple[str, ...]]:
         )
 
     main = _FUNCTION.sub(shortened, text)
-    if not pieces:
+    if not long:
         return main, ()
-    main = _HELPER.sub("static ", main)  # it is part of every file
-    return main, tuple(main + "".join(pieces[k : k + FILE]) for k in range(0, len(pieces), FILE))
+    whole = hashlib.sha256(text.encode()).hexdigest()
+    main = f"/* Pieces of {whole}. */\n{_HELPER.sub('static ', main)}"  # it is part of every file
+    return main, _files(main, (piece for each in long for piece in _pieces(*each)))
 
 
-def _pieces(name: str, parameters: str, statements: list[str]) -> Iterator[tuple[str, str]]:
-    """(head, body) of each piece."""
+def _files(main: str, pieces: Iterator[str]) -> Iterator[str]:
+    while several := [*islice(pieces, FILE)]:
+        yield main + "".join(several)
+
+
+def _pieces(heads: list[str], statements: list[str]) -> Iterator[str]:
+    """The pieces of a function, with their heads."""
     slots = [_slots(statement) for statement in statements]
     bounds = [slice(k, k + PIECE) for k in range(0, len(statements), PIECE)]
     after: list[set[str]] = []  # by piece: slots whose values later pieces read
@@ -69,7 +79,7 @@ def _pieces(name: str, parameters: str, statements: list[str]) -> Iterator[tuple
             live.discard(written)
             live.update(read)
     before: set[str] = set()
-    for k, (piece, needed) in enumerate(zip(bounds, reversed(after), strict=True)):
+    for head, piece, needed in zip(heads, bounds, reversed(after), strict=True):
         last = {written: i for i, (written, _) in enumerate(slots[piece])}
         body: list[str] = []
         local: set[str] = set()
@@ -85,8 +95,7 @@ def _pieces(name: str, parameters: str, statements: list[str]) -> Iterator[tuple
                 body.append(f"  a[{int(written[1:])}]={written};\n")
             local.update(read, {written} - {""})
         declared = f"  casadi_real {', '.join(sorted(local))};\n" if local else ""
-        head = f"__attribute__((noinline)) int part{k}_{name}({parameters}, casadi_real* a)"
-        yield head, f"{{\n{declared}{''.join(body)}  return 0;\n}}\n"
+        yield f"{head} {{\n{declared}{''.join(body)}  return 0;\n}}\n"
         before = needed
 
 

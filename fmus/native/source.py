@@ -14,9 +14,9 @@ from hapticlink.fmus.native.pieces import split
 from hapticlink.fmus.one_pass import one_pass
 
 
-def component_source(component: Component) -> tuple[str, tuple[str, ...]]:
+def component_source(component: Component) -> tuple[str, Iterable[str]]:
     """component.h (sizes, names, start values and functions) and the texts of further C files, with
-    pieces of long functions; the same texts for the same component.
+    pieces of long functions, as `pieces.split`; the same texts for the same component.
 
     The functions are `static`, so that their names (initialize, output, advance) cause no conflict.
     """
@@ -74,7 +74,7 @@ def _room(text: str, of: str) -> int:
     return max(int(n) for n in re.findall(rf"\*sz_{of} = (\d+);", text))
 
 
-def functions(made: Iterable[ca.Function]) -> tuple[str, tuple[str, ...]]:
+def functions(made: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
     """Static C functions in which each instruction of CasADi's virtual machine is a statement on
     local variables, and the C files with the pieces of those that are long.
 
