@@ -140,7 +140,8 @@ def test_a_schedule_waits_by_the_clock_of_the_machine(tmp_path: Path, loop: str)
     began = Pace().now()
     run = simulate("closed-loop", tmp_path, ["duration=0.11"], real_time=RealTimeRun()).run
     assert Pace().now() - began > 100 * MS
-    assert run["real_time"]["samples"]["graphics"]["taken"] == 3
+    samples = run["real_time"]["samples"]["graphics"]
+    assert samples["taken"] == 3 or (samples["late"] and 1 <= samples["taken"] < 3)
 
 
 BODY = """
@@ -181,15 +182,21 @@ def test_an_fmu_that_hangs_beside_the_loop_is_named(
 ) -> None:
     """It is in its step when the run ends, and is not called again; the loop went on meanwhile."""
     monkeypatch.setattr(beside, "GRACE", 0.01)
-    path = beside_the_loop(tmp_path, "__import__('time').sleep(0.5)", timeout=0.05)
-    run = simulate(path, tmp_path / "out", (), real_time=RealTimeRun()).run
-    assert "slow: has not returned from its step within 0.05 s" in run["fault"]["message"]
+    go = tmp_path / "go"
+    hang = f"while not __import__('os').path.exists({str(go)!r}): __import__('time').sleep(0.01)"
+    path = beside_the_loop(tmp_path, hang, timeout=0.3)
+    try:
+        run = simulate(path, tmp_path / "out", (), real_time=RealTimeRun()).run
+    finally:
+        go.touch()
+    assert "slow: has not returned from its step within 0.3 s" in run["fault"]["message"]
     assert run["real_time"]["abandoned"] == ["slow"]
     rows = read_table(tmp_path / "out" / "haptics.csv")["time"]
     assert np.array_equal(rows, np.arange(len(rows)) / 512)
     for thread in threading.enumerate():
         if thread.name == "hapticlink-beside":
-            thread.join()
+            thread.join(60)
+    assert not threads()
 
 
 def test_a_step_that_is_not_done_at_the_end_is_waited_for(tmp_path: Path, loop: str) -> None:
