@@ -148,9 +148,7 @@ def variable(
     """
     import numpy as np
 
-    low, high = math.ceil(1 / (fastest * base)), math.floor(1 / (slowest * base))
-    if not 1 <= low <= high:
-        raise ValueError(f"no period between {fastest} and {slowest} Hz is a whole haptic tick")
+    low, high = bounds(slowest, fastest, base)
     if end // low > MOST_DRAWN:
         raise ValueError(
             f"up to {end // low} periods would be drawn before the run, at most {MOST_DRAWN} are: "
@@ -161,6 +159,15 @@ def variable(
     while starts[-1] <= end + high:
         starts.append(starts[-1] + int(generator.integers(low, high, endpoint=True)))
     return tuple(starts)
+
+
+def bounds(slowest: Fraction, fastest: Fraction, base: Fraction) -> tuple[int, int]:
+    """The shortest and the longest period of `variable`, in ticks. Raises ValueError where no whole
+    number of ticks lies between the bounds."""
+    low, high = math.ceil(1 / (fastest * base)), math.floor(1 / (slowest * base))
+    if not 1 <= low <= high:
+        raise ValueError(f"no period between {fastest} and {slowest} Hz is a whole haptic tick")
+    return low, high
 
 
 def listed(times: Sequence[Fraction], base: Fraction) -> tuple[int, ...]:

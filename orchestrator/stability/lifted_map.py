@@ -30,7 +30,7 @@ from hapticlink.orchestrator.stability.tangent import SAME, Columns, Instruction
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
 
-Watch = Callable[[int, Vector], bool]
+Watch = Callable[[Vector], None]
 
 
 def hyperperiod(time: Timeline) -> int:
@@ -96,16 +96,14 @@ class LiftedMap:
         self._state.restore(self._begin)
         return LiftedMap(Plan(system), self._simulation, 0.0, self._tangent, window)
 
-    def __call__(
-        self, state: Vector, watch: Watch = lambda count, state: False, always: bool = False
-    ) -> Vector | None:
-        """F(state). watch: called after 1, 2, 4, 8, ... events, or `always`, with their number and
-        the state; where it returns True, the evaluation ends without a result."""
+    def image(self, state: Vector, watch: Watch | None = None) -> Vector:
+        """F(state). watch: called after each event with the numbers of the FMUs and signals, and
+        behind them those of holds, of which a latency can leave more or fewer than at the end."""
         self._state.restore(self._state.put(self._template, state))
-        for count, (tick, event) in enumerate(self._moments, start=1):
+        for tick, event in self._moments:
             self._run(tick, event)
-            if (always or count & (count - 1) == 0) and watch(count, self._numbers()):
-                return None
+            if watch:
+                watch(self._state.numbers(self._state.save()))
         interrupt.check()
         return self._numbers()
 
@@ -168,12 +166,6 @@ class LiftedMap:
             yield from self._closures.directions(self.coordinates, self._free, point)
         else:
             yield from np.eye(len(point))[self._free]
-
-    def image(self, state: Vector) -> Vector:
-        """F(state)."""
-        found = self(state)
-        assert found is not None
-        return found
 
     def second(self, state: Vector) -> Vector:
         """The state after two periods, of which the second one is run at its own time: F(F(state))

@@ -2,8 +2,9 @@
 
 The argument of its eigenvalue is known up to whole turns only. A mode v = a + i b is therefore
 followed through the hyperperiod by two evaluations, from z + d a and z + d b: the coordinate with
-the largest share moves as c(t) = c_a + i c_b, and the phase of c, unwrapped over the events, is
-omega P. It is exact as long as c turns by less than half a turn between two events.
+the largest share, of an FMU or a signal, moves as c(t) = c_a + i c_b, and the phase of c, unwrapped
+over the events, is omega P. It is exact as long as c turns by less than half a turn between two
+events.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ def traced(map_: LiftedMap, at: Linear, mode: Mode) -> Mode:
     """The mode with its frequency beyond the argument of its eigenvalue."""
     if map_.events == 1:
         return mode
-    j = int(np.argmax(mode.participation))
-    j = int(at.taken[j])
+    held = [map_.coordinates[i].kind == "hold" for i in at.taken]
+    j = int(at.taken[np.argmax(np.where(held, 0.0, mode.participation))])
     v = mode.vector * (STEP / np.max(np.abs(mode.vector) / np.maximum(1.0, np.abs(at.point))))
     rest = _followed(map_, at.point, j)
     paths = [_followed(map_, at.point + part, j) - rest for part in (v.real, v.imag)]
@@ -43,10 +44,5 @@ def traced(map_: LiftedMap, at: Linear, mode: Mode) -> Mode:
 def _followed(map_: LiftedMap, point: Vector, j: int) -> Vector:
     """The coordinate j after each event."""
     seen: list[float] = []
-
-    def watch(count: int, state: Vector) -> bool:
-        seen.append(float(state[j]))
-        return False
-
-    map_(point, watch, always=True)
+    map_.image(point, lambda state: seen.append(float(state[j])))
     return np.array(seen)

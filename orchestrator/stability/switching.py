@@ -17,12 +17,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import matrix_balance, solve_triangular
+from scipy.sparse.linalg import LinearOperator, eigs
 from scipy.stats import t as student
 
 Matrix = NDArray[np.float64]
 BATCHES = 40
 CONFIDENCE = 0.95
+ROUNDING = 1e-12
+"""Of the spectral radius of a product, relative."""
+DENSE = 600
+"""Largest number of second moments whose map is written as a matrix."""
 
 
 @dataclass(frozen=True)
@@ -60,30 +65,38 @@ def joint_spectral_radius(
         after.setdefault(edge.start, []).append(i)
     lower = 0.0
     worst: tuple[int, ...] = ()
-    level: list[tuple[Matrix, tuple[int, ...], float]] = [
-        (scaled[i], (i,), float(np.linalg.norm(scaled[i], 2))) for i in range(len(edges))
+    level: list[tuple[Matrix, float, tuple[int, ...], float]] = [
+        (*_normed(A), (i,), float(np.linalg.norm(A, 2))) for i, A in enumerate(scaled)
     ]
     upper, spent = max(bound for *_, bound in level), len(level)
     while level:
-        for P, path, _ in level:
+        for P, size, path, _ in level:
             if edges[path[0]].start == edges[path[-1]].end:
-                found = float(np.abs(np.linalg.eigvals(P)).max()) ** (1 / len(path))
-                if found > lower:
+                found = float(np.abs(np.linalg.eigvals(P)).max())
+                found **= 1 / len(path)
+                found *= np.exp(size / len(path))
+                if found > lower * (1.0 + ROUNDING):  # a shorter product has the same otherwise
                     lower, worst = found, path
-        level = [each for each in level if each[2] > lower + tolerance]
+        level = [each for each in level if each[-1] > lower + tolerance]
         upper = min(upper, max([lower + tolerance, *(bound for *_, bound in level)]))
-        children = sum(len(after[edges[path[-1]].end]) for _, path, _ in level)
+        children = sum(len(after[edges[path[-1]].end]) for _, _, path, _ in level)
         if not level or spent + children > products:
             break
         spent += children
         longer = []
-        for P, path, bound in level:
+        for P, size, path, bound in level:
             for i in after[edges[path[-1]].end]:
-                Q = scaled[i] @ P
-                size = float(np.linalg.norm(Q, 2)) ** (1 / (len(path) + 1))
-                longer.append((Q, (*path, i), min(bound, size)))
+                Q, grown = _normed(scaled[i] @ P)
+                grown += size
+                longer.append((Q, grown, (*path, i), min(bound, np.exp(grown / (len(path) + 1)))))
         level = longer
     return Bounds(lower, max(lower, upper), worst)
+
+
+def _normed(P: Matrix) -> tuple[Matrix, float]:
+    """P/|P| and ln |P|, since long products leave the range of doubles; 0 and -inf for P = 0."""
+    size = float(np.linalg.norm(P, 2))
+    return (P / size, float(np.log(size))) if size else (P, -np.inf)
 
 
 def _in_good_norms(edges: Sequence[Edge], rounds: int = 60) -> list[Matrix]:
@@ -115,25 +128,33 @@ def _in_good_norms(edges: Sequence[Edge], rounds: int = 60) -> list[Matrix]:
     return best
 
 
-def mean_square(edges: Sequence[Edge], rounds: int = 20_000) -> float:
-    """The spectral radius of the map of second moments, by the power method. Costa, Fragoso,
-    Marques, Discrete-Time Markov Jump Linear Systems (2005), section 3.3."""
+def mean_square(edges: Sequence[Edge]) -> float:
+    """The spectral radius of the map of second moments. Costa, Fragoso, Marques, Discrete-Time
+    Markov Jump Linear Systems (2005), section 3.3. It maps positive semidefinite X to such, so that
+    its radius is an eigenvalue, the one with the largest real part (Krein, Rutman): no power method
+    finds it, since others may be as large."""
     n = len(edges[0].A)
-    X = {node: np.eye(n) for e in edges for node in (e.start, e.end)}
-    before = 0.0
-    for k in range(rounds):
-        Y = {node: np.zeros((n, n)) for node in X}
-        for e in edges:
-            Y[e.end] += e.probability * e.A @ X[e.start] @ e.A.T
-        size = sum(float(np.trace(y)) for y in Y.values())
-        old = sum(float(np.trace(x)) for x in X.values())
-        if size == 0.0:
-            return 0.0
-        X = {node: y / size for node, y in Y.items()}
-        if k > 10 and abs(size / old - before) < 1e-12 * before:
-            break
-        before = size / old
-    return before
+    nodes = sorted({node for e in edges for node in (e.start, e.end)})
+    sizes = sum(np.abs(e.A) for e in edges)
+    scale = matrix_balance(sizes, permute=False, separate=True)[1][0]
+    balanced = [e.A * scale / scale[:, None] for e in edges]
+
+    def moved(x: Matrix) -> Matrix:
+        X = dict(zip(nodes, x.reshape(len(nodes), n, n), strict=True))
+        Y = {node: np.zeros((n, n)) for node in nodes}
+        for e, A in zip(edges, balanced, strict=True):
+            Y[e.end] += e.probability * A @ X[e.start] @ A.T
+        return np.concatenate([Y[node].ravel() for node in nodes])
+
+    size = len(nodes) * n * n
+    if size <= DENSE:
+        return float(np.abs(np.linalg.eigvals(np.stack([*map(moved, np.eye(size))]))).max())
+    start = np.tile(np.eye(n).ravel(), len(nodes))
+    if not moved(start).any():
+        return 0.0
+    map_ = LinearOperator((size, size), moved)
+    found = eigs(map_, k=1, which="LR", v0=start, return_eigenvectors=False)
+    return float(found[0].real)
 
 
 def lyapunov(edges: Sequence[Edge], seed: int = 0, steps: int = 20_000) -> tuple[float, float]:

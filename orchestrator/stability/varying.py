@@ -18,7 +18,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.frames import Frames
-from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.base.ticks import Clock, Timeline, bounds, exact
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
@@ -44,7 +44,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class VaryingStability:
-    """The result for a rate that varies. frames: the periods that occur (ticks of `tick` s).
+    """The result for a rate that varies. frames: the periods that may occur (ticks of `tick` s).
     bounds: of the joint spectral radius, per frame. worst: the periods of its fastest sequence.
     second_moment: spectral radius of the map of second moments, per frame. exponent: Lyapunov's
     (1/s), with the half-width of its 95 % confidence interval on a sequence drawn with `seed`."""
@@ -142,20 +142,21 @@ def varying_stability(
         with built(read) as whole:
             system, removed = frozen.without(whole)
             place = _clock(system)
-            steps = system.timeline.clocks[place]._steps
-            lengths = range(min(steps), max(steps) + 1)
-            seed = next(
-                p.rate.seed for p in clocks(read).paces.values() if isinstance(p.rate, VariableRate)
+            rate = next(
+                p.rate for p in clocks(read).paces.values() if isinstance(p.rate, VariableRate)
             )
+            # All that may be drawn, not only what this run draws.
+            low, high = bounds(exact(rate.min), exact(rate.max), system.timeline.base)
+            lengths, seed = range(low, high + 1), rate.seed
             edges, names = edges_of(read, system, place, list(lengths))
-    bounds = joint_spectral_radius(edges, 1e-4, products)
+    found = joint_spectral_radius(edges, 1e-4, products)
     exponent, width = lyapunov(edges, seed)
     return VaryingStability(
         title=read.title,
         frames=tuple(lengths),
         tick=float(system.timeline.base),
-        bounds=bounds,
-        worst=tuple(names[i] for i in bounds.worst),
+        bounds=found,
+        worst=tuple(names[i] for i in found.worst),
         second_moment=mean_square(edges),
         exponent=exponent,
         confidence=width,

@@ -19,9 +19,13 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
         operations += building_blocks.feed(system, event, unit)
     for unit in sampled:
         operations += building_blocks.step(system, event, unit)
+    divided = [unit for unit in started if unit.name in system.substeps]
+    for unit in divided:  # all its substeps take what the first one does
+        operations += building_blocks.step(system, event, unit)
     for unit in sampled:
         operations += building_blocks.publish(system, unit)
     operations += building_blocks.record(system, event)
     for unit in started:
-        operations += building_blocks.step(system, event, unit)
+        if unit not in divided:
+            operations += building_blocks.step(system, event, unit)
     return tuple(operations)

@@ -95,13 +95,13 @@ def test_every_fmu_is_stepped_without_gap_or_overlap(
 
 
 @shared
-@given(timelines, st.sampled_from(CAUSAL))
+@given(timelines, st.sampled_from(CAUSAL), st.sampled_from([{}, {"mechanism": 3}]))
 def test_nothing_reads_the_future_and_holds_give_the_newest(
-    stamped: Make, timeline: Timeline, coupling: str
+    stamped: Make, timeline: Timeline, coupling: str, substeps: dict[str, int]
 ) -> None:
-    """Of every clock: what it puts out is used at the first tick at or after its stamp, by plants
-    and by sampled blocks. Jacobi's sampled outputs come an event later."""
-    system = stamped(timeline, coupling)
+    """Of every clock: what it puts out is used at the first tick at or after its stamp, by plants,
+    in all their substeps, and by sampled blocks. Jacobi's sampled outputs come an event later."""
+    system = replace(stamped(timeline, coupling), substeps=substeps)
     sources = {c.name: system.fmu[c.source] for c in system.connections}
     for tick, connection, stamp in uses(Plan(system)):
         assert stamp <= tick

@@ -235,6 +235,29 @@ def test_growth_along_a_trajectory_is_that_of_the_variational_equation() -> None
     assert grown == pytest.approx(math.log(np.linalg.norm(M, 2)) / lasting, rel=1e-3)
 
 
+def test_samples_of_a_position_gather_while_a_slower_wall_does_not_read_them() -> None:
+    """A wall at 64 Hz reads the position of 3 periods of 512 Hz before; m v' = F - b v, exact:
+    s_{k+1} = M(8) s_k + G(8) F_k,   F_{k+1} = -K [1 0] (M(5) s_k + G(5) F_k)"""
+    m, b, K = 0.3, 5.0, 60.0
+
+    def over(periods: int) -> np.ndarray:
+        decay, t = math.exp(-b / m * periods / 512), periods / 512
+        moved = (1 - decay) * m / b
+        return np.array([[1, moved, (t - moved) / b], [0, decay, (1 - decay) / b]])
+
+    A = np.vstack([over(8), -K * over(5)[0]])
+    options = {
+        "hand.wrench": [0.0, 0.0, 0.0],
+        "fmu.wall.rate": 64,
+        "fmu.wall.settings": {"stiffness": K, "unilateral": False},
+        "delays": {"virtual_mechanism.rail.position": 0.005},
+    }
+    found = hl.stability("virtual-wall", options)
+    first = max(np.linalg.eigvals(A), key=lambda z: (abs(z), z.imag))
+    assert found.radius == pytest.approx(abs(first), rel=1e-6)
+    assert found.modes[0].omega == pytest.approx(np.angle(first) * 64, rel=1e-6)
+
+
 def test_what_has_no_map_is_refused() -> None:
     rates = {"graphics.rate": [0.03, 0.07, 0.1, 0.2], "duration": 0.1}
     with pytest.raises(hl.InputFault, match=r"the period of \w+ varies"):
