@@ -110,26 +110,6 @@ def if_else_zero(condition: float, value: float) -> float:
     return 0.0 if condition == 0.0 else value
 
 
-def erfinv(a: float) -> float:
-    """Inverse of erf: CasADi's rational approximation (calculus.hpp) and two Newton steps."""
-    if fabs(a) >= 1.0:
-        return copysign(inf, a) if fabs(a) == 1.0 else nan
-    if isnan(a):
-        return nan
-    if a < 0.7 and a >= -0.7:
-        z = a * a
-        top = ((-0.140543331 * z + 0.914624893) * z - 1.645349621) * z + 0.886226899
-        low = (((-0.329097515 * z + 0.012229801) * z + 1.442710462) * z - 2.118377725) * z + 1.0
-        y = a * top / low
-    else:
-        z = math.sqrt(-math.log((1.0 - fabs(a)) / 2.0))
-        top = ((1.641345311 * z + 3.429567803) * z - 1.624906493) * z - 1.970840454
-        y = copysign(top / ((1.637067800 * z + 3.543889200) * z + 1.0), a)
-    for _ in range(2):
-        y = y - (erf(y) - a) / (2.0 / math.sqrt(math.pi) * math.exp(-y * y))
-    return y
-
-
 def look_up(times: Sequence[float], rows: Sequence[Sequence[float]]) -> tuple[LookUp, LookUp]:
     """CasADi's linear interpolant of `rows` and its slope, in its order of operations
     (casadi_interpn.hpp): functions of t that return one value per column."""

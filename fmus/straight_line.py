@@ -26,7 +26,7 @@ from hapticlink.fmus.errors import UnknownOperation
 
 # A name in `UNARY` and `BINARY` is a function of ieee.py.
 UNARY = """exp expm1 log log1p sqrt sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh
-           floor ceil fabs sign erf erfinv"""
+           floor ceil fabs sign erf"""
 BINARY = "atan2 fmod remainder copysign fmin fmax hypot if_else_zero"
 
 # Plain arithmetic uses operators; division and powers do not, since they raise in Python.
