@@ -53,7 +53,8 @@ BINARY = {
 
 SPECIAL = [0.0, -0.0, 1.0, -1.0, 2.0, -3.0, 0.5, -0.5, 2.5, 1e308, -1e308, 5e-324, 710.0]
 SPECIAL += [math.inf, -math.inf, math.nan]
-doubles = st.floats() | st.floats(-5, 5) | st.sampled_from(SPECIAL)
+# No signalling nan: what C makes of one in fmax is the platform's.
+doubles = st.floats(allow_nan=False) | st.floats(-5, 5) | st.sampled_from(SPECIAL)
 
 
 @cache
