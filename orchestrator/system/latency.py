@@ -8,8 +8,8 @@ once, so that a run starts consistently.
 
 from __future__ import annotations
 
-import heapq
 import math
+from bisect import insort
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import count
@@ -32,6 +32,7 @@ class Link:
         self._spread = exact(latency.max) - self._low if latency.max is not None else Fraction(0)
         self._loss, self._base = latency.loss, base
         self._draw = np.random.Generator(np.random.PCG64(latency.seed)).random
+        # In the order of arrival, so that equal states have equal lists, as the lifted map needs.
         self._in_transit: list[tuple[int, int, int, Any]] = []
         self._order, self._newest = count(), 0
         self.sent = self.lost = self.overtaken = 0
@@ -51,12 +52,12 @@ class Link:
             self.lost += 1
             return
         arrival = max(stamp + late, earliest)
-        heapq.heappush(self._in_transit, (arrival, stamp, next(self._order), item))
+        insort(self._in_transit, (arrival, stamp, next(self._order), item))
 
     def arrived(self, tick: int) -> Iterator[tuple[int, int, Any]]:
         """(arrival, stamp, item) of each sample that has arrived by `tick` since the last call."""
         while self._in_transit and self._in_transit[0][0] <= tick:
-            arrival, stamp, _, item = heapq.heappop(self._in_transit)
+            arrival, stamp, _, item = self._in_transit.pop(0)
             if stamp < self._newest:
                 self.overtaken += 1
                 continue

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 import hapticlink as hl
 from hapticlink.orchestrator.commands import main
+from hapticlink.orchestrator.stability import wall_limits
 from hapticlink.orchestrator.stability.linearise import Linear
 from hapticlink.orchestrator.stability.modes import counted, modes, verdict
 
@@ -233,6 +234,19 @@ def test_growth_along_a_trajectory_is_that_of_the_variational_equation() -> None
     options = {"linkage.start": {"pivot": start - math.pi / 2}}
     grown = hl.finite_time_growth("pendulum", options, at=at, seconds=seconds)
     assert grown == pytest.approx(math.log(np.linalg.norm(M, 2)) / lasting, rel=1e-3)
+
+
+@pytest.mark.parametrize("late", [3, 4, 12])
+def test_many_samples_are_on_their_way(late: int) -> None:
+    """A wall whose force comes `late` periods later, against the roots of its equation."""
+    gains = np.array([300.0])
+    expected = wall_limits.radius(0.3, 5.0, 1 / 512, late, gains, 0 * gains)[0]
+    options = {
+        "hand.wrench": [0.0, 0.0, 0.0],
+        "fmu.wall.settings": {"stiffness": 300.0, "unilateral": False},
+        "delays": {"wall.F": late / 512},
+    }
+    assert hl.stability("virtual-wall", options).radius == pytest.approx(expected, abs=1e-8)
 
 
 def test_samples_of_a_position_gather_while_a_slower_wall_does_not_read_them() -> None:
