@@ -71,22 +71,25 @@ def work(each: Line) -> Row:
         row = judged(session, "check", [])
     if "growth_rate" not in row:
         return {"end": DONE, "rows": [row]}
-    seconds = long_enough(row["growth_rate"])
-    growth = growth_of_run(each.scene, seconds)
-    row |= {"run_growth_rate": growth, "run_verdict": "unstable" if growth > 0 else "stable"}
+    growth, verdict = of_run(each.scene, row["growth_rate"])
+    row |= {"run_growth_rate": growth, "run_verdict": verdict}
     return {"end": DONE, "rows": [row | {"agree": row["run_verdict"] == row["verdict"]}]}
 
 
-def long_enough(growth: float) -> float:
-    """Seconds of a run that shows a growth rate (1/s)."""
-    return min(LONGEST, max(SHORTEST, SPANS / max(abs(growth), 1e-9)))
+def of_run(scene: Scene, foretold: float) -> tuple[float, str]:
+    """Growth rate (1/s) and verdict of a run that lasts SPANS time constants of the rate that a map
+    has `foretold`, within the limits. A run is stable if its motion decays: by a factor e, or half
+    as fast as foretold if that is slower. One that keeps its size is an instability that ended in
+    a limit cycle, as where motors saturate, before the first quarter of the run was over."""
+    seconds = min(LONGEST, max(SHORTEST, SPANS / max(abs(foretold), 1e-9)))
+    growth = _growth(scene, seconds)
+    return growth, "stable" if growth < -min(1 / seconds, abs(foretold) / 2) else "unstable"
 
 
-def growth_of_run(scene: Scene, seconds: float) -> float:
+def _growth(scene: Scene, seconds: float) -> float:
     """The growth rate (1/s) of the mechanism's velocities between the second and the last quarter
-    of a run of `seconds`, or between the first and the last if that is larger, since growth may
-    have ended in a limit cycle before; that of a run that diverges is infinite, that of one at rest
-    minus infinite."""
+    of a run of `seconds`, or between the first and the last if that is larger; that of a run that
+    diverges is infinite, that of one at rest minus infinite."""
     with temporary_folders.room() as room:
         experiment = simulate(open_scene.load(scene, [f"duration={seconds:.6g}"]), room)
         if experiment.outcome.reason not in ("duration", "stop_when"):

@@ -15,7 +15,7 @@ import numpy as np
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import Experiment
-from hapticlink.orchestrator.maps.checks import growth_of_run, long_enough
+from hapticlink.orchestrator.maps import checks
 from hapticlink.orchestrator.results.tables import Vector
 from hapticlink.orchestrator.stability.session import Session
 from hapticlink.orchestrator.study.design import CONTINUOUS, FLOOR, REFERENCE
@@ -56,8 +56,7 @@ def at_rest(experiment: Experiment) -> Row:
         found = session.judge([target])
     joint = scene.linkage.joint[0].name
     kicked = open_scene.load(scene, [target, f"linkage.start_velocity.{joint}={KICK}"])
-    growth = growth_of_run(kicked, long_enough(found.growth))
-    run = "unstable" if growth > 0 else "stable"
+    _, run = checks.of_run(kicked, found.growth)
     return {"end": "duration", "verdict": found.verdict, MARGIN: -found.growth, RUN: run}
 
 

@@ -14,7 +14,7 @@ from hapticlink.orchestrator.study.choose import LEAST, SHARE, energy, margin, w
 from hapticlink.orchestrator.study.design import CONTINUOUS, DIRECT, MOBILITY, REFERENCE, mapped
 from hapticlink.orchestrator.study.figures import Panel, Square, maps, short
 from hapticlink.orchestrator.study.found import COMPENSATION, Found, both
-from hapticlink.orchestrator.study.measure import COUPLING, MARGIN, RUN, draw, stable
+from hapticlink.orchestrator.study.measure import COUPLING, KICK, MARGIN, RUN, draw, stable
 from hapticlink.orchestrator.study.methods import (
     BIAS,
     COLUMNS,
@@ -184,8 +184,9 @@ def _signs(found: Found) -> str:
     rows = [r for by in found.margins.values() for r in by.values() if MARGIN in r]
     wrong = [r for r in rows if r["verdict"] != r[RUN]]
     text = (
-        f"Runs after a small kick, with the growth of the mechanism's velocities, have the sign of "
-        f"the map in {len(rows) - len(wrong)} of {len(rows)} scenes at rest"
+        f"Whether a run decays after a kick of {KICK:g} rad/s is as the map says in "
+        f"{len(rows) - len(wrong)} of {len(rows)} scenes at rest; growth that saturated motors end "
+        "in a limit cycle is no decay"
     )
     if not wrong:
         return f"{text}."
@@ -194,8 +195,7 @@ def _signs(found: Found) -> str:
     largest = max(abs(r[MARGIN]) for r in wrong)
     return (
         f"{text}. The others: {listed}{'; ...' if len(where) > 6 else ''}, with margins of up to "
-        f"{short(largest)} 1/s (maps.csv). Growth that saturated motors end within the first "
-        "quarter of a run is not seen by it."
+        f"{short(largest)} 1/s (maps.csv)."
     )
 
 

@@ -102,3 +102,26 @@ def test_runs_shake_beyond_the_limit(late: int, reference: float) -> None:
         return float(last.max() / early.max())
 
     assert growth(0.98 * reference) < 1 < growth(1.02 * reference)
+
+
+def test_growth_until_motors_saturate() -> None:
+    """`two-users`, pulled apart to where both couplings together are too stiff: a kick grows by the
+    rate of the map, up to a limit cycle as large as the torque limit is."""
+    pose = (0.1942, -1.1702, 0.2527, -0.8407)
+    hand = {"type": "profile", "damping": [5.0, 5.0, 0.005], "table": [[0.0, 0.0, 0.0, 0.0]]}
+    scene: dict[str, Any] = {"hand": hand, "hands.left": hand, "graphics.rate": 32, "duration": 0.2}
+    scene["linkage.start"] = dict(zip(POSE, pose, strict=True))
+    loose = open_scene.load("two-users", scene)
+    with Session(loose) as session:
+        growth = session.judge({}).growth
+    assert 150 < growth < 200
+    largest = []
+    for limit_ in (0.5, 1.0):
+        kick = {"linkage.start_velocity.shoulder1": 1e-6, "device.torque_limit": limit_}
+        run = hl.run(loose, {**kick, "devices.left.torque_limit": limit_})
+        speed = np.abs(run["virtual_mechanism.qd"]).max(axis=1)
+        small = np.flatnonzero((speed > 1e-5) & (speed < 0.1))
+        rate = np.polyfit(small * T, np.log(speed[small]), 1)[0]
+        assert rate == pytest.approx(growth, rel=0.01)
+        largest.append(speed[-20:].max())
+    assert largest[1] == pytest.approx(2 * largest[0], rel=0.1)

@@ -99,6 +99,22 @@ def test_a_run_and_its_map_at_rest(tmp_path: Path) -> None:
     assert 0.5 < rest[measure.MARGIN] < 20.0
 
 
+@pytest.mark.parametrize(
+    ("arrangement", "linkage", "hold", "growth"),
+    [(MOBILITY, "serial", "zoh", 185.3), (DIRECT, "four-bar", "second-order", 24.14)],
+)
+def test_growth_that_ends_in_a_limit_cycle_is_unstable(
+    arrangement: str, linkage: str, hold: str, growth: float, tmp_path: Path
+) -> None:
+    """With the report's gains, motors saturate within the first quarter of the run, whose speed
+    then neither grows nor decays."""
+    job = design.run(arrangement, cases.at_rest(linkage), Method(hold, "stiff"), "none", "57")
+    assert job.scene
+    rest = measure.at_rest(simulate(job.scene, tmp_path, ["duration=0.1"]))
+    assert (rest["verdict"], rest[measure.RUN]) == ("unstable", "unstable")
+    assert rest[measure.MARGIN] == pytest.approx(-growth, rel=1e-3)
+
+
 def test_coupling_errors_are_distances_up_to_the_first_end() -> None:
     rest = np.zeros((65, 2))
     moved = rest.copy()
