@@ -11,6 +11,7 @@ from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.scene import drop as dropping
 from hapticlink.orchestrator.scene import families, toml_keys
 from hapticlink.orchestrator.scene.find import find, folder_of
+from hapticlink.orchestrator.scene.overrides import told
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import Path, Place, flatten, key_lines, place_of, whole
@@ -122,7 +123,7 @@ def with_family(
     try:
         expanded = families.members(linkage)
     except families.FamilyError as error:
-        option = f"--set {set_by[error.path]}" if error.path in set_by else None
+        option = told(set_by[error.path]) if error.path in set_by else None
         file, line = place_of(error.path, places)
         finding = Finding(".".join(map(str, error.path)), error.message, line, option, file)
         raise SceneFault(name, [finding]) from None
