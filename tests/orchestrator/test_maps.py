@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.maps import walls
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.maps import checks, walls
+from hapticlink.orchestrator.scene.overrides import written
 from hapticlink.orchestrator.stability import wall_limits
 
 M, D, T = 0.3, 5.0, 1 / 512
@@ -48,10 +50,30 @@ def test_the_boundary_is_that_of_the_closed_form(wall: hl.Map) -> None:
 
 
 def test_runs_agree_with_the_map(wall: hl.Map) -> None:
-    checks = wall.of("check")
-    assert len(checks) == 4
-    assert all(row["agree"] for row in checks)
-    assert {row["verdict"] for row in checks} == {"stable", "unstable"}
+    tried = wall.of("check")
+    assert len(tried) == 4
+    assert all(row["agree"] for row in tried)
+    assert {row["verdict"] for row in tried} == {"stable", "unstable"}
+
+
+@pytest.mark.parametrize("foretold", [5.0, -5.0])
+def test_a_run_is_judged_alike_whatever_was_foretold(foretold: float) -> None:
+    """A wall below its limit, whose slow decay two seconds would not show."""
+    scene = open_scene.load("virtual-wall", [*written(WALL), f"{STIFFNESS}=4900", f"{DAMPING}=0"])
+    root = _root(4900.0)
+    growth, verdict = checks.of_run(scene, foretold)
+    assert growth == pytest.approx(np.log(abs(root)) / T, rel=1e-3)
+    assert -0.5 < growth < 0.0
+    assert verdict == "stable"
+
+
+def _root(stiffness: float) -> complex:
+    """The largest root z of a handle with damping and a sampled spring: x' = A x + B F over T."""
+    e = np.exp(-D * T / M)
+    A = np.array([[1.0, M / D * (1 - e)], [0.0, e]])
+    B = np.array([[T / D - M / D**2 * (1 - e)], [(1 - e) / D]])
+    roots = np.linalg.eigvals(A - stiffness * B @ np.array([[1.0, 0.0]]))
+    return complex(max(roots, key=abs))
 
 
 def test_a_map_is_continued_and_not_computed_again(wall: hl.Map, folder: Path) -> None:
