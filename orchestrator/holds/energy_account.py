@@ -14,6 +14,7 @@ overtaken, which the target never sees.
 from __future__ import annotations
 
 from collections import deque
+from itertools import pairwise
 
 import numpy as np
 
@@ -109,8 +110,11 @@ class Account(Hold):
         are delayed and several may be in transit, the length of the path."""
         if not self._delayed:
             return np.abs(self._x - self._x_stamp)
-        corners = np.array([self._x_stamp, *(x for tick, x in self._path if tick > self._stamp)])
-        return np.abs(np.diff(corners, axis=0)).sum(axis=0)
+        corners = [self._x_stamp, *(x for tick, x in self._path if tick > self._stamp)]
+        length = np.zeros_like(self._x)
+        for before, x in pairwise(corners):  # one after the other: NumPy's `sum` has its own order
+            length += np.abs(x - before)
+        return length
 
     def correction(self, fresh: bool) -> Vector:
         """The effort added to the newest sample until the next tick; `fresh` when that sample is

@@ -115,6 +115,37 @@ def test_holds_in_c_are_those_in_python(name: str, wrapped: str, seed: int) -> N
         assert pair.compiled.value(later, 1.5).tobytes() == expected.tobytes()
 
 
+@pytest.mark.parametrize("size", [1, 2])
+@pytest.mark.parametrize("name", [name for name in NAMES if HOLDS[name].needs == "power"])
+def test_a_long_path_is_added_up_in_the_same_order(name: str, size: int) -> None:
+    """Of one entry NumPy adds eight numbers or more in an order of its own. 20 steps of the target
+    for each sample, which comes 13 of them late; the force works against a motion at about 1 m/s,
+    so that the friction is within its limits."""
+    generator, signals = np.random.default_rng(1), Signals()
+
+    def made() -> Hold:
+        x, v = (
+            Reader(signals, [*range(i, i + size)], np.ones(size))  # type: ignore[arg-type]
+            for i in (SIZE, 2 * SIZE)
+        )
+        return HOLDS[name](HoldContext(size, seconds, x, v))
+
+    loop = structures.Loop(values=signals.values.ctypes.data)
+    loop.numerator, loop.denominator = NUMERATOR, DENOMINATOR
+    python, held = made(), np.zeros(size)
+    compiled = CompiledHold(load(), ctypes.addressof(loop), made(), range(size), held)
+    for tick in range(400):
+        speed = 1.0 + 0.1 * generator.normal(size=SIZE)
+        signals.values[SIZE : 2 * SIZE] += speed * seconds(1)
+        signals.values[2 * SIZE : 3 * SIZE] = speed
+        if tick % 20 == 0:
+            sample = -3.0 + np.cos(tick) + np.zeros(size)
+            for hold in (python, compiled):
+                hold.push(max(tick - 13, 0), sample, tick)
+        expected = np.array(python.value(tick, 0.5), copy=True)
+        assert compiled.value(tick, 0.5).tobytes() == expected.tobytes()
+
+
 MATRICES = [*HOLDS.names(lambda kind: kind in KINDS and not kind.needs and not kind.gives_samples)]
 
 
