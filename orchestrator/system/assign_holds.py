@@ -69,6 +69,8 @@ def _assign(
         source, target = (fmus[n].clock for n in (c.source, c.target))
         key = next((k for k in names(c) if k in rules.holds), None)
         latency = next((rules.delays[k] for k in names(c) if k in rules.delays), None)
+        if latency and not (latency.min or latency.max or latency.loss):
+            latency = None  # of 0 s: as where none is named
         hold = rules.holds[key] if key else None
         if not key and source != target:
             longest, other = (timeline.clock(name).longest for name in (source, target))
