@@ -35,6 +35,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.assign_holds import misfit
 from hapticlink.orchestrator.system.ports import names
+from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import Connection, System
 
 SLOWEST = 1e-3
@@ -114,7 +115,8 @@ class RealTime:
     def set(self, name: str, value: ArrayLike) -> None:
         """Set an input that nothing feeds, or a tunable parameter, `fmu.port`, from the FMU's next
         step on; entries in the order of their indices, in the FMU's units. Raises InputFault for
-        other names and for values of another number or that are not finite."""
+        other names, for gains of a spring whose energy `pspm` limits, and for values of another
+        number or that are not finite."""
         fmu = name.partition(".")[0]
         if name not in self._settings:
             scalars = [*self._scalars(name, "input", "parameter")]
@@ -258,6 +260,11 @@ class RealTime:
                 raise InputFault(f"{name} is fed by a connection, {fed[scalar.name]}")
             if scalar.causality == "parameter" and scalar.variability != "tunable":
                 raise InputFault(f"{name} is not tunable: change the scene, with `reset`")
+        if name in limited_gains(self._simulation.system):
+            raise InputFault(
+                f"{name} is a gain of a spring whose energy `pspm` limits, which counts with that "
+                "of the start: change the scene, with `reset`"
+            )
 
     def _with(self, c: Connection, hold: str | None, delay: float | None) -> Connection:
         """The connection with another hold or latency."""

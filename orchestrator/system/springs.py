@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from hapticlink.orchestrator.fmi.units import SAME
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
-from hapticlink.orchestrator.system.system import Connection, Fmu
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 _KINDS = {
     "set_position": ("input",),
@@ -24,6 +25,20 @@ _KINDS = {
 def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     """The spring whose set position or set velocity a connection feeds; None if there is none."""
     return next((s for s in springs if _end(c) in s.ports), None)
+
+
+def limited_gains(system: System) -> set[str]:
+    """The gains, `fmu.parameter`, of springs whose energy a hold limits: its tank has their values
+    at the start, so that they may not change while the scene runs."""
+    held = {_end(c) for c in system.connections if c.hold and HOLDS[c.hold].needs == "spring"}
+    return {
+        f"{fmu.name}.{gain}"
+        for fmu in system.fmus
+        for spring in fmu.description.springs
+        if f"{fmu.name}.{spring.set_position}" in held
+        for gain in (spring.stiffness, spring.damping)
+        if gain
+    }
 
 
 def misfit(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator.api.real_time import RealTime
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.view import messages
 from hapticlink.orchestrator.view.scene import STIFFNESS
 
@@ -53,7 +54,7 @@ class Controls:
             self._change_rate(s.rate, s.jitter)
         for name in {*s.holds, *s.delays}:
             self._live.hold(name, s.holds.get(name), s.delays.get(name))
-        for name in s.gains:
+        for name in s.gains.keys() & self._gains.keys():
             self._set(name)
         if not s.topology:
             self.apply(messages.Topology("topology", False))
@@ -182,6 +183,7 @@ def target(user: str) -> str:
 def _gains(live: RealTime) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
     """Values and units of the parameters that a page can scale, by their name."""
     found: dict[str, tuple[NDArray[np.float64], list[str]]] = {}
+    fixed = limited_gains(live.system)
     names = ["virtual_mechanism", *(block(b, user) for user in users(live.scene) for b in GAINS)]
     for fmu in (live.system.fmu[name] for name in names if name in live.system.fmu):
         tunable = [
@@ -190,6 +192,8 @@ def _gains(live: RealTime) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
             if s.causality == "parameter" and s.variability == "tunable" and s.port not in OTHERS
         ]
         for port in dict.fromkeys(s.port for s in tunable):
+            if f"{fmu.name}.{port}" in fixed:
+                continue
             entries = fmu.description.port(port, "parameter")
             start = np.array([s.start for s in entries])
             found[f"{fmu.name}.{port}"] = start, [s.unit or "" for s in entries]

@@ -182,11 +182,36 @@ def test_a_reset_begins_anew_with_changed_options() -> None:
     assert "foh" in made.run["holds"].values()
 
 
+ENERGY = (
+    "holds.virtual_mechanism.F_drift=passive",
+    *(f"holds.controller.{end}=pspm" for end in ("x_S", "v_S")),
+)
+
+
 def test_the_hold_of_a_force_whose_energy_another_hold_shares_is_not_changed() -> None:
     def turn(live: hl.RealTime) -> None:
         with pytest.raises(hl.InputFault, match="share its energy"):
             live.hold("virtual_mechanism.F_drift", "zoh")
         live.stop()
 
-    ends = (f"holds.controller.{end}=pspm" for end in ("x_S", "v_S"))
-    ran("closed-loop-direct", turn, "holds.virtual_mechanism.F_drift=passive", *ends)
+    ran("closed-loop-direct", turn, *ENERGY)
+
+
+def test_a_gain_of_the_spring_whose_energy_is_limited_is_not_changed() -> None:
+    """The tank would count the force of the gain before it. Where nothing is limited it is."""
+    told: list[str] = []
+
+    def turn(live: hl.RealTime) -> None:
+        for gain in ("K_pc", "B_pc"):
+            try:
+                live.set(f"controller.{gain}", (3000.0, 3000.0, 3.0))
+            except hl.InputFault as fault:
+                told.append(str(fault))
+        live.set("controller.k_j", 100.0)
+        live.stop()
+
+    ran("closed-loop-direct", turn)
+    assert not told
+    ran("closed-loop-direct", turn, *ENERGY)
+    assert len(told) == 2
+    assert all("whose energy `pspm` limits" in each for each in told)
