@@ -132,7 +132,7 @@ def lines(results: Results) -> Iterator[str]:
     for fmu, errors in run.get("step_errors", {}).items():
         yield from long_steps(fmu, errors, run["fmus"][fmu].get("block"))
     yield from friction_speed.coarse(results)
-    yield from _late_passivity(run)
+    yield from _passivity(results)
     yield from _stopped(results)
     yield from _contacts(results)
     for clock, steps in run["controlled_steps"].items():
@@ -153,22 +153,11 @@ def lines(results: Results) -> Iterator[str]:
         yield f"zoh instead of the default hold {hold} for {kept}: {'; '.join(reasons)}"
 
 
-def _late_passivity(run: Mapping[str, Any]) -> Iterator[str]:
-    """A line for each force of a passivity controller that acts later than at its sample."""
-    guarded = {"controller"} if (run["scene"]["controller"] or {}).get("passivity") else set()
-    for fmu in run["scene"].get("fmu", ()):
-        if fmu.get("block") == "virtual_wall" and fmu.get("settings", {}).get("passivity"):
-            guarded.add(fmu["name"])
-    for name, age in run["delays"].items():
-        source, _, signal = name.partition(" -> ")[0].partition(".")
-        if age["max"] > 0.0 and (
-            (source in guarded or (source.startswith("controller_") and "controller" in guarded))
-            and signal in ("F_motor", "F")
-        ):
-            yield (
-                f"warning: {name} acts {short(1e3 * age['max'])} ms late: the passivity controller "
-                "pairs it with the motion since its sample, and does not bound its energy"
-            )
+def _passivity(results: Results) -> Iterator[str]:
+    # casadi, for the torques of motors, which most of the terminal's lines can do without
+    from hapticlink.orchestrator.results import passivity_warnings
+
+    yield from passivity_warnings.lines(results)
 
 
 def _stopped(results: Results) -> Iterator[str]:

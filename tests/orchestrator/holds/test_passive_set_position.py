@@ -5,6 +5,7 @@ from __future__ import annotations
 import uuid
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
@@ -211,6 +213,42 @@ def test_a_near_end_that_is_an_angle_is_known_as_one() -> None:
         _, (tank,) = make_holds(system, SignalVector(system))
     assert isinstance(tank, EnergyTank)
     np.testing.assert_allclose(tank.near.turns, [0.0, 0.0, 2 * np.pi])
+
+
+SHARED = {"hold": "pspm", "holds.controller.F_drift": "passive", "duration": 0.2}
+MOTORS = "warning: controller.F_motor -> haptic_device.F_motor acts"
+ALONE = "pspm of controller does not count controller.F_drift -> virtual_mechanism.F_drift"
+
+
+@pytest.mark.parametrize(
+    ("link", "told"),
+    [
+        ({}, None),
+        ({"coupling": "jacobi"}, MOTORS),
+        ({"delays.controller.F_motor": 0.004}, MOTORS),
+        ({"delays.controller.F_motor": {"loss": 0.3}}, MOTORS),
+        ({"delays.controller.F_drift": 0.004}, ALONE),
+    ],
+)
+def test_a_run_tells_where_a_force_of_the_coupling_is_late(
+    link: dict[str, Any], told: str | None
+) -> None:
+    """Its energy is counted over the motion since its sample, or not at all."""
+    run = hl.run("closed-loop-direct", SHARED | {"graphics.rate": 32} | link, figures=False)
+    found = [line for line in run.run["warnings"] if line.startswith((MOTORS, ALONE))]
+    assert len(found) == (told is not None)
+    assert not told or found[0].startswith(told)
+
+
+def test_a_latency_of_nothing_changes_nothing() -> None:
+    """The energy tank keeps both sides of the coupling."""
+    moving = {"hand.wrench": [0.0, 0.0, 0.0], "linkage.start_velocity.shoulder1": 4.0}
+    x, none = (
+        hl.run("closed-loop-direct", SHARED | moving | late, figures=False)["haptic_device.x"]
+        for late in ({}, {"delays.controller.F_drift": 0.0, "delays.controller.x_S.max": 0.0})
+    )
+    assert np.ptp(x) > 1e-3
+    assert np.array_equal(x, none)
 
 
 MOVES = """

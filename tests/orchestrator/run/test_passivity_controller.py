@@ -151,15 +151,56 @@ def test_what_cannot_be_damped_is_refused(key: str, value: float) -> None:
         hl.scene("closed-loop", {f"controller.passivity.{key}": value})
 
 
-def test_a_run_warns_where_the_guarded_force_is_late() -> None:
-    """What a latency adds is not bounded: of a wall by `delays`, of the motors by the order of
-    Jacobi. None without."""
-    late = "passivity controller pairs it with the motion"
-    for delay, told in ((0.0, False), (T, True)):
-        options = {"duration": 0.1, "fmu.wall.settings.passivity": MASS, "delays.'wall.F'": delay}
-        run = hl.run("virtual-wall", options, figures=False)
-        assert any(late in line for line in run.run["warnings"]) == told
-    for coupling, told in (("gauss-seidel", False), ("jacobi", True)):
-        options = {"duration": 0.05, "controller.passivity": True, "coupling": coupling}
-        run = hl.run("closed-loop", options, figures=False)
-        assert any(late in line for line in run.run["warnings"]) == told
+def warned(scene: str, options: dict[str, Any], why: str) -> list[str]:
+    """The warnings of a short run that contain `why`."""
+    run = hl.run(scene, {"duration": 0.1} | options, figures=False)
+    return [line for line in run.run["warnings"] if line.startswith("warning") and why in line]
+
+
+@pytest.mark.parametrize("end", ["wall.F", "wall.x"])
+@pytest.mark.parametrize("link", [T, {"loss": 0.2}])
+def test_a_run_warns_where_force_or_pose_of_a_guarded_wall_is_late(end: str, link: object) -> None:
+    options = {"fmu.wall.settings.passivity": MASS}
+    assert not warned("virtual-wall", options, "passivity controller")
+    (line,) = warned("virtual-wall", options | {f"delays.'{end}'": link}, "passivity controller")
+    assert end in line
+    assert not warned("virtual-wall", {f"delays.'{end}'": link}, "passivity controller")
+
+
+@pytest.mark.parametrize(
+    ("late", "connection"),
+    [
+        ({"coupling": "jacobi"}, "controller.F_motor -> haptic_device.F_motor"),
+        ({"delays.controller.x_D": 0.002}, "haptic_device.x -> controller.x_D"),
+    ],
+)
+def test_so_it_does_of_a_guarded_controller(late: dict[str, Any], connection: str) -> None:
+    guarded = {"controller.passivity": True}
+    assert not warned("closed-loop", guarded, "passivity controller")
+    (line,) = warned("closed-loop", guarded | late, "passivity controller")
+    assert connection in line
+
+
+def test_of_a_further_users_controller_it_warns_by_its_own_settings() -> None:
+    late, why = {"coupling": "jacobi"}, "passivity controller"
+    left = "warning: controller_left.F_motor -> haptic_device_left.F_motor"
+    (line,) = warned("two-users", late | {"controllers.left.passivity": True}, why)
+    assert line.startswith(left)
+    both = late | {"controller.passivity": True}
+    assert len(warned("two-users", both, why)) == 2
+    (line,) = warned("two-users", both | {"controllers.left.passivity": False}, why)
+    assert not line.startswith(left)
+
+
+def test_it_warns_of_motors_at_their_limit() -> None:
+    """The controller counts what it asked for: 0 J here, where the motors gave more."""
+    weak = {
+        "controller.passivity": True,
+        "controller.stiffness": [3000.0, 3000.0, 3.0],
+        "device.torque_limit": 0.02,
+        "hand.wrench": [1.0, 0.0, 0.0],
+        "stop_when": "",
+    }
+    (line,) = warned("closed-loop", weak, "passivity controller counts forces")
+    assert "motors of controller were at their limit" in line
+    assert not warned("closed-loop", weak | {"controller.passivity": False}, "passivity")
