@@ -19,9 +19,10 @@ Shaping is what the device, shaped by M_d Lambda^-1, has taken less than the mec
 a mobility or directions that are held or differ, velocity terms left out, saturation and stops.
 
 Works on the handle and the mechanism are those of the energy meters, of the wrenches as they act:
-a sample that always comes as late, by a latency or in the order of Jacobi, is paired with the
-displacement over which it acts. Where a hold gives other values than samples, the work is known at
-the meter's last sample alone, and reached there in proportion to that of the samples.
+a sample that comes late, by a latency or in the order of Jacobi, or is lost is paired with the
+displacement over which it acts (`arrivals.py`). Where a hold gives other values than samples, the
+work is known at the meter's last sample alone, and reached there in proportion to that of the
+samples.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.orchestrator.results.arrivals import known_from
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.results.tracking import of_block, poses, table_of
 
@@ -163,14 +165,14 @@ def works(
             work(force, stamps, moved, position, at),
             ideal(force, stamps, moved, position, at),
         )
-    late = results.run["delays"].get(name, {}).get("max", 0.0) if table is moved else 0.0
+    known = known_from(results, name, stamps, table is moved)
     meter = booked[name]
     until = meter["until"]
-    to = np.append(at, max(until, at[-1]))  # the meter may have gone on after the last of the times
+    to = np.union1d(at, until)  # where the meter stops may be beside or after the times
     acts, source = (
-        _passing(series, to, until, meter[kind])[:-1]
+        _passing(series, to, until, meter[kind])[np.searchsorted(to, at)]
         for kind, series in (
-            ("held", work(force, stamps + late, moved, position, to)),
+            ("held", work(force, known, moved, position, to)),
             ("ideal", ideal(force, stamps, moved, position, to)),
         )
     )
@@ -188,12 +190,14 @@ def _passing(series: Vector, at: Vector, until: float, value: float) -> Vector:
     return changed
 
 
-def work(force: Vector, stamps: Vector, moved: Table, position: str, at: Vector) -> Vector:
-    """The work (J) of the newest of the forces (n, 3), stamped `stamps`, over the steps of a
-    position until the times `at`."""
+def work(force: Vector, known: Vector, moved: Table, position: str, at: Vector) -> Vector:
+    """The work (J) of the newest of the forces (n, 3), known from the times `known` on, over the
+    steps of a position until the times `at`. A force that comes after a newer one does not act."""
     x, time = moved[position], moved["time"]
-    rows = np.searchsorted(stamps, time[:-1] + 1e-12, "right") - 1
-    held = force[np.maximum(rows, 0)]
+    order = np.argsort(known, kind="stable")
+    newest = np.maximum.accumulate(order)
+    rows = np.searchsorted(known[order], time[:-1] + 1e-12, "right") - 1
+    held = force[newest[np.maximum(rows, 0)]]
     done = np.concatenate([[0.0], (held * np.diff(x, axis=0)).sum(axis=1).cumsum()])
     return np.interp(at, time, done)
 

@@ -84,6 +84,48 @@ def test_a_force_that_comes_late_counts_where_it_acts(
     np.testing.assert_allclose(port.generated_J, expected, atol=1e-9 * np.abs(work).max())
 
 
+@pytest.mark.parametrize("link", [{"loss": 0.3}, {"max": 0.02}, {"max": 0.02, "loss": 0.3}])
+def test_a_force_that_is_lost_or_overtaken_does_not_act(
+    tmp_path: Path, link: dict[str, float]
+) -> None:
+    """The newest force that has arrived acts, each with a latency and a luck drawn by PCG64 (that
+    of t = 0 is known, and sent again by a sampled hand)."""
+    rows = [[t / 10, *np.cos([9 * t, 7 * t, 5 * t]) * (0.6, 0.6, 0.01)] for t in range(11)]
+    options = [
+        "duration=1.0",
+        f"hand={{type='profile', table={[[float(v) for v in row] for row in rows]}}}",
+        *(
+            f"delays.haptic_device.F_hand.{key}={value}"
+            for key, value in (link | {"seed": 2}).items()
+        ),
+    ]
+    found = simulate("closed-loop", tmp_path, options).results
+    port, table = user_port(found), found.haptics
+    assert port
+    force, x = table["hand.F"], table["haptic_device.x_true"]
+    drawn = np.random.Generator(np.random.PCG64(2)).random((len(force), 2))[1:]
+    late = np.ceil(drawn[:, 0] * link.get("max", 0.0) * 512 - 1e-9)
+    late[drawn[:, 1] < link.get("loss", 0.0)] = np.inf
+    arrival = np.arange(len(force)) + np.concatenate([[0.0], late])
+    acts = [force[np.flatnonzero(arrival[: k + 1] <= k)[-1]] for k in range(len(force) - 1)]
+    work = np.concatenate([[0.0], (acts * np.diff(x, axis=0)).sum(axis=1).cumsum()])
+    energy = table["virtual_mechanism.energy"]
+    expected = energy - energy[0] - work
+    np.testing.assert_allclose(port.generated_J, expected, atol=1e-9 * np.abs(work).max())
+
+
+def test_a_meter_that_stops_between_two_frames(tmp_path: Path) -> None:
+    """A hand half a tick beside the others: its work until the last frame is that of its samples,
+    whatever the energy between the frames before."""
+    options = ["duration=0.5", "phases.hand=1/1024", "hand.wrench=[-0.5, 0.0, 0.0]"]
+    found = simulate("closed-loop-direct", tmp_path, options).results
+    port, frames, ticks = user_port(found), found.graphics, found.haptics
+    assert port
+    x = np.interp(frames["time"], ticks["time"], ticks["haptic_device.x_true"][:, 0])
+    energy = frames["virtual_mechanism.energy"]
+    np.testing.assert_allclose(port.generated_J, energy - energy[0] + 0.5 * (x - x[0]), atol=1e-12)
+
+
 def test_a_run_that_ends_beside_a_frame(tmp_path: Path) -> None:
     """Meters stop at the newest sample of the source that the mechanism has stepped past, the
     account at the newest one of the mechanism, 2 ms later: the mechanism's loss is still its energy
