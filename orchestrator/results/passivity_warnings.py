@@ -7,15 +7,20 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import groupby
 from typing import Any
 
+from hapticlink.components.specs.control import Passivity
 from hapticlink.orchestrator.results.episodes import Episode, saturations
 from hapticlink.orchestrator.results.figure_axes import short
 from hapticlink.orchestrator.results.port_blocks import meters
+from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.tracking import of_block, of_user
+
+HANDLE, DAMPING = "haptic_device.x", "controller.passivity_damping"
 
 
 def lines(results: Results) -> Iterator[str]:
-    """A line for each late force and pose of a passivity controller or of `pspm`, and for motors at
-    their limit beside a passivity controller."""
+    """A line for each late force and pose of a passivity controller or of `pspm`, for motors at
+    their limit beside a passivity controller, and for one that damps counts of encoders."""
     run = results.run
     late = {name: age["max"] for name, age in run["delays"].items() if age["max"] > 0.0}
     guarded = _guarded(run)
@@ -40,19 +45,52 @@ def lines(results: Results) -> Iterator[str]:
                 "passivity controller counts forces that they do not reach, and does not bound "
                 "their energy"
             )
+    if run["scene"]["sensing"] == "encoders":
+        yield from _counts(results)
     yield from _set_positions(results, late)
 
 
 def _guarded(run: Mapping[str, Any]) -> list[str]:
     """The FMUs with a passivity controller."""
+    walls = [
+        fmu["name"]
+        for fmu in run["scene"].get("fmu", ())
+        if fmu.get("block") == "virtual_wall" and fmu.get("settings", {}).get("passivity")
+    ]
+    return [*(f"controller_{user}" if user else "controller" for user in _laws(run)), *walls]
+
+
+def _laws(run: Mapping[str, Any]) -> dict[str, Passivity]:
+    """The passivity controllers of the users who have one; the first one's name is empty."""
     scene = run["scene"]
     own = scene["controller"] or {}
-    users = {f"controller_{n}": scene["controllers"].get(n, own) for n in scene["devices"]}
-    found = [name for name, law in ({"controller": own} | users).items() if law.get("passivity")]
-    for fmu in scene.get("fmu", ()):
-        if fmu.get("block") == "virtual_wall" and fmu.get("settings", {}).get("passivity"):
-            found.append(fmu["name"])
-    return found
+    laws = {"": own} | {name: scene["controllers"].get(name, own) for name in scene["devices"]}
+    given = {user: law["passivity"] for user, law in laws.items() if law.get("passivity")}
+    return {user: Passivity() if law is True else Passivity(**law) for user, law in given.items()}
+
+
+def _counts(results: Results) -> Iterator[str]:
+    """A line for each passivity controller that damps single counts of the encoders."""
+    from hapticlink.components.device.encoder_count import count_energies  # casadi
+
+    run, devices = results.run, all_devices(results)
+    for user, law in _laws(run).items():
+        handle = of_user(HANDLE, user)
+        table, device = of_block(results, handle, 3), devices.get(user)
+        if table is None or device is None or not len(table["time"]):
+            continue
+        acted = of_block(results, damping := of_user(DAMPING, user))
+        if acted and not acted[damping].any():
+            continue
+        period = run["clocks"][run["fmus"][handle.partition(".")[0]]["rate"]]["longest"]
+        count = float(count_energies(device, table[handle][0], period).max())
+        if law.noise < count:
+            key = f"controllers.{user}" if user else "controller"
+            yield (
+                f"warning: {key}.passivity.noise is {law.noise:g} J, and one count of an encoder "
+                f"in a period {short(count)} J: the passivity controller damps counts, which give "
+                f"no energy; take {key}.passivity.noise={1.1 * count:.2g}"
+            )
 
 
 def _controller(saturated: Episode) -> str:
@@ -68,23 +106,28 @@ def _is_one(port: str, fmus: Collection[str], names: tuple[str, ...]) -> bool:
 
 def _set_positions(results: Results, late: Mapping[str, float]) -> Iterator[str]:
     """A line for each late force from an FMU whose spring `pspm` sets to either end of it."""
-    run, powers = results.run, meters(results)
-    set_by: dict[str, set[str]] = {}
-    for name, hold in run["holds"].items():
-        source, _, target = name.partition(" -> ")
-        if hold == "pspm":
-            set_by.setdefault(target.partition(".")[0], set()).add(source.partition(".")[0])
+    run = results.run
+    feeds = {_fmus(name) for name in run["connections"]}
+    set_by = {_fmus(name)[::-1] for name, hold in run["holds"].items() if hold == "pspm"}
+    forces = {spring["force"] for spring in run["scene"]["spring"]}
     for name, age in late.items():
-        source, target = (end.partition(".")[0] for end in name.split(" -> "))
-        if source not in set_by or name not in powers:
+        spring, end = _fmus(name)
+        works = name in meters(results) or name.partition(" -> ")[0] in forces
+        if not works or spring not in {fmu for fmu, _ in set_by} or (end, spring) not in feeds:
             continue
-        if target not in set_by[source]:
+        if (spring, end) not in set_by:
             yield (
                 f"warning: {name} acts {short(1e3 * age)} ms late: pspm counts the force over the "
                 "motion since its sample, and does not bound its energy"
             )
         elif name in run["latencies"] and run["holds"].get(name) in ("passive", "nepce"):
             yield (
-                f"pspm of {source} does not count {name}, which has a latency: it bounds the "
+                f"pspm of {spring} does not count {name}, which has a latency: it bounds the "
                 "energy given to the near side alone, not to both"
             )
+
+
+def _fmus(connection: str) -> tuple[str, str]:
+    """The FMUs of a connection."""
+    source, _, target = connection.partition(" -> ")
+    return source.partition(".")[0], target.partition(".")[0]

@@ -5,12 +5,18 @@ from __future__ import annotations
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 import hapticlink as hl
 from hapticlink.components.blocks.controller import controller
+from hapticlink.components.device.encoder_count import count_energies
+from hapticlink.components.device.pantograph import base_angles, dynamics
+from hapticlink.components.device.torques import numbers
 from hapticlink.components.specs.control import Controller, Passivity
+from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.stability import wall_limits
 from tests.blocks import Running
 
@@ -204,3 +210,30 @@ def test_it_warns_of_motors_at_their_limit() -> None:
     (line,) = warned("closed-loop", weak, "passivity controller counts forces")
     assert "motors of controller were at their limit" in line
     assert not warned("closed-loop", weak | {"controller.passivity": False}, "passivity")
+
+
+def test_it_warns_where_it_damps_counts_of_the_encoders() -> None:
+    """The motors give the true handle nothing, and yet it acts, until `noise` is what the warning
+    says: the energy of one count."""
+    encoders = {"sensing": "encoders", "duration": 1.0, "controller.passivity": True}
+    why = "damps counts"
+    (line,) = warned("closed-loop", encoders, why)
+    noise = float(line.rpartition("=")[2])
+    assert not warned("closed-loop", encoders | {"controller.passivity": {"noise": noise}}, why)
+    assert not warned("closed-loop", encoders | {"sensing": "ideal"}, why)
+    enough = encoders | {"controller.passivity": {"energy": 1.0}}
+    assert not warned("closed-loop", enough, why)  # where it never acts
+
+
+def test_the_energy_of_a_count_is_that_of_the_pose_that_fits_it() -> None:
+    device, pose = Device(), np.array([0.03, 0.02, 0.4])
+    angles = ca.Function("q", [x := ca.SX.sym("x", 3)], [base_angles(x, numbers(device))])
+    inertia = ca.Function("M", [x], [dynamics(x, ca.SX(3, 1), numbers(device))[0]])
+    start = np.asarray(angles(pose)).ravel()
+    for i, found in enumerate(count_energies(device, pose, T)):
+        # a thousandth of a count, so that the fit is linear
+        small = device.encoder_resolution * 1e-3
+        wanted = start + small * np.eye(4)[i]
+        fit = least_squares(lambda p: np.asarray(angles(p)).ravel() - wanted, pose, xtol=1e-15)  # noqa: B023
+        v = (fit.x - pose) / 1e-3 / T
+        assert found == pytest.approx(v @ np.asarray(inertia(pose)) @ v / 2, rel=1e-3)
