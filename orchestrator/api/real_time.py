@@ -35,7 +35,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.assign_holds import misfit
 from hapticlink.orchestrator.system.ports import names
-from hapticlink.orchestrator.system.springs import limited_gains
+from hapticlink.orchestrator.system.springs import limited_fmus, limited_gains
 from hapticlink.orchestrator.system.system import Connection, System
 
 SLOWEST = 1e-3
@@ -168,9 +168,9 @@ class RealTime:
         """Change the rate (Hz) of a clock other than the haptic one, such as `graphics`, from the
         end of its current step on; steps then end on haptic ticks. jitter: each ends up to half
         this share of a period early or late, uniformly, drawn by numpy's PCG64 with the seed and
-        the step's number. Raises InputFault where an FMU cannot vary its step, for a rate that is
-        not between 0 and the haptic one, and for a jitter that leaves no haptic tick between two
-        ends."""
+        the step's number. Raises InputFault where an FMU cannot vary its step or has a spring whose
+        energy `pspm` limits, for a rate that is not between 0 and the haptic one, and for a jitter
+        that leaves no haptic tick between two ends."""
         timeline = self._simulation.system.timeline
         haptics, *others = timeline.clocks
         if clock not in [c.name for c in others]:
@@ -179,6 +179,11 @@ class RealTime:
         fixed = [f for f in fixed if not varies_step(self._simulation.system.fmu[f].description)]
         if fixed:
             raise InputFault(f"rate of {clock}: {fixed[0]} takes steps of one size only")
+        if limited := [f for f in limited_fmus(self.system) if self.system.fmu[f].clock == clock]:
+            raise InputFault(
+                f"rate of {clock}: `pspm` limits the energy of a spring of {limited[0]} over the "
+                "steps of the start: change the scene, with `reset`"
+            )
         period = 1 / (exact(rate) * timeline.base) if SLOWEST <= rate < math.inf else Fraction(0)
         if period < haptics.longest:
             limits = f"from {SLOWEST:g} Hz up to that of the haptics"

@@ -41,6 +41,11 @@ def limited_gains(system: System) -> set[str]:
     }
 
 
+def limited_fmus(system: System) -> set[str]:
+    """The FMUs of springs whose energy a hold limits: its tank has their longest step."""
+    return {c.target for c in system.connections if c.hold and HOLDS[c.hold].needs == "spring"}
+
+
 def misfit(
     c: Connection,
     springs: Iterable[SetSpring],

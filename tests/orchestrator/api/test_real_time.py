@@ -174,6 +174,36 @@ def test_time_stands_still_in_a_pause_and_goes_on_by_steps() -> None:
     assert np.array_equal(made.haptics["time"], np.arange(103) / 512)
 
 
+def test_the_rate_of_a_spring_whose_energy_is_limited_is_not_changed(tmp_path: Path) -> None:
+    """The tank would count with the period of the start."""
+    varies = {"canHandleVariableCommunicationStepSize": "true"}
+    body = python_fmu(tmp_path, "Body", "self.y = time + size")
+    near = python_fmu(tmp_path, "Near", "self.y = self.u", **varies)  # type: ignore[arg-type]
+    text = f"""
+connection = [{{ from = "body.y", to = "near.u" }}]
+spring = [{{ set_position = "near.u", position = "near.y", stiffness = [100.0] }}]
+fmu = [
+  {{ name = "body", path = "{body.name}" }},
+  {{ name = "near", path = "{near.name}", rate = 64 }},
+]
+"""
+    told: list[str] = []
+
+    def turn(live: hl.RealTime) -> None:
+        try:
+            live.rate(next(c.name for c in live.system.timeline.clocks[1:]), 32)
+        except hl.InputFault as fault:
+            told.append(str(fault))
+        live.stop()
+
+    path = str(scene(tmp_path, text, 512, 0.25))
+    ran(path, turn)
+    assert not told
+    ran(path, turn, "holds.near.u=pspm")
+    assert len(told) == 1
+    assert "`pspm` limits the energy of a spring of near" in told[0]
+
+
 def test_a_reset_begins_anew_with_changed_options() -> None:
     turn = once(0.05, lambda live: live.reset({"hold": "foh"}))
     made = ran("closed-loop", turn, "duration=0.1")
