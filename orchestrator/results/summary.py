@@ -161,8 +161,14 @@ def _passivity(results: Results) -> Iterator[str]:
 
 
 def _stopped(results: Results) -> Iterator[str]:
-    """A line if the passive midpoint method had to stop the mechanism."""
+    """A line if the passive midpoint method had to stop the mechanism, and one if contacts change
+    its energy between steps."""
     table = of_block(results, STOPS)
+    if table and (results.run["scene"]["contacts"] or {}).get("detection") == "graphics":
+        yield (
+            "passive-midpoint makes no energy within a step, but each new frame of contacts may "
+            "change it: take contacts.detection = 'haptics'"
+        )
     if table and len(table["time"]) and (stops := int(table[STOPS][-1])):
         yield (
             f"warning: virtual_mechanism was stopped in {stops} steps, which its energy did not "

@@ -171,3 +171,29 @@ def test_contacts_that_are_too_deep_or_too_stiff_are_warned_of(tmp_path: Path) -
     told = "\n".join(line for line in summary.lines(results) if line.startswith("warning"))
     assert "link2 is 11.9 mm deep in disc, past the middle of the thinner one (3 mm)" in told
     assert "contacts of disc with block have a pole" in told
+
+
+@pytest.mark.parametrize(
+    ("detection", "integrator", "told"),
+    [
+        ("graphics", "passive-midpoint", True),
+        ("haptics", "passive-midpoint", False),
+        ("graphics", "rk4", False),
+    ],
+)
+def test_that_a_frame_of_contacts_changes_the_energy_is_told(
+    tmp_path: Path, detection: str, integrator: str, told: bool
+) -> None:
+    """Of the method that makes none, which only holds between two frames: the energy rises there by
+    more than the wrenches on the arm do in work."""
+    options = ["duration=1.0", "graphics.rate=10", f"contacts.detection={detection}"]
+    results = simulate(
+        "push-disc", tmp_path, [*options, f"mechanism.integrator={integrator}"]
+    ).results
+    assert any("each new frame of contacts" in line for line in summary.lines(results)) == told
+    table = results.haptics
+    wrench = table["hand.F"] - table["controller.F_drift"]
+    work = (wrench[:-1] * np.diff(table["virtual_mechanism.x"], axis=0)).sum(axis=1)
+    gained = np.diff(table["virtual_mechanism.energy"]) - work
+    if integrator == "passive-midpoint":
+        assert (gained.max() > 1e-6) == told
