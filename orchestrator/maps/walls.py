@@ -12,6 +12,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability import wall_limits
 
 START = "fmu.{}.start.{}"
+EXACT = ("rk4", "dormand-prince-8")
+"""Integrators whose steps are, for a map, those of the device itself."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Form:
 
 def form(scene: Scene, panel: Mapping[str, str], x: str, y: str) -> Form | None:
     """The closed form of a scene whose only sampled part is a wall on a device of one prismatic
-    joint, behind a zero-order hold; None for any other."""
+    joint, behind a zero-order hold, against a constant hand; None for any other."""
     read = open_scene.load(scene, [f"{k}={v}" for k, v in panel.items()])
     wall = next((f for f in read.fmu if f.block == "virtual_wall"), None)
     linkage = read.linkage
@@ -42,6 +44,12 @@ def form(scene: Scene, panel: Mapping[str, str], x: str, y: str) -> Form | None:
     joint, body = linkage.joint[0], linkage.body[0]
     keys = [START.format(wall.name, name) for name in ("stiffness", "damping")]
     if sorted((x, y)) != sorted(keys) or joint.type != "prismatic" or not joint.damping:
+        return None
+    sprung = joint.stiffness or joint.drive or linkage.spring
+    held = read.hands or (read.hand is not None and read.hand.type != "constant")
+    pulsed = wall.settings.get("pulse") or wall.settings.get("velocity") == "measured"
+    exactly = read.mechanism.integrator in EXACT and read.coupling == "gauss-seidel"
+    if sprung or held or pulsed or not exactly:
         return None
     holds = {read.hold, *read.holds.values()}
     late = [d for name, d in read.delays.items() if name.startswith(wall.name)]

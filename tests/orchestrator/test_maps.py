@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +48,26 @@ def test_the_boundary_is_that_of_the_closed_form(wall: hl.Map) -> None:
     radii = [row["spectral_radius"] for row in grid]
     assert form(x, y) == pytest.approx(radii, rel=1e-7)
     assert walls.form(wall.scene, {"hold": "foh"}, DAMPING, STIFFNESS) is None
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"coupling": "jacobi"},
+        {"mechanism.integrator": "semi-implicit-euler"},
+        {"linkage.joint.rail.stiffness": 500.0},
+        {"hand": {"type": "spring", "stiffness": [300.0, 0.0, 0.0], "damping": [5.0, 0.0, 0.0]}},
+        {"fmu.wall.settings.pulse": 0.3},
+        {
+            "fmu.wall.settings.velocity": "measured",
+            "connection.+": {"from": "virtual_mechanism.rail.velocity", "to": "wall.v"},
+        },
+    ],
+    ids=["jacobi", "another integrator", "sprung", "held", "pulse", "velocity measured"],
+)
+def test_another_loop_has_no_closed_form(other: dict[str, Any]) -> None:
+    assert walls.form(hl.scene("virtual-wall", WALL), {}, DAMPING, STIFFNESS) is not None
+    assert walls.form(hl.scene("virtual-wall", WALL | other), {}, DAMPING, STIFFNESS) is None
 
 
 def test_runs_agree_with_the_map(wall: hl.Map) -> None:

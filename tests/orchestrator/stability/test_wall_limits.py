@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import hapticlink as hl
 from hapticlink.orchestrator import open_scene
@@ -55,6 +56,55 @@ def test_the_limit_is_where_the_characteristic_polynomial_leaves_the_unit_circle
     own = wall_limits.radius(M, D, T, periods, np.array([limit, 2 * limit]), np.array([B, B]))
     assert own == pytest.approx([radius(limit), radius(2 * limit)], rel=1e-6)
     assert radius(limit * (1 - 1e-6)) < 1 < radius(limit * (1 + 1e-6))
+
+
+def looped(m: float, b: float, T: float, periods: int, K: float, B: float) -> float:
+    """The spectral radius of x, v, the last x and the forces on their way, sampled and held."""
+    n = 3 + periods
+    E = expm(np.array([[0.0, 1.0, 0.0], [0.0, -b / m, 1.0 / m], [0.0, 0.0, 0.0]]) * T)
+    wall = np.zeros(n)
+    wall[[0, 2]] = -K - B / T, B / T
+    A = np.zeros((n, n))
+    A[:2, :2], A[2, 0] = E[:2, :2], 1.0
+    A[:2] += np.outer(E[:2, 2], np.eye(n)[-1] if periods else wall)
+    if periods:
+        A[3] = wall
+        A[range(4, n), range(3, n - 1)] = 1.0
+    return float(np.abs(np.linalg.eigvals(A)).max())
+
+
+@pytest.mark.parametrize(
+    ("x", "periods", "beta"),
+    [(6.0, 0, 0.0), (3.7, 0, 0.0), (1e-6, 1, 0.0), (1e-7, 3, 0.0), (1e-2, 2, 0.3), (0.3, 3, -0.1)],
+)
+def test_the_limit_holds_for_much_and_little_damping(x: float, periods: int, beta: float) -> None:
+    """x = b T/m, beta = B T/m, for m = 1 kg, T = 1 s."""
+    K = wall_limits.stable(1.0, x, 1.0, periods, beta)
+    assert looped(1.0, x, 1.0, periods, 0.995 * K, beta) < 1.0
+    assert looped(1.0, x, 1.0, periods, 1.005 * K, beta) > 1.0
+
+
+def test_a_damper_that_is_unstable_alone_has_no_limit() -> None:
+    """3 samples late, beta = 0.5: a root crosses the unit circle at alpha = 3.46, behind others."""
+    assert min(looped(1.0, 0.01, 1.0, 3, K, 0.5) for K in np.geomspace(1e-4, 10.0, 40)) > 1.0
+    with pytest.raises(ValueError, match="stable for no K"):
+        wall_limits.stable(1.0, 0.01, 1.0, 3, 0.5)
+
+
+@pytest.mark.parametrize("delay", [4, 20])
+def test_the_damping_of_a_passive_wall_is_found_with_long_delays(delay: int) -> None:
+    """Without a damper it is K (T/2 + t_d), needed where the frequency is 0."""
+    found = wall_limits.passive_damping(T, delay, np.array([1000.0]), np.array([0.0]))
+    assert found[0] == pytest.approx(1000.0 * T * (0.5 + delay), rel=1e-4)
+
+
+def test_quantities_that_are_none_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"T = 0\.0: must be positive"):
+        wall_limits.passive(5.0, 0.0)
+    with pytest.raises(ValueError, match=r"delay = -1\.0: must not be negative"):
+        wall_limits.delayed(5.0, T, -1.0)
+    with pytest.raises(ValueError, match="m = nan: must be positive"):
+        wall_limits.stable(np.nan, 5.0, T)
 
 
 def test_small_gains_with_a_delay_come_to_the_rule_of_gil() -> None:
