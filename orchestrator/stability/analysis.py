@@ -19,7 +19,7 @@ from hapticlink.orchestrator.stability.closures import Closures
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
-from hapticlink.orchestrator.stability.modes import Mode, counted, leading, modes, verdict
+from hapticlink.orchestrator.stability.modes import NEAR, Mode, counted, leading, modes, verdict
 from hapticlink.orchestrator.stability.oscillation import traced
 from hapticlink.orchestrator.stability.tangent import KINK
 from hapticlink.orchestrator.stability.varying import (
@@ -99,7 +99,11 @@ class Stability:
             f"spectral radius {self.radius:.8g} +- {self.uncertainty:.1g} over "
             f"{self.period:.6g} s, growth rate {self.growth:.5g} 1/s"
         )
-        for title, found in (("modes", self.modes), ("neutral modes", self.neutral)):
+        neutral = "neutral modes"
+        if self.neutral:
+            most = max(min(mode.uncertainty, NEAR) for mode in self.neutral) / self.period
+            neutral += f", of which growth up to {most:.2g} 1/s cannot be told from none"
+        for title, found in (("modes", self.modes), (neutral, self.neutral)):
             if found:
                 yield f"{title}: growth rate (1/s), frequency (Hz), damping ratio, participation"
             for mode in found:

@@ -31,6 +31,8 @@ from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
 
 Watch = Callable[[Vector], None]
+CONVERGED = 1e-12
+"""Tolerance of iterations: far below the differences by which slopes are found."""
 
 
 def hyperperiod(time: Timeline) -> int:
@@ -238,6 +240,9 @@ def opened(
                 f"delays of {c.name}: latency and loss are random, so that no two periods are "
                 "alike; the map needs a constant latency"
             )
+    tolerance = min(system.iteration.tolerance, CONVERGED)
+    exactly = replace(system.iteration, method="newton", tolerance=tolerance)
+    system = replace(system, iteration=exactly)
     with (
         temporary_folders.room() as room,
         RunFolder(room) as results,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
-from hapticlink.orchestrator.stability.tangent import SAME
+from hapticlink.orchestrator.stability.tangent import SAME, SMALL
 
 Matrix = NDArray[np.float64]
 ONE = 1e-7
@@ -28,7 +28,7 @@ class Linear:
     """The map around `point`: F(point) = image, with the Jacobian A (n, n) along the orthonormal
     directions V, the columns of a matrix; its error E (n, n) by slopes to one side, and per
     column the largest of them relative to the column (`kink`): of order 1 where the map is not
-    differentiable."""
+    differentiable. Columns smaller than SMALL, which rounding can make, count as of that size."""
 
     point: Vector
     image: Vector
@@ -55,7 +55,7 @@ class Linear:
     @property
     def kink(self) -> Vector:
         size = np.abs(self.A).max(axis=0, initial=0.0)
-        kinks: Vector = np.abs(self.E).max(axis=0, initial=0.0) / np.where(size > 0, size, 1.0)
+        kinks: Vector = np.abs(self.E).max(axis=0, initial=0.0) / np.maximum(size, SMALL)
         return kinks
 
     @property

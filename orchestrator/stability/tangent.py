@@ -31,6 +31,7 @@ from hapticlink.orchestrator.plan.operations import (
     Get,
     Push,
     Repeat,
+    Rollback,
     Set,
     Step,
     flat,
@@ -132,6 +133,8 @@ class Tangent:
             return
         if isinstance(operation, Step) and operation.fmu in self._simulation.isolated:
             call = self._awaited(operation.fmu, call)
+        if isinstance(operation, Repeat):
+            call = self._from_here(operation, call)
         reach = self._of(operation)
         if reach is None:
             call(tick)
@@ -160,6 +163,19 @@ class Tangent:
         def call(tick: int) -> None:
             step(tick)
             finish()
+
+        return call
+
+    def _from_here(self, operation: Repeat, repeat: Call) -> Call:
+        """The iteration of a loop from the state that its FMUs have at the call: to that it rolls
+        back, and not to the one that was saved before it was perturbed."""
+        fmus = [op.fmu for op in operation.again if isinstance(op, Rollback)]
+        saves = [self._simulation.instances[fmu].save for fmu in fmus]
+
+        def call(tick: int) -> None:
+            for save in saves:
+                save()
+            repeat(tick)
 
         return call
 

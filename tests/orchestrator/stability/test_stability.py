@@ -99,6 +99,7 @@ def test_baumgarte_is_stable_up_to_its_limit_off_the_closures(share: float, verd
     found = hl.stability("five-bar", options)
     assert found.verdict == verdict
     assert len(found.neutral) >= 2  # it moves freely
+    assert any("growth up to 0.051 1/s cannot be told from none" in line for line in found.lines())
 
 
 @pytest.mark.parametrize(("start", "at", "pull"), [(0.1, 0.0, 50.0), (1.0, 0.95, 1.0)])
@@ -164,6 +165,27 @@ def test_growth_and_frequency_are_those_of_a_run_across_rates() -> None:
     crossings = np.count_nonzero(np.diff(np.sign((x - x[0])[75:, 2])))
     hertz = crossings / 2 / (run.time("virtual_mechanism.x")[-1] - 2.5)
     assert first.omega / (2 * np.pi) == pytest.approx(hertz, abs=0.15)
+
+
+@pytest.mark.parametrize("method", ["newton", "aitken"])
+@pytest.mark.parametrize("interpolation", ["zoh", "foh"])
+def test_an_algebraic_loop_has_the_growth_of_its_run(method: str, interpolation: str) -> None:
+    """A mass of 1 kg and a spring hand that is a plant, iterated: the loop is differentiated from
+    the state that is perturbed, and not from the one that its rollbacks had saved before.
+    x_{k+1} = a x_k + b x_{k-1}, the mode that decays last."""
+    options: dict[str, Any] = {
+        "coupling": "iterated",
+        "iteration": {"method": method, "interpolation": interpolation},
+        "hand": {"type": "spring", "timing": "continuous", "stiffness": [300.0, 0.0, 0.0],
+                 "damping": [0.3, 0.0, 0.0], "target": [[0.0, 0.0, 0.0, 0.0]]},
+        "haptics.rate": 60,
+    }  # fmt: skip
+    found = hl.stability("sampled-spring", options)
+    x = hl.run("sampled-spring", options | {"duration": 3.0}, figures=False)["virtual_mechanism.q"]
+    late = x[len(x) // 2 :, 0]
+    a, b = np.linalg.lstsq(np.column_stack([late[1:-1], late[:-2]]), late[2:])[0]
+    assert found.modes[0].z == pytest.approx(max(np.roots([1.0, -a, -b]), key=np.imag), abs=1e-6)
+    assert found.kinks == ()
 
 
 def test_redundant_closures_are_kept_by_perturbations(tmp_path: Path) -> None:
