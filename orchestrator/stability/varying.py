@@ -232,7 +232,7 @@ def alternating(
     whole, count = ends[-1], len(cycle)
     starts = [0, *ends[:-1]]
     base = system.timeline
-    rounds = 4 + -(-behind_start(system) // whole)
+    rounds = 4 + -(-_settled(system) // whole)
     frames = Frames(lambda i: i // count * whole + starts[i % count], (rounds + 2) * count, count)
     paces = list(base.clocks)
     paces[place] = Clock(paces[place].name, frames)
@@ -243,6 +243,12 @@ def alternating(
     return replace(system, timeline=Timeline(base.base, rounds * whole, tuple(paces), base.of))
 
 
+def _settled(system: System) -> int:
+    """Ticks after which frames are taken: so many that lengths, which holds keep beside stamps, are
+    far smaller than those, and slopes of one length are not taken for another (tangent.py)."""
+    return 4 * behind_start(system)
+
+
 def window(system: System, place: int) -> tuple[int, int]:
     """The first tick of the last frame of a cycle behind the start, and its length."""
     frames = system.timeline.clocks[place].starts
@@ -250,6 +256,6 @@ def window(system: System, place: int) -> tuple[int, int]:
     i = next(
         i
         for i in range(len(frames))
-        if i % frames.round == frames.round - 1 and frames[i] >= behind_start(system)
+        if i % frames.round == frames.round - 1 and frames[i] >= _settled(system)
     )
     return frames[i], frames[i + 1] - frames[i]

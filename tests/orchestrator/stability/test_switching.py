@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import hapticlink as hl
 from hapticlink.orchestrator.stability.switching import (
@@ -14,6 +15,7 @@ from hapticlink.orchestrator.stability.switching import (
     lyapunov,
     mean_square,
 )
+from hapticlink.orchestrator.stability.varying import varying_stability
 from tests.orchestrator.stability.test_stability import HELD
 
 GOLDEN = [np.array([[1.0, 1.0], [0.0, 1.0]]), np.array([[1.0, 0.0], [1.0, 1.0]])]
@@ -94,3 +96,30 @@ def test_a_rate_that_varies_is_judged_by_the_frames_that_it_draws(hold: str) -> 
     assert found.bounds.lower >= fixed.radius - 1e-6
     assert found.bounds.upper >= found.bounds.lower
     assert math.log(found.second_moment) / 2 >= found.exponent * 16 / 512 - 0.01
+
+
+def test_frames_of_a_hold_that_keeps_lengths_are_those_of_its_equations() -> None:
+    """A wall at 64 to 128 Hz on m = 0.3 kg, b = 5 N.s/m, whose force is the mean of two samples,
+    in frames of 4 to 8 ticks: x, v, and the last sample f.
+
+        F = (f - K x)/2,   f <- -K x,   (x, v) <- exact step of N ticks under F
+    """
+    K, m, b = 700.0, 0.3, 5.0
+    options = {
+        "fmu.wall.settings.unilateral": False,
+        "hand.wrench": [0.0, 0.0, 0.0],
+        "fmu.wall.rate": {"min": 64, "max": 128, "seed": 3},
+        "holds": {"wall.F": "mean"},
+        "fmu.wall.start.stiffness": K,
+    }
+    frames = []
+    for n in range(4, 9):
+        A = expm(np.array([[0, 1, 0], [0, -b / m, 1 / m], [0, 0, 0]]) * n / 512)
+        A[2, 2] = 0.0
+        F = np.array([-K / 2, 0.0, 0.5])
+        A[:2] = np.column_stack([A[:2, :2], np.zeros(2)]) + np.outer(A[:2, 2], F)
+        A[2] = -K, 0.0, 0.0
+        frames.append(A)
+    second = np.abs(np.linalg.eigvals(sum(np.kron(A, A) for A in frames) / len(frames))).max()
+    found = varying_stability("virtual-wall", options, products=100)
+    assert found.second_moment == pytest.approx(second, rel=1e-5)
