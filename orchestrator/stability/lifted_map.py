@@ -112,7 +112,7 @@ class LiftedMap:
         point: Vector,
         V: Matrix,
         same: float = SAME,
-        after: Callable[[Instruction, Columns], None] = lambda instruction, M: None,
+        after: Callable[[Instruction, Columns], None] | None = None,
     ) -> tuple[Vector, Matrix, Matrix]:
         """F(point), its derivatives along the columns of V, and their errors; slopes of operations
         are shared by numbers that differ by up to `same`, relative. `after` each operation is
@@ -122,14 +122,24 @@ class LiftedMap:
         ends = np.cumsum([len(part) for part in state.parts(self._template)])[:-1]
         M = dict(zip(state.owners, np.split(V, ends), strict=True))
         D = {owner: np.zeros_like(rows) for owner, rows in M.items()}
+        alive = np.arange(V.shape[1])
         self._tangent.begin()
         for tick, event in self._moments:
             for instruction, call in self._instructions(event):
                 self._tangent.carry(tick, instruction, call, M, D, same)
-                after(instruction, M)
+                if after:
+                    after(instruction, M)
+            if not after:  # a column that is zero once remains so
+                kept = np.any([X.any(axis=0) for Y in (M, D) for X in Y.values()], axis=0)
+                alive = alive[kept]
+                for Y in (M, D):
+                    Y.update({owner: X[:, kept] for owner, X in Y.items()})
             interrupt.check()
-        whole, errors = (np.vstack([X[owner] for owner in state.owners]) for X in (M, D))
-        return self._numbers(), whole, errors
+        image, found = self._numbers(), []
+        for Y in (M, D):
+            found.append(np.zeros((len(image), V.shape[1])))
+            found[-1][:, alive] = np.vstack([Y[owner] for owner in state.owners])
+        return image, found[0], found[1]
 
     def ways(self) -> dict[str, str]:
         """By FMU, how the slopes of the last linearisation were found."""
