@@ -55,8 +55,9 @@ class LiftedMap:
     """F of a system, from the first multiple of the hyperperiod on that is behind its start and not
     before the time `at` (s).
 
-    begin: that time (s). period: the hyperperiod (s), of a number of `events`. coordinates: of the
-    state, in order. start: the state there.
+    initial: the numbers of the FMUs at the start of the scene. begin: that time (s). period: the
+    hyperperiod (s), of a number of `events`. coordinates: of the state, in order. start: the state
+    at `begin`.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class LiftedMap:
         self.period, self.seconds = time.seconds(length), time.seconds
         first = window[0] if window else length * math.ceil(behind_start(plan.system, at) / length)
         self._begin, self.begin = self._state.save(), time.seconds(first)
+        self.initial = np.concatenate(self._state.parts(self._begin)[: len(simulation.instances)])
         moments = list(takewhile(lambda moment: moment.tick < first + 2 * length, plan))
         for tick, event in moments:
             if tick < first:
