@@ -86,7 +86,7 @@ def stability(
         )
         tell(said, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json)
         return 0
-    with waiting(f"{name}: equilibrium and linearisation, which can take minutes", quiet):
+    with waiting(f"{name}: equilibrium and linearisation, which can take a minute", quiet):
         user = api.passivity(scene, given, at=at) if port else None  # refuses many forces at once
         found = api.stability(scene, given, at=at)
     folder = folders.ensure(out or default_folder("runs", scene, chosen))

@@ -22,11 +22,13 @@ from hapticlink.orchestrator.stability.linearise import Linear
 from hapticlink.orchestrator.stability.modes import NEAR, Mode, counted, leading, modes, verdict
 from hapticlink.orchestrator.stability.oscillation import traced
 from hapticlink.orchestrator.stability.tangent import KINK
+from hapticlink.orchestrator.stability.trajectory import trajectory
 from hapticlink.orchestrator.stability.varying import (
     VaryingStability,
     varies,
     varying_stability,
 )
+from hapticlink.orchestrator.stability.whereabouts import Whereabouts, whereabouts
 from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 
@@ -42,7 +44,7 @@ class Stability:
     without neutral modes, and its uncertainty. growth: ln(radius)/period (1/s). modes: the leading
     ones. neutral: those with z = 1. frozen: lines of text. kinks: coordinates in which the map has
     no slope. linearised: by FMU, whether its slopes are those of its graph or differences.
-    equilibrium: by coordinate."""
+    equilibrium: by coordinate. where: its pose, and whether the run from the start rests there."""
 
     title: str
     period: float
@@ -55,6 +57,7 @@ class Stability:
     frozen: tuple[str, ...]
     kinks: tuple[str, ...]
     linearised: dict[str, str]
+    where: Whereabouts
 
     @property
     def growth(self) -> float:
@@ -80,6 +83,7 @@ class Stability:
             "frozen": list(self.frozen),
             "not_differentiable": list(self.kinks),
             "linearised": self.linearised,
+            "where": self.where.record(),
             "equilibrium": self.equilibrium,
         }
 
@@ -99,6 +103,7 @@ class Stability:
             f"spectral radius {self.radius:.8g} +- {self.uncertainty:.1g} over "
             f"{self.period:.6g} s, growth rate {self.growth:.5g} 1/s"
         )
+        yield from self.where.lines()
         neutral = "neutral modes"
         if self.neutral:
             most = max(min(mode.uncertainty, NEAR) for mode in self.neutral) / self.period
@@ -144,11 +149,15 @@ def at_rest(scene: Scene, whole: System, at: float, seconds: float) -> Stability
     simulated time, as in `stability`."""
     system, removed = frozen.without(whole)
     with opened(long_enough(scene, system, at), at, Closures(scene)) as map_:
-        found = equilibrium(map_, seconds)
-        return _result(scene.title, map_, found, [*removed, *frozen.kept(system)])
+        run = trajectory(map_, seconds)
+        found = equilibrium(map_, run)
+        where = whereabouts(scene, map_, found, run)
+        return _result(scene.title, map_, found, [*removed, *frozen.kept(system)], where)
 
 
-def _result(title: str, map_: LiftedMap, at: Linear, lines: list[str]) -> Stability:
+def _result(
+    title: str, map_: LiftedMap, at: Linear, lines: list[str], where: Whereabouts
+) -> Stability:
     found = [mode for mode in modes(at, map_.period) if abs(mode.z) > LOST]
     neutral = [mode for mode in found if mode.neutral]
     others = [mode for mode in found if not mode.neutral]
@@ -168,4 +177,5 @@ def _result(title: str, map_: LiftedMap, at: Linear, lines: list[str]) -> Stabil
         frozen=tuple(lines),
         kinks=kinks,
         linearised=map_.ways(),
+        where=where,
     )

@@ -3,9 +3,9 @@
     (I - A) d = F(z) - z,   z <- z + d
 
 A of `linearise`; d is the one of least norm, in balanced coordinates, so that a free motion (an
-eigenvalue of 1) stays where it is. A unilateral contact makes F piecewise smooth: from a state on
-the wrong piece there may be no equilibrium to find, so the search starts again from states that the
-simulation passes through.
+eigenvalue of 1) stays where it is. A scene can have many equilibria, as with a mechanism that
+stands or hangs, or within obstacles: the search begins where the run of the scene from its start
+is nearest to rest, so that what a run settles to is what is found.
 """
 
 from __future__ import annotations
@@ -17,53 +17,66 @@ from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
 from hapticlink.orchestrator.stability.linearise import Linear, linearised
 from hapticlink.orchestrator.stability.modes import counted, modes
 from hapticlink.orchestrator.stability.tangent import SAME
+from hapticlink.orchestrator.stability.trajectory import (
+    TOLERANCE,
+    Trajectory,
+    relative,
+    require_constant,
+)
 
-TOLERANCE = 1e-9
-"""Of each coordinate z, relative to max(1, |z|)."""
 ITERATIONS = 20
 PATIENCE = 3
 """Steps of Newton in a row without halving the smallest residual that end a search."""
-COARSE = 0.03
+COARSE = 0.3
 """Largest relative difference of numbers for which Newton's method shares slopes."""
+FINER = 0.1
+"""Of that after a step that did not halve the smallest residual."""
 HALVINGS = 6
 """Of a step of Newton's method that changes more over a period than where it begins."""
 NEUTRAL = 1e-7
 """Singular values of the balanced I - A, relative to the largest, that count as 0."""
 
 
-def equilibrium(map_: LiftedMap, seconds: float) -> Linear:
-    """The map linearised at its equilibrium; the search starts from the start of the scene, and
-    then from states that are passed within `seconds`. One that the scene leaves without oscillation
-    is taken unless another one, nearer to the start, is found on the way.
+def equilibrium(map_: LiftedMap, run: Trajectory) -> Linear:
+    """The map linearised at its equilibrium: the one that Newton's method finds from the state of
+    the `run` that is nearest to rest. Where it finds none, as from a state off the contact that is
+    to be closed, or one that a scene leaves without oscillation, it begins at other states of the
+    run; of what it finds, the run passes nearest to the one that is taken.
 
     Raises InputFault where none is found, naming what does not come to rest.
     """
-    state, passed, ahead = map_.start, 0, 1
+    found: list[Linear] = []
     nearest: Linear | None = None
-    left: Linear | None = None
-    ended: FmuFault | None = None
-    while passed * map_.period <= seconds:
+    for state in run.begins():
         try:
-            found = _newton(map_, state)
-            if rests(found):
-                leaves = _leaves(found, map_.period)
-                if left is None or not leaves:
-                    _require_rest(map_, found)
-                    if not leaves:
-                        both = (found,) if left is None else (left, found)
-                        return min(both, key=lambda at: _way(map_, at))
-                    left = found
-            elif nearest is None or _unrest(found).max() < _unrest(nearest).max():
-                nearest = found
-            for _ in range(ahead):
-                state = map_.image(state)
-        except FmuFault as fault:  # diverges from here on
-            ended = fault
-            break
-        passed, ahead = passed + ahead, 1 + passed // 2
-    if left is not None:
-        return left
-    raise InputFault(_why_none(map_, nearest, ended))
+            at = _newton(map_, state)
+            if rests(at):
+                require_constant(map_, at.point, at.taken)
+        except FmuFault:
+            continue
+        if rests(at):
+            found.append(at)
+            if not _leaves(at, map_.period):
+                break
+        elif nearest is None or _unrest(at).max() < _unrest(nearest).max():
+            nearest = at
+    if not found:
+        raise InputFault(_why_none(map_, nearest, run))
+    return min(found, key=lambda at: run.distances(at.point).min())
+
+
+def nearby(map_: LiftedMap, state: Vector) -> Linear | None:
+    """The map linearised at the equilibrium that Newton's method finds from a `state`, such as that
+    of another variant of the scene; None where there is none, or a scene leaves it without
+    oscillation."""
+    try:
+        at = _newton(map_, state)
+    except FmuFault:
+        return None
+    if not rests(at) or _leaves(at, map_.period):
+        return None
+    require_constant(map_, at.point, at.taken)
+    return at
 
 
 def _leaves(at: Linear, period: float) -> bool:
@@ -72,38 +85,13 @@ def _leaves(at: Linear, period: float) -> bool:
     return any(not m.z.imag and m.z.real - 1.0 > m.uncertainty for m in first)
 
 
-def _way(map_: LiftedMap, at: Linear) -> float:
-    """How far the start is, relative, along the directions in which the map moves."""
-    return float(_relative(at.V.T @ (at.point - map_.start), at.V.T @ at.point).max())
-
-
-def _require_rest(map_: LiftedMap, at: Linear) -> None:
-    """Raises InputFault where the second period is another map than the first one, as under a
-    target that moves."""
-    once, again = map_.image(at.image)[at.taken], map_.second(at.point)[at.taken]
-    moved = _relative(again - once, once)
-    if moved.max() > 10 * TOLERANCE:
-        raise InputFault(
-            f"the equilibrium moves with time, as under a drive or target that does: by "
-            f"{moved.max():.1e} in {map_.period:.4g} s, seen in "
-            f"{map_.coordinates[at.taken[int(np.argmax(moved))]]}; give `at`, a time from which "
-            f"on nothing changes, here later than {map_.begin:.4g} s"
-        )
-
-
 def rests(at: Linear) -> bool:
     return bool((_unrest(at) <= TOLERANCE).all())
 
 
 def _unrest(at: Linear) -> Vector:
     """Along each direction, the change over a period, relative."""
-    return _relative(at.change, at.V.T @ at.point)
-
-
-def _relative(change: Vector, z: Vector) -> Vector:
-    """|change| of coordinates z, relative to max(1, |z|)."""
-    found: Vector = np.abs(change) / np.maximum(1.0, np.abs(z))
-    return found
+    return relative(at.change, at.V.T @ at.point)
 
 
 def newton_step(at: Linear) -> Vector:
@@ -116,7 +104,9 @@ def newton_step(at: Linear) -> Vector:
 
 def _newton(map_: LiftedMap, state: Vector) -> Linear:
     """Newton's method from `state`: the last point where the FMUs can be evaluated. Slopes are
-    shared by numbers as different as the residual allows, as long as it shrinks with them."""
+    shared by numbers as different as the residual, so that over most of a long period, and with
+    an error of each step that is of second order all the same; by fewer where it does not shrink.
+    """
     at, least, idle = linearised(map_, state, COARSE), np.inf, 0
     for _ in range(ITERATIONS):
         left = _unrest(at).max()
@@ -124,7 +114,7 @@ def _newton(map_: LiftedMap, state: Vector) -> Linear:
         if left <= TOLERANCE or idle == PATIENCE:
             break
         least = min(least, left)
-        same = SAME if idle else max(SAME, min(COARSE, 0.1 * left))
+        same = max(SAME, min(COARSE, left) * FINER**idle)
         try:
             at = linearised(map_, _nearer(map_, at, newton_step(at)), same)
         except FmuFault:  # far from where it is linear
@@ -143,18 +133,18 @@ def _nearer(map_: LiftedMap, at: Linear, step: Vector) -> Vector:
             change = at.V.T @ (map_.image(there) - there)
         except FmuFault:
             continue
-        if _relative(change, at.V.T @ there).max() < least:
+        if relative(change, at.V.T @ there).max() < least:
             return there
     return at.moved(step)
 
 
-def _why_none(map_: LiftedMap, nearest: Linear | None, ended: FmuFault | None) -> str:
+def _why_none(map_: LiftedMap, nearest: Linear | None, run: Trajectory) -> str:
     remedy = (
         "the map is linearised around a state of rest: take a hand that holds the mechanism, "
         "such as an arm or a spring, and no wrench, drive or target that changes with time"
     )
     if nearest is None:
-        return f"no equilibrium found before the run ends ({ended}); {remedy}"
+        return f"no equilibrium found before the run ends ({run.ended}); {remedy}"
     along = nearest.V[:, int(np.argmax(_unrest(nearest)))]
     j = int(np.argmax(np.abs(along)))
     change = nearest.image[j] - nearest.point[j]

@@ -57,8 +57,9 @@ class LiftedMap:
     """F of a system, from the first multiple of the hyperperiod on that is behind its start and not
     before the time `at` (s).
 
-    begin: that time (s). period: the hyperperiod (s), of a number of `events`. coordinates: of the
-    state, in order. start: the state there.
+    initial: the numbers of the FMUs at the start of the scene. begin: that time (s). period: the
+    hyperperiod (s), of a number of `events`. coordinates: of the state, in order. start: the state
+    at `begin`.
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class LiftedMap:
         self.period, self.seconds = time.seconds(length), time.seconds
         first = window[0] if window else length * math.ceil(behind_start(plan.system, at) / length)
         self._begin, self.begin = self._state.save(), time.seconds(first)
+        self.initial = np.concatenate(self._state.parts(self._begin)[: len(simulation.instances)])
         moments = list(takewhile(lambda moment: moment.tick < first + 2 * length, plan))
         for tick, event in moments:
             if tick < first:
@@ -114,7 +116,7 @@ class LiftedMap:
         point: Vector,
         V: Matrix,
         same: float = SAME,
-        after: Callable[[Instruction, Columns], None] = lambda instruction, M: None,
+        after: Callable[[Instruction, Columns], None] | None = None,
     ) -> tuple[Vector, Matrix, Matrix]:
         """F(point), its derivatives along the columns of V, and their errors; slopes of operations
         are shared by numbers that differ by up to `same`, relative. `after` each operation is
@@ -124,14 +126,24 @@ class LiftedMap:
         ends = np.cumsum([len(part) for part in state.parts(self._template)])[:-1]
         M = dict(zip(state.owners, np.split(V, ends), strict=True))
         D = {owner: np.zeros_like(rows) for owner, rows in M.items()}
+        alive = np.arange(V.shape[1])
         self._tangent.begin()
         for tick, event in self._moments:
             for instruction, call in self._instructions(event):
                 self._tangent.carry(tick, instruction, call, M, D, same)
-                after(instruction, M)
+                if after:
+                    after(instruction, M)
+            if not after:  # a column that is zero once remains so
+                kept = np.any([X.any(axis=0) for Y in (M, D) for X in Y.values()], axis=0)
+                alive = alive[kept]
+                for Y in (M, D):
+                    Y.update({owner: X[:, kept] for owner, X in Y.items()})
             interrupt.check()
-        whole, errors = (np.vstack([X[owner] for owner in state.owners]) for X in (M, D))
-        return self._numbers(), whole, errors
+        image, found = self._numbers(), []
+        for Y in (M, D):
+            found.append(np.zeros((len(image), V.shape[1])))
+            found[-1][:, alive] = np.vstack([Y[owner] for owner in state.owners])
+        return image, found[0], found[1]
 
     def ways(self) -> dict[str, str]:
         """By FMU, how the slopes of the last linearisation were found."""

@@ -53,6 +53,7 @@ from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.harmonics import Complex, Hybrid, Scale, hertz, with_worst
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
+from hapticlink.orchestrator.stability.trajectory import trajectory
 from hapticlink.orchestrator.stability.two_port import ROUNDING, TwoPort, mixes
 from hapticlink.orchestrator.system.built import built
 
@@ -125,7 +126,7 @@ def passivity(scene: str | Path | Scene, options: Options = (), *, at: float = 0
             with opened(long_enough(read, system, at), at, Closures(read)) as map_:
                 mechanism = mechanism_port(system, hand)
                 require_size(map_, hand, mechanism)
-                rest = equilibrium(map_, read.duration)
+                rest = equilibrium(map_, trajectory(map_, read.duration))
                 T = 1 / float(read.haptics.rate)
                 return of(read.title, map_, rest, hand, mechanism, T)
 

@@ -20,10 +20,11 @@ from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability import frozen
 from hapticlink.orchestrator.stability.closures import Closures
-from hapticlink.orchestrator.stability.equilibrium import equilibrium
-from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
+from hapticlink.orchestrator.stability.equilibrium import equilibrium, nearby
+from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
 from hapticlink.orchestrator.stability.modes import counted, modes, verdict
+from hapticlink.orchestrator.stability.trajectory import trajectory
 from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 
@@ -54,6 +55,7 @@ class Session:
         self._open = ExitStack()
         self._map: LiftedMap | None = None
         self._kind: Hashable = None
+        self._rest: Vector | None = None
         self._starts: dict[tuple[str, str], tuple[Scalar, float]] = {}
         self.loads = 0
 
@@ -71,12 +73,13 @@ class Session:
                 system = long_enough(read, frozen.without(whole)[0])
                 map_ = self._prepared(read, system)
                 try:
-                    at = equilibrium(map_, read.duration)
+                    at = None if self._rest is None else nearby(map_, self._rest)
+                    at = at or equilibrium(map_, trajectory(map_, read.duration))
                 except Fault:
                     self._open.close()
                     self._kind = None
                     raise
-            map_.start = at.point
+            self._rest = at.point
             return _verdict(at, map_.period)
 
     def _prepared(self, read: Scene, system: System) -> LiftedMap:
@@ -85,6 +88,7 @@ class Session:
             return self._map
         self._open.close()
         self._map = self._open.enter_context(opened(system, 0.0, Closures(read)))
+        self._rest = None
         self._kind, self._starts = kind, starts
         self.loads += 1
         return self._map

@@ -34,6 +34,7 @@ from hapticlink.orchestrator.stability.switching import (
     lyapunov,
     mean_square,
 )
+from hapticlink.orchestrator.stability.trajectory import trajectory
 from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks
@@ -189,7 +190,7 @@ def edges_of(
     with opened(
         alternating(system, place, middle, middle), 0.0, Closures(scene) if scene else None
     ) as map_:
-        at = equilibrium(map_, 60.0)
+        at = equilibrium(map_, trajectory(map_, 60.0))
         V = np.stack(list(map_.directions(at.point)), axis=1)
 
         def frame(before: int, length: int, further: int | None = None) -> Matrix:

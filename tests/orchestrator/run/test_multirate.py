@@ -31,6 +31,7 @@ from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.lifted_map import opened
 from hapticlink.orchestrator.stability.modes import modes
 from hapticlink.orchestrator.stability.switching import joint_spectral_radius
+from hapticlink.orchestrator.stability.trajectory import trajectory
 from hapticlink.orchestrator.stability.varying import edges_of
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator.systems import connected
@@ -187,7 +188,7 @@ def test_limit_of_the_coupling_to_one_percent(
 def radius(made: System) -> float:
     """The spectral radius of the lifted map, over a hyperperiod."""
     with opened(made) as map_:
-        found = modes(equilibrium(map_, 10.0), map_.period)
+        found = modes(equilibrium(map_, trajectory(map_, 10.0)), map_.period)
     return max(abs(mode.z) for mode in found if not mode.neutral)
 
 

@@ -23,6 +23,7 @@ from hapticlink.orchestrator.stability.cut import HandPort, MechanismPort
 from hapticlink.orchestrator.stability.equilibrium import equilibrium
 from hapticlink.orchestrator.stability.lifted_map import opened
 from hapticlink.orchestrator.stability.passivity import Passivity
+from hapticlink.orchestrator.stability.trajectory import trajectory
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator.run.test_multirate import F, V, X
 from tests.orchestrator.systems import connected
@@ -97,7 +98,9 @@ def judged(folder: Path, rate: int) -> Passivity:
         "mechanism", ((("F", -1.0),),), (place("mechanism", "x"),), (place("mechanism", "v"),)
     )
     with opened(made) as map_:
-        return passivity.of("two masses", map_, equilibrium(map_, 1.0), hand, port, T)
+        return passivity.of(
+            "two masses", map_, equilibrium(map_, trajectory(map_, 1.0)), hand, port, T
+        )
 
 
 DECAY = np.exp(-DAMPING * T / MASS)

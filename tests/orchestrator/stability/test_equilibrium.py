@@ -1,0 +1,84 @@
+"""Which equilibrium a scene is judged at, against where runs of the FMUs rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.stability.lifted_map import LiftedMap
+
+LINKAGES = Path(__file__).parents[3] / "orchestrator" / "study" / "linkages"
+FOUR_BAR, SLIDER_CRANK = LINKAGES / "four-bar.toml", LINKAGES / "slider-crank.toml"
+
+
+def held(kind: str, k: float, b: float, *target: float, turn: float = 0.0) -> dict[str, Any]:
+    """A hand with a fixed target."""
+    hand = {"type": kind, "stiffness": [k, k, turn], "damping": [b, b, 0.02]}
+    return {"graphics.rate": 64, "hand": {**hand, "target": [[0.0, *target]]}}
+
+
+@pytest.mark.parametrize(
+    ("scene", "options"),
+    [
+        (FOUR_BAR, held("arm", 184.86, 15.2, 0.01118, -0.02902, 0.4355)),
+        ("serial", held("arm", 161.7, 18.0, 0.08416, 0.05309, -1.0502, turn=1.0)),
+    ],
+)
+def test_it_is_the_one_at_which_the_run_rests(scene: str | Path, options: dict[str, Any]) -> None:
+    """Newton's method from the start of these scenes ends at others, which are unstable."""
+    options |= {"duration": 12.0}
+    found = hl.stability(scene, options)
+    run = hl.run(scene, options, figures=False)
+    x, time = run["virtual_mechanism.x"], run.time("virtual_mechanism.x")
+    assert found.verdict == "stable"
+    assert found.where.run == "rests there"
+    assert found.where.pose == pytest.approx(x[-1], abs=1e-5)
+    way = x[-1] - x[0]
+    start = found.where.from_start.by
+    assert (start["m"], start["rad"]) == pytest.approx((np.hypot(*way[:2]), abs(way[2])), abs=1e-5)
+    off = np.abs(x - x[-1]).max(axis=1)
+    assert off[time >= found.where.time].max() < 1e-3
+    assert off[time < found.where.time - 1.0].max() > 1e-3
+
+
+def test_what_presses_is_told_with_its_depth() -> None:
+    options = held("spring", 858.6, 37.25, -0.045, 0.0002, -0.329, turn=1.0) | {
+        "duration": 4.0,
+        "graphics.rate": 16,
+        "contacts.enclosure": [[-0.022, 0.0], [0.018, 0.0], [0.018, 0.042], [-0.022, 0.042]],
+        "contacts.stiffness": 1000.0,
+        "contacts.damping": 10.0,
+        "controller.contact": True,
+    }
+    found = hl.stability(SLIDER_CRANK, options)
+    run = hl.run(SLIDER_CRANK, options, figures=False)
+    (depth,) = found.where.contacts.values()
+    assert list(found.where.contacts) == ["rod on enclosure"]
+    assert depth == pytest.approx(-run["virtual_mechanism.contact_gap"][-1], rel=1e-3)
+    assert f"in contact: rod on enclosure ({1e3 * depth:.2g} mm)" in next(found.where.lines())
+
+
+def test_a_run_that_grows_away_is_told() -> None:
+    """A wall that is too stiff, against which the handle hops: its rest is 2 N/K deep."""
+    options = {"fmu.wall.start.stiffness": 6000.0, "linkage.start.rail": 0.0003}
+    found = hl.stability("virtual-wall", options)
+    assert found.where.pose[0] == pytest.approx(2 / 6000)
+    assert found.where.run == "passes"
+    assert "the run from the start does not rest there" in "\n".join(found.lines())
+    run = hl.run("virtual-wall", options, figures=False)
+    x, time = run["virtual_mechanism.x"][:, 0], run.time("virtual_mechanism.x")
+    near = x[np.argmin(np.abs(time - found.where.time))]
+    assert found.where.nearest.by["m"] == pytest.approx(abs(near - 2 / 6000), abs=1e-6)
+
+
+def test_a_moving_target_is_told_before_a_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    def search(self: LiftedMap, *given: Any, **options: Any) -> NoReturn:
+        raise AssertionError("a search has begun")
+
+    monkeypatch.setattr(LiftedMap, "slopes", search)
+    with pytest.raises(hl.InputFault, match="moves with time"):
+        hl.stability("two-hands")
