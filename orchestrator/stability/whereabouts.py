@@ -41,7 +41,8 @@ class Whereabouts:
     one. from_start: how far that is from the start of the scene. contacts: depths (m) of what
     presses, by body and obstacle. run: what the run from the start does, "rests there",
     "approaches", "rests elsewhere" or "passes", at the `time` (s) from which on it is there, or
-    at which it is nearest; and how far it is from there at that time and at its `end` (s)."""
+    at which it is nearest (by its operational point, if it passes); and how far it is from there
+    at that time and at its `end` (s)."""
 
     pose: tuple[float, ...]
     from_start: Gap
@@ -110,6 +111,8 @@ def whereabouts(scene: Scene, map_: LiftedMap, at: Linear, run: Trajectory) -> W
         first, last = away[: len(away) // 2 + 1], away[len(away) // 2 :]
         kind = "approaches" if last.max() < first.max() / 2 else "passes"
     places = _places(map_, "x")[:3]
+    if kind == "passes" and len(places) == 3:
+        nearest = int(np.argmin(np.hypot(*(run.states - at.image)[:, places[:2]].T)))
 
     def gap(state: Vector) -> Gap:  # FMUs come first in a state
         if len(places) == 3:
