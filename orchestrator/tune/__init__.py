@@ -69,9 +69,8 @@ def tune(
         tell("the scene's own run, for its poses")
         run = simulated(scene, given)
         found = poses(run, linkage, POSES)
-        with at_rest(scene, quick, found, tell) as at:
-            touched = any(any(pose.press) for pose in found)
-            found = [pose for pose in found if pose.name in at]
+        touched = any(any(pose.press) for pose in found)
+        with at_rest(scene, quick, found, tell) as (found, at):
             pressed = [pose for pose in found if any(pose.press)]
             if touched and not pressed:
                 raise InputFault(f"the run touches, but rests in no pose in contact; {STEADY}")
@@ -122,7 +121,7 @@ def tune(
             except InputFault as fault:
                 raise InputFault(f"{fault}; {REMEDY}") from None
         tell("the margin at the scene's own rates")
-        with at_rest(scene, given, found, tell, rests) as at:
+        with at_rest(scene, given, found, tell, rests) as (result.poses, at):
             judge = Judge(at)
             reached = judge.margin(scales)
             if reached < margin * (1 - 2 * FINE):
@@ -134,7 +133,7 @@ def tune(
             near = (*given, rate)
             near = whole_frames(open_scene.load(scene, near), near)
             try:
-                with at_rest(scene, near, found, tell, rests) as at:
+                with at_rest(scene, near, found, tell, rests) as (_, at):
                     result.margins[rate] = Judge(at).margin(scales, COARSE)
             except InputFault:
                 result.margins[rate] = 0.0

@@ -45,7 +45,8 @@ def _felt(axes: Axes, tuned: Tuned) -> None:
 def _margins(axes: Axes, tuned: Tuned) -> None:
     names = [fill(NAMES.get(at, at), 24) for at in tuned.margins]
     bars = axes.barh(names, list(tuned.margins.values()), 0.6, color="0.6")
-    axes.bar_label(bars, fmt="%.3g", fontsize="small", padding=2)
+    clear = {"facecolor": "white", "edgecolor": "none", "pad": 1}  # of the lines
+    axes.bar_label(bars, fmt="%.3g", fontsize="small", padding=3, bbox=clear)
     axes.axvline(1.0, color="tab:red", lw=1.0, label="unstable below")
     axes.axvline(tuned.asked, color="0.2", lw=1.0, ls="--", label="asked for")
     axes.set_xlabel("margin: factor on all stiffnesses up to instability")

@@ -7,10 +7,10 @@ ratio B/(2 sqrt(K m)) on any mass.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import Fmu, System
 
 FMU = "controller"
 LAWS = {
@@ -58,6 +58,18 @@ class Gains:
         for gain in self._gains:
             for (scalar, _), value in zip(gain.entries, gain.scaled(scales), strict=True):
                 yield FMU, scalar, value
+
+    def applied(self, system: System, scales: Scales) -> System:
+        """The system that starts with the given scales."""
+        scaled = {scalar.name: (scalar, value) for _, scalar, value in self.parameters(scales)}
+
+        def started(fmu: Fmu) -> Fmu:
+            if fmu.name != FMU:
+                return fmu
+            others = (start for start in fmu.starts if start[0].name not in scaled)
+            return replace(fmu, starts=(*others, *scaled.values()))
+
+        return replace(system, fmus=tuple(map(started, system.fmus)))
 
     def options(self, scales: Scales) -> dict[str, float | list[float]]:
         """The options of a scene with the given scales, to four digits."""

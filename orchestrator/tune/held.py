@@ -13,7 +13,7 @@ to single wrenches leave few digits. X is the compliance (3, 3).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +31,15 @@ from hapticlink.orchestrator.stability.linearise import Linear, linearised
 from hapticlink.orchestrator.stability.modes import modes
 from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.tune.gains import Gains, Scales
-from hapticlink.orchestrator.tune.spring_hand import LEVER
+from hapticlink.orchestrator.tune.spring_hand import FIRM, LEVER
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 DEVICE, HAND = "haptic_device", "hand"
+CONTACT = "virtual_mechanism.F_env"
+SOFT = 0.25
+"""Scale of the scene's gains with which rest is looked for where they throw the handle off."""
 STEPS = 12
 """Newton steps to rest."""
 SHARED, NEARBY = 1e-4, 1e-2
@@ -50,12 +53,13 @@ GROWN = 1e7
 
 class Held:
     """A scene at rest in a spring hand, looked for from a `start`, such as the `rest` of the same
-    scene at other rates. T: the haptic period (s). gains: those of its laws. Raises InputFault
-    where it comes to no rest."""
+    scene at other rates. T: the haptic period (s). gains: those of its laws; the map may
+    begin with softer ones. Raises InputFault where it comes to no rest with them."""
 
-    def __init__(self, map_: LiftedMap, T: float, start: Vector | None = None) -> None:
-        self._map, self._T = map_, T
-        self.gains = Gains(map_.system)
+    def __init__(
+        self, map_: LiftedMap, gains: Gains, T: float, start: Vector | None = None
+    ) -> None:
+        self._map, self.gains, self._T = map_, gains, T
         if start is None or len(start) != len(map_.start):  # holds keep more or fewer samples
             start = map_.start
         self._at = linearised(map_, start, SHARED)
@@ -63,11 +67,18 @@ class Held:
         map_.forget()  # slopes of the states on the way, which may touch less
         self._home = self._at = linearised(map_, self._at.point, SHARED)
         self._set: tuple[Scales, float] = {}, 0.0
+        with suppress(InputFault, FmuFault):  # gains too stiff to rest with
+            self._home = self._settled({}, FIRM)
 
     @property
     def rest(self) -> Vector:
-        """The state at rest with the scene's gains."""
+        """The state at rest with the scene's gains, or with softer ones."""
         return self._home.point
+
+    @property
+    def touches(self) -> bool:
+        """Whether a contact force acts at rest."""
+        return bool(self.signal(CONTACT).any())
 
     def stable(self, scales: Scales, hand: float) -> bool:
         """Whether no mode grows, neutral ones aside, with gains scaled by `scales` in a spring hand
@@ -81,14 +92,15 @@ class Held:
         return bool(counted) and counted[0].growth <= 0.0
 
     def signal(self, port: str) -> NDArray[np.float64]:
-        """The values of an output `fmu.port` at rest, with the scene's gains; none where there is
-        no such output."""
-        found = [
-            float(self._home.image[i])
+        """The values of an output `fmu.port` at `rest`; none where there is no such output."""
+        return self._home.image[self._places(port)]
+
+    def _places(self, port: str) -> list[int]:
+        return [
+            i
             for i, c in enumerate(self._map.coordinates)
             if c.kind == "signal" and str(c).partition("[")[0] == port
         ]
-        return np.array(found)
 
     def compliance(self, scales: Scales, hand: float, hertz: float) -> Complex:
         """The compliance (3, 3) of the handle at a frequency. Raises InputFault where it comes to
@@ -105,13 +117,15 @@ class Held:
         return X
 
     def _settled(self, scales: Scales, hand: float) -> Linear:
-        """The map at rest with these gains, found from the rest of the scene's own, so that the
-        result does not depend on what was asked before."""
+        """The map at rest with these gains, found from `rest`, so that the result does not depend
+        on what was asked before."""
         if (scales, hand) != self._set:
             self._map.set_parameters([*self.gains.parameters(scales), *self._held(hand)])
             self._set = {}, 0.0  # until all is done
             self._at = self._linear(self._home.point, NEARBY)
             self._rest(NEARBY)
+            if self.touches and not self._at.image[self._places(CONTACT)].any():
+                raise InputFault("it comes off what it touches")
             self._set = dict(scales), hand
         return self._at
 
@@ -147,8 +161,19 @@ class Held:
 
 @contextmanager
 def held(read: Scene, start: Vector | None = None) -> Iterator[Held]:
-    """A scene whose hand is a `spring`, at rest."""
-    with built(read) as whole:
+    """A scene whose hand is a `spring`, at rest. Raises InputFault or FmuFault where it comes to
+    none."""
+    with built(read) as whole, ExitStack() as stack:
         system = long_enough(read, frozen.without(whole)[0])
-        with opened(system, 0.0, Closures(read)) as map_:
-            yield Held(map_, float(1 / exact(read.haptics.rate)), start)
+        gains, T = Gains(system), float(1 / exact(read.haptics.rate))
+
+        def rested(scale: float) -> Held:
+            softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
+            map_ = stack.enter_context(opened(softer, 0.0, Closures(read)))
+            return Held(map_, gains, T, start)
+
+        try:
+            place = rested(1.0)
+        except (InputFault, FmuFault):
+            place = rested(SOFT)
+        yield place

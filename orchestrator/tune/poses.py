@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +17,13 @@ from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tracking import MECHANISM, table_of
 from hapticlink.orchestrator.scene import overrides
-from hapticlink.orchestrator.tune.held import Held, Vector, held
+from hapticlink.orchestrator.tune.held import CONTACT, Held, Vector, held
 from hapticlink.orchestrator.tune.spring_hand import FIRM, spring
 
-FORCE, JOINTS = "virtual_mechanism.F_env", "virtual_mechanism.q"
+JOINTS = "virtual_mechanism.q"
+LIGHT = 0.25
+"""The force (N) with which a hand presses where that of the run slides off, as from a corner or a
+disc along the spring that the coupling is."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,12 @@ class Pose:
     joints: dict[str, float | list[float]]
     point: tuple[float, ...]
     press: tuple[float, ...]
+
+    @property
+    def lighter(self) -> Pose:
+        """Pressed with LIGHT."""
+        F = np.array(self.press)
+        return replace(self, press=tuple((F * LIGHT / np.hypot(*F[:2])).tolist()))
 
     @property
     def name(self) -> str:
@@ -54,7 +63,7 @@ def poses(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     if table is None or JOINTS not in table or not len(table["time"]):
         raise InputFault(f"{MECHANISM} and {JOINTS} are not recorded: no poses of a run")
     times, points, joints = table["time"], table[MECHANISM], table[JOINTS]
-    force = table[FORCE] if FORCE in table else np.zeros((len(times), 3))
+    force = table[CONTACT] if CONTACT in table else np.zeros((len(times), 3))
     moments = [int(i * len(times) / count) for i in range(count)]
     size = np.hypot(force[:, 0], force[:, 1])
     touching = np.flatnonzero(size)
@@ -78,21 +87,31 @@ def at_rest(
     found: Sequence[Pose],
     tell: Callable[[str], object],
     starts: Mapping[str, Vector] = {},
-) -> Iterator[dict[str, Held]]:
-    """The scene at rest in each pose, by name, looked for from `starts`; poses without rest are
-    left out and told. Raises InputFault where none has any."""
+) -> Iterator[tuple[list[Pose], dict[str, Held]]]:
+    """The poses in which the scene rests, and it there by name, looked for from `starts`. A hand
+    that slides off what it touches presses lightly; poses without rest are left out and told.
+    Raises InputFault where none has any."""
     with ExitStack() as stack:
-        at = {}
+        rest, at = [], {}
         for pose in found:
-            try:
-                read = open_scene.load(scene, pose.options(given))
-                at[pose.name] = stack.enter_context(held(read, starts.get(pose.name)))
-            except (InputFault, FmuFault) as fault:
-                tell(f"  pose at {pose.name} is left out: {fault}")
+            for pressed in (pose, pose.lighter) if any(pose.press) else (pose,):
+                try:
+                    read = open_scene.load(scene, pressed.options(given))
+                    place = stack.enter_context(held(read, starts.get(pose.name)))
+                    if any(pose.press) and not place.touches:
+                        raise InputFault("it comes off what it touches")
+                except (InputFault, FmuFault) as fault:
+                    why = fault
+                else:
+                    rest.append(pressed)
+                    at[pose.name] = place
+                    break
+            else:
+                tell(f"  pose at {pose.name} is left out: {why}")
         tell(f"  {len(at)} poses at rest")
         if not at:
             raise InputFault("the scene comes to no rest in any pose of its run, in a firm grip")
-        yield at
+        yield rest, at
 
 
 def _by_joint(linkage: Linkage, q: Vector) -> dict[str, float | list[float]]:

@@ -1,13 +1,14 @@
 """Tuned gains: the felt stiffness against a closed form and against runs that press, the margin
 against runs that settle.
 
-The tunings of closed-loop and enclosure are those of results/tune/, which take minutes; the gains,
+The tunings are those of results/tune/, which take minutes; the gains,
 poses, margins and compliances that they record are tried in runs of the FMUs.
 """
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -21,7 +22,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.overrides import written
 from hapticlink.orchestrator.stability.linearise import linearised
 from hapticlink.orchestrator.tune.held import held
-from hapticlink.orchestrator.tune.poses import Pose
+from hapticlink.orchestrator.tune.poses import LIGHT, Pose
 from hapticlink.orchestrator.tune.search import COARSE, search
 from hapticlink.orchestrator.tune.spring_hand import FIRM, HANDS, spring
 
@@ -223,6 +224,30 @@ def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
             left.append(np.inf if run.fault else speed[-256:].max() / speed.max())
     assert max(late[0.9]) < 0.2
     assert max(late[1.1]) > 0.5
+
+
+def test_rest_is_found_with_gains_that_are_unstable_there() -> None:
+    """Own gains of `obstacles` throw the handle off; they are judged at the pose all the same."""
+    pose = {pose.name: pose for pose in poses(recorded("obstacles"))}["1.8 s"]
+    given = pose.options(("sensing=encoders", "graphics.rate=32"))
+    with held(open_scene.load("obstacles", given)) as place:
+        assert place.signal("haptic_device.x_true") == pytest.approx(pose.point, abs=1e-6)
+        assert place.stable(dict.fromkeys(place.gains.laws, 0.5), FIRM)
+        assert not place.stable({}, FIRM)
+
+
+def test_a_contact_that_is_slid_off_is_pressed_lightly() -> None:
+    """With the force of its run on a pin the handle slides along it; a light one holds it there."""
+    pose = poses(recorded("obstacles"))[-1]
+    size = np.hypot(*pose.press[:2])
+    assert size == pytest.approx(LIGHT)
+    for force, least, most in ((LIGHT, 0.0, 2e-4), (4.7, 4e-3, np.inf)):
+        press = tuple(F * force / size for F in pose.press)
+        options = [*replace(pose, press=press).options(()), "duration=4.0", *NO_ENCODER]
+        run = hl.run(RECORDED / "obstacles" / "tuned.toml", options, figures=False)
+        assert run.fault is None
+        assert run["virtual_mechanism.F_env"][-1].any()
+        assert least < np.hypot(*(run["haptic_device.x_true"][-1] - pose.point)[:2]) < most
 
 
 def test_the_columns_that_are_carried_hold_all_modes() -> None:
