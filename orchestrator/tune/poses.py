@@ -103,6 +103,8 @@ def at_rest(
                 except (InputFault, FmuFault) as fault:
                     why = fault
                 else:
+                    if pressed is not pose:
+                        tell(f"  pose at {pose.name}: the force slides off; {LIGHT:g} N are taken")
                     rest.append(pressed)
                     at[pose.name] = place
                     break
