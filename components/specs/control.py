@@ -32,7 +32,7 @@ class Teleoperation:
 @dataclass(frozen=True, kw_only=True)
 class Passivity:
     """Time-domain passivity observer and controller (Hannaford and Ryu 2002): what the motors give
-    beyond a budget is taken out by damping ([stability](stability.md#passivity-controller))."""
+    beyond a budget is taken out by damping ([energy](energy.md#passivity-controller))."""
 
     energy: Annotated[float, Quantity("J", ge=0)] = 0.0
     """What the motors may give in all: that of drives and gravity, of a mechanism in motion at the

@@ -45,9 +45,11 @@ def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> I
         with suppress(OSError, ValueError):
             known = json.loads((folder / DURATIONS).read_text(encoding="utf-8"))
     took = known.get(command)
-    told = guess if took is None else f"took up to {took:.1f} minutes here"
+    told = f"duration {guess}"
+    if took is not None:
+        told = f"duration up to {took:.1f} minutes here, less what is done already"
     if not hidden:
-        say(f"{command}: duration {told}, less what is done already", file=sys.stderr)
+        say(f"{command}: {told}", file=sys.stderr)
     begun = monotonic()
     try:
         yield

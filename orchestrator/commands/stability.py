@@ -25,10 +25,12 @@ from hapticlink.orchestrator.commands.sweep import Jobs, Vary
 At = Annotated[float, Parameter(help="Time (s) from which on no target, drive or wrench changes.")]
 Growth = Annotated[
     float | None,
-    Parameter(help="Time (s) over which perturbations grow along the trajectory from AT on."),
+    Parameter(
+        help="Instead, how fast perturbations grow along the run in this time (s) from AT on."
+    ),
 ]
 UserPort = Annotated[
-    bool, Parameter(negative="", help="Passivity of the user's port for any hand, as well.")
+    bool, Parameter(negative="", help="Tell as well whether any hand could be given energy.")
 ]
 Check = Annotated[
     int, Parameter(help="Points of the map to be checked by runs, near the boundary and away.")
@@ -53,18 +55,20 @@ def stability(
     quiet: Quiet = False,
     json: Json = False,
 ) -> int:
-    """Judge the stability of a scene around its equilibrium, from the linearised map of its
-    co-simulation over a period of all its rates: spectral radius, modes and who takes part.
+    """Tell whether small motions of a scene around its rest decay, how fast, and who takes part.
 
-    Prints the result and writes stability.json to OUT (default `runs/SCENE`, with
-    options `runs/SCENE,key=value,...`). With --vary, a map
-    over one or two numeric keys and others, refined at the boundary: map.csv and map.png in OUT
-    (default maps/SCENE); the same command continues an interrupted map.
+    The scene needs a hand that holds the mechanism and does not move, such as an arm. Prints the
+    result, which docs/stability.md explains line by line, and writes stability.json to OUT
+    (default `runs/SCENE`, with options `runs/SCENE,key=value,...`).
+
+    With --vary, a map over one or two numeric keys and others, refined at the boundary: map.csv
+    and map.png in OUT (default maps/SCENE); the same command continues an interrupted map.
 
     For example:
 
         hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
         hapticlink stability virtual-wall --port
+        hapticlink stability virtual-wall --vary fmu.wall.start.stiffness=2000..8000:4 --check 2
     """
     chosen = (*(set or ()), *(swap or ()))
     name = default_folder("runs", scene).name
@@ -120,8 +124,16 @@ def _map(
         f"{len(verdicts)} points, {said}",
         f"  {len(made.of('boundary'))} points of the boundary",
     ]
+    reasons = [row["message"] for row in made.of("grid") if row["verdict"] == "refused"]
+    lines += [f"  refused, the first one: {reason}" for reason in reasons[:1]]
     if check:
-        agree = [row.get("agree") for row in made.of("check")]
-        lines.append(f"  {agree.count(True)} of {len(agree)} runs agree with the map")
+        runs = made.of("check")
+        other = [row for row in runs if not row.get("agree")]
+        lines.append(f"  {len(runs) - len(other)} of {len(runs)} runs agree with the map")
+        keys = [text.partition("=")[0] for text in vary]
+        for row in other:
+            point = ", ".join(f"{key}={row[key]}" for key in keys)
+            run = row.get("run_verdict", "not judged")
+            lines.append(f"  not at {point}: map {row['verdict']}, run {run}")
     lines.append(f"  {folder}/: map.csv, map.png")
     return iter(lines), {"folder": str(folder), "rows": made.rows}

@@ -79,13 +79,15 @@ def work(each: Line) -> Row:
 def of_run(scene: Scene, foretold: float) -> tuple[float, str]:
     """Growth rate (1/s) and verdict of a run that lasts SPANS time constants of the rate that a map
     has `foretold`, within the limits, and the longest time where its motion changes by less than a
-    factor e: whatever was foretold, a slow decay is told from a limit cycle. A run is stable if its
-    motion decays: by a factor e, or half as fast as foretold if that is slower. One that keeps its
+    factor e, or in the other sense than foretold: a slow decay is told from a limit cycle, and a
+    mode that starts small below decaying ones has time to show. A run is stable if its motion
+    decays: by a factor e, or half as fast as foretold if that is slower. One that keeps its
     size is an instability that ended in a limit cycle, as where motors saturate, before the first
     quarter of the run was over."""
     seconds = min(LONGEST, max(SHORTEST, SPANS / max(abs(foretold), 1e-9)))
     growth = _growth(scene, seconds)
-    if abs(growth) * seconds < 1.0 and seconds < LONGEST:
+    unsure = abs(growth) * seconds < 1.0 or (growth < 0) != (foretold < 0)
+    if unsure and seconds < LONGEST:
         seconds = LONGEST
         growth = _growth(scene, seconds)
     return growth, "stable" if growth < -min(1 / seconds, abs(foretold) / 2) else "unstable"

@@ -112,7 +112,7 @@ class VaryingStability:
             f"{', '.join(map(str, self.worst))} ticks"
         )
         yield (
-            f"mean square: {self.mean_square}; second moments grow {self.second_moment:.6g}-fold a "
+            f"mean square: {self.mean_square}; second moments times {self.second_moment:.6g} a "
             "frame"
         )
         yield (
