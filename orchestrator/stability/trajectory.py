@@ -85,8 +85,9 @@ def trajectory(map_: LiftedMap, seconds: float) -> Trajectory:
     for k in range(periods + 1):
         try:
             image = map_.image(state)
-        except FmuFault as fault:
-            ended = str(fault)
+        except FmuFault as fault:  # each period runs by the clock of the first
+            since = fault.time + k * map_.period
+            ended = str(FmuFault(fault.fmu, fault.what, since, fault.messages))
             break
         except InputFault as fault:  # a hold began anew, as where constrained directions change
             if k == 0:

@@ -75,6 +75,19 @@ def test_a_run_that_grows_away_is_told() -> None:
     assert found.where.nearest.by["m"] == pytest.approx(abs(near - 2 / 6000), abs=1e-6)
 
 
+def test_a_run_that_diverges_is_told_with_the_time_of_the_run() -> None:
+    """The search runs a period again and again, each by the clock of the first one."""
+    options = {
+        "duration": 4.0,
+        "hand": {"type": "arm", "target": [[0.0, 0.0445, 0.0148, -0.788]]},
+        "controller.teleoperation.stiffness": [600.0, 600.0, 0.6],
+    }
+    run = hl.run("closed-loop-direct", options, figures=False)
+    assert run.fault
+    found = hl.stability("closed-loop-direct", options)
+    assert found.where.ended.split(" at t = ")[1] == str(run.fault).split(" at t = ")[1]
+
+
 def test_a_moving_target_is_told_before_a_search(monkeypatch: pytest.MonkeyPatch) -> None:
     def search(self: LiftedMap, *given: Any, **options: Any) -> NoReturn:
         raise AssertionError("a search has begun")
