@@ -170,8 +170,12 @@ def of(
             found.append(lacking_here if abs(lacking_here) > none else 0.0)
         return found
 
-    grid = np.array([angle for angle in _angles(N) if scale.moved(device, angle)])
-    angles = np.union1d(grid, scale.resonances(whole))
+    angles = np.union1d(_angles(N), scale.resonances(whole))
+    # Next to half the haptic rate, which is at 0 or at pi, the device may seem to move by rounding.
+    still = np.array([angle for angle in angles if not scale.moved(device, angle)])
+    low = still[still < np.pi / 2].max(initial=0.0)
+    high = still[still >= np.pi / 2].min(initial=np.inf)
+    angles = angles[(low < angles) & (angles < high)]
     angles = with_worst(angles, lambda angle: max(lacks(angle)))
     for angle in angles:
         port, alone = impedances(angle)

@@ -98,3 +98,18 @@ def test_at_half_the_rate_rounding_is_no_damping() -> None:
     assert abs(found.own) < 1.0
     assert found.needed < 10.0
     assert max(f for f, _ in found.curve) < 256.0
+
+
+def test_the_hand_that_is_cut_off_does_not_matter() -> None:
+    """Half the haptic rate is a harmonic of frames, next to which the device hardly moves."""
+    start = [0.0, 0.0445, 0.0148, -0.788]
+    hands: list[dict[str, Any]] = [
+        {"type": "constant", "wrench": [0.0, 0.0, 0.0]},
+        {"type": "spring", "stiffness": [300.0, 300.0, 1.0], "damping": [10.0, 10.0, 0.02]},
+    ]
+    hands[1]["target"] = [start]
+    options = {"graphics.rate": 32}
+    free, held = (hl.passivity("closed-loop-direct", options | {"hand": h}) for h in hands)
+    assert held.needed == pytest.approx(free.needed, rel=0.01)
+    assert held.at_least == pytest.approx(free.at_least, rel=0.01)
+    assert held.own == free.own == 0.0
