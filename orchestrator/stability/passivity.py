@@ -196,6 +196,7 @@ def of(
             return scale.at(cut, angle, H, scale.moving)
 
         angles = np.union1d(angles, scale.resonances(cut))
+        angles = angles[(low < angles) & (angles < high)]
         angles = with_worst(angles, lambda angle: two_port.most_lacking(cut_at(angle)))
         both = two_port.judged(
             [(angle, cut_at(angle)) for angle in angles],
