@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.orchestrator.stability import session
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap
+from hapticlink.orchestrator.stability.trajectory import Trajectory, trajectory
 from tests.orchestrator.stability.test_virtual_coupling import HELD, POINT
 
 LINKAGES = Path(__file__).parents[3] / "orchestrator" / "study" / "linkages"
@@ -136,3 +138,25 @@ def test_a_moving_target_is_told_before_a_search(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(LiftedMap, "slopes", search)
     with pytest.raises(hl.InputFault, match="moves with time"):
         hl.stability("two-hands")
+
+
+def test_a_variant_without_an_equilibrium_nearby_is_run_from_its_own_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And not from where the variant before was when its map began."""
+    begun: list[np.ndarray] = []
+
+    def run(map_: LiftedMap, seconds: float) -> Trajectory:
+        begun.append(map_.start)
+        return trajectory(map_, seconds)
+
+    monkeypatch.setattr(session, "nearby", lambda map_, state: None)
+    monkeypatch.setattr(session, "trajectory", run)
+    scene = hl.scene("virtual-wall", {"linkage.start.rail": 0.001, "duration": 1.0})
+    soft, stiff = ([f"fmu.wall.start.stiffness={K}"] for K in (1000, 4000))
+    for variants in ((soft, stiff), (stiff,)):
+        with session.Session(scene) as judge:
+            for variant in variants:
+                judge.judge(variant)
+    assert begun[1] == pytest.approx(begun[2], rel=1e-12, abs=1e-15)
+    assert len(begun) == 3
