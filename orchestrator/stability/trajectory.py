@@ -84,10 +84,10 @@ def trajectory(map_: LiftedMap, seconds: float) -> Trajectory:
         except FmuFault as fault:
             ended = str(fault)
             break
-        except InputFault as fault:  # a hold began anew, as where constrained directions change
+        except InputFault:
             if k == 0:
                 raise
-            ended = str(fault)
+            ended = "a hold begins anew, as where the number of constrained directions changes"
             break
         change = float(relative(image - state, state)[moving].max(initial=0.0))
         if not math.isfinite(change):

@@ -81,7 +81,7 @@ class Whereabouts:
             pressing = (f"{who} ({1e3 * depth:.2g} mm)" for who, depth in self.contacts.items())
             line += f", in contact: {', '.join(pressing)}"
         yield line
-        fails = f", and fails: {self.ended}" if self.ended else ""
+        fails = f", where the map ends: {self.ended}" if self.ended else ""
         if self.run == "rests there":
             yield f"the run from the start comes to rest there, from {self.time:.4g} s on"
         elif self.run == "approaches":
