@@ -22,6 +22,7 @@ from hapticlink.orchestrator.stability.trajectory import (
     Trajectory,
     relative,
     require_constant,
+    still,
 )
 
 ITERATIONS = 20
@@ -46,22 +47,26 @@ def equilibrium(map_: LiftedMap, run: Trajectory) -> Linear:
     Raises InputFault where none is found, naming what does not come to rest.
     """
     found: list[Linear] = []
+    swings = False
     nearest: Linear | None = None
     for state in run.begins():
         try:
             at = _newton(map_, state)
-            if rests(at):
+            resting = rests(at) and still(map_, at.image)
+            if resting:
                 require_constant(map_, at.point, at.taken)
         except FmuFault:
             continue
-        if rests(at):
+        if resting:
             found.append(at)
             if not _leaves(at, map_.period):
                 break
+        elif rests(at):
+            swings = True
         elif nearest is None or _unrest(at).max() < _unrest(nearest).max():
             nearest = at
     if not found:
-        raise InputFault(_why_none(map_, nearest, run))
+        raise InputFault(_why_none(map_, nearest, run, swings))
     return min(found, key=lambda at: run.distances(at.point).min())
 
 
@@ -71,9 +76,9 @@ def nearby(map_: LiftedMap, state: Vector) -> Linear | None:
     oscillation."""
     try:
         at = _newton(map_, state)
+        if not rests(at) or _leaves(at, map_.period) or not still(map_, at.image):
+            return None
     except FmuFault:
-        return None
-    if not rests(at) or _leaves(at, map_.period):
         return None
     require_constant(map_, at.point, at.taken)
     return at
@@ -86,6 +91,7 @@ def _leaves(at: Linear, period: float) -> bool:
 
 
 def rests(at: Linear) -> bool:
+    """Whether the state is the same after a period."""
     return bool((_unrest(at) <= TOLERANCE).all())
 
 
@@ -138,13 +144,20 @@ def _nearer(map_: LiftedMap, at: Linear, step: Vector) -> Vector:
     return at.moved(step)
 
 
-def _why_none(map_: LiftedMap, nearest: Linear | None, run: Trajectory) -> str:
+def _why_none(map_: LiftedMap, nearest: Linear | None, run: Trajectory, swings: bool) -> str:
     remedy = (
         "the map is linearised around a state of rest: take a hand that holds the mechanism, "
         "such as an arm or a spring, and no wrench, drive or target that changes with time"
     )
+    if swings:
+        return (
+            "no equilibrium found, but a limit cycle that repeats after "
+            f"{map_.period:.4g} s, as where an instability ends at the torque limit of motors; "
+            "take lower gains, or a start at rest"
+        )
     if nearest is None:
-        return f"no equilibrium found before the run ends ({run.ended}); {remedy}"
+        ended = f" before the run ends ({run.ended})" if run.ended else ""
+        return f"no equilibrium found{ended}; {remedy}"
     along = nearest.V[:, int(np.argmax(_unrest(nearest)))]
     j = int(np.argmax(np.abs(along)))
     change = nearest.image[j] - nearest.point[j]

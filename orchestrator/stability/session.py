@@ -56,6 +56,7 @@ class Session:
         self._map: LiftedMap | None = None
         self._kind: Hashable = None
         self._rest: Vector | None = None
+        self._set_anew = False
         self._starts: dict[tuple[str, str], tuple[Scalar, float]] = {}
         self.loads = 0
 
@@ -74,7 +75,9 @@ class Session:
                 map_ = self._prepared(read, system)
                 try:
                     at = None if self._rest is None else nearby(map_, self._rest)
-                    at = at or equilibrium(map_, trajectory(map_, read.duration))
+                    if at is None:
+                        map_ = self._fresh(read, system)
+                        at = equilibrium(map_, trajectory(map_, read.duration))
                 except Fault:
                     self._open.close()
                     self._kind = None
@@ -89,9 +92,16 @@ class Session:
         self._open.close()
         self._map = self._open.enter_context(opened(system, 0.0, Closures(read)))
         self._rest = None
-        self._kind, self._starts = kind, starts
+        self._kind, self._starts, self._set_anew = kind, starts, False
         self.loads += 1
         return self._map
+
+    def _fresh(self, read: Scene, system: System) -> LiftedMap:
+        """The map from the start of the scene on, which is run again where parameters were set
+        since."""
+        if self._set_anew:
+            self._kind = None
+        return self._prepared(read, system)
 
     def _set(self, map_: LiftedMap, starts: dict[tuple[str, str], tuple[Scalar, float]]) -> bool:
         """Sets the parameters that differ; False where that takes another FMU."""
@@ -101,7 +111,7 @@ class Session:
         if any(v[0].causality != "parameter" or v[0].variability != "tunable" for _, v in changed):
             return False
         map_.set_parameters([(fmu, scalar, value) for (fmu, _), (scalar, value) in changed])
-        self._starts = starts
+        self._starts, self._set_anew = starts, self._set_anew or bool(changed)
         return True
 
 

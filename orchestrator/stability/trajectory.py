@@ -21,6 +21,8 @@ from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
 
 TOLERANCE = 1e-9
 """Of each coordinate z at rest, relative to max(1, |z|)."""
+STILL = 1e-5
+"""Largest change of a state at rest within a period, relative to max(1, |z|)."""
 AS_CALM = 10.0
 """Times the least change over a period up to which a state counts as no less near to rest: a
 mechanism that coasts or swings is as calm anywhere, and is judged near its start."""
@@ -31,8 +33,9 @@ KEPT = 2000
 @dataclass(frozen=True)
 class Trajectory:
     """States (k, n) of a run at the `times` (k,) (s), and what each changes over a period,
-    `unrest` (k,), relative to max(1, |z|). moving: the coordinates that count. ended: what ended
-    the run before its time, but for rest."""
+    `unrest` (k,), relative to max(1, |z|): inf where it repeats after a period without being at
+    rest. moving: the coordinates that count. ended: what ended the run before its time, but for
+    rest."""
 
     times: Vector
     states: NDArray[np.float64]
@@ -64,18 +67,11 @@ class Trajectory:
 
 
 def trajectory(map_: LiftedMap, seconds: float) -> Trajectory:
-    """The run from the start of the map, for `seconds` or until it rests or an FMU fails.
+    """The run from the start of the map, for `seconds` or until it rests, repeats itself or fails.
 
     Raises InputFault where a target, wrench or drive changes with time, and as `image` does.
     """
-    moving = np.array(
-        [
-            i
-            for i, c in enumerate(map_.coordinates)
-            if c.kind == "fmu" and not c.inert and not discrete(c)
-        ],
-        dtype=np.intp,
-    )
+    moving = _moving(map_)
     with suppress(FmuFault):  # the run tells of it
         require_constant(map_, map_.start, moving)
     periods = int(seconds / map_.period)
@@ -89,25 +85,49 @@ def trajectory(map_: LiftedMap, seconds: float) -> Trajectory:
             since = fault.time + k * map_.period
             ended = str(FmuFault(fault.fmu, fault.what, since, fault.messages))
             break
-        except InputFault as fault:  # a hold began anew, as where constrained directions change
+        except InputFault:
             if k == 0:
                 raise
-            ended = str(fault)
+            ended = "a hold begins anew, as where the number of constrained directions changes"
             break
         change = float(relative(image - state, state)[moving].max(initial=0.0))
         if not math.isfinite(change):
             ended = "its numbers are no longer finite"
             break
-        if k % every == 0 or change <= TOLERANCE:
+        repeats = change <= TOLERANCE
+        if repeats and not still(map_, state):
+            change = math.inf
+        if k % every == 0 or repeats:
             times.append(map_.begin + k * map_.period)
             states.append(state)
             unrest.append(change)
-        if change <= TOLERANCE:
+        if repeats:
             break
         state = image
     if not states:
         raise InputFault(f"no equilibrium found: the run fails at its start ({ended})")
     return Trajectory(np.array(times), np.array(states), np.array(unrest), moving, ended)
+
+
+def _moving(map_: LiftedMap) -> NDArray[np.intp]:
+    """The coordinates that count."""
+    own = [c.kind == "fmu" and not c.inert and not discrete(c) for c in map_.coordinates]
+    return np.flatnonzero(own)
+
+
+def still(map_: LiftedMap, state: Vector) -> bool:
+    """Whether a state with F(z) = z is at rest within the period, too: an oscillation whose period
+    divides that of the map repeats as well, such as a limit cycle of motors that saturate, at half
+    the haptic rate."""
+    taken, moved = _moving(map_), 0.0
+    z = state[taken]
+
+    def watch(numbers: Vector) -> None:
+        nonlocal moved
+        moved = max(moved, float(relative(numbers[taken] - z, z).max(initial=0.0)))
+
+    map_.image(state, watch)
+    return moved <= STILL
 
 
 def require_constant(map_: LiftedMap, state: Vector, taken: NDArray[np.intp]) -> None:

@@ -14,11 +14,13 @@ from hapticlink.components.contact.depth import depths
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, Vector
 from hapticlink.orchestrator.stability.linearise import Linear
-from hapticlink.orchestrator.stability.trajectory import Trajectory, relative
+from hapticlink.orchestrator.stability.trajectory import TOLERANCE, Trajectory, relative
 from hapticlink.orchestrator.system.haptic_loop import MECHANISM
 
 THERE = 1e-3
 """Distance of a state and input of an FMU, relative to max(1, |z|), within which a run is there."""
+FALLING = 0.9
+"""Of the distance in the third quarter of a run, below which that in the last still falls."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class Whereabouts:
             pressing = (f"{who} ({1e3 * depth:.2g} mm)" for who, depth in self.contacts.items())
             line += f", in contact: {', '.join(pressing)}"
         yield line
-        fails = f", and fails: {self.ended}" if self.ended else ""
+        fails = f", where the map ends: {self.ended}" if self.ended else ""
         if self.run == "rests there":
             yield f"the run from the start comes to rest there, from {self.time:.4g} s on"
         elif self.run == "approaches":
@@ -103,13 +105,13 @@ def whereabouts(scene: Scene, map_: LiftedMap, at: Linear, run: Trajectory) -> W
     """Where the equilibrium of the map is, and whether the run from the start comes there."""
     away = run.distances(at.point)
     there, nearest = away <= THERE, int(np.argmin(away))
-    if there[-1]:
+    (first, last), (third, fourth) = _halves(away), _halves(away[len(away) // 2 :])
+    if there[-1] and (run.rests or last <= max(first, TOLERANCE)):
         kind, nearest = "rests there", int(np.append(-1, np.flatnonzero(~there))[-1]) + 1
     elif run.rests:
         kind = "rests elsewhere"
     else:
-        first, last = away[: len(away) // 2 + 1], away[len(away) // 2 :]
-        kind = "approaches" if last.max() < first.max() / 2 else "passes"
+        kind = "approaches" if last < first / 2 and fourth < FALLING * third else "passes"
     places = _places(map_, "x")[:3]
     if kind == "passes" and len(places) == 3:
         nearest = int(np.argmin(np.hypot(*(run.states - at.image)[:, places[:2]].T)))
@@ -134,6 +136,11 @@ def whereabouts(scene: Scene, map_: LiftedMap, at: Linear, run: Trajectory) -> W
         at_end=gap(run.states[-1]),
         ended=run.ended,
     )
+
+
+def _halves(away: Vector) -> tuple[float, float]:
+    """The largest distance in the first and in the second half of a run."""
+    return float(away[: len(away) // 2 + 1].max()), float(away[len(away) // 2 :].max())
 
 
 def _places(map_: LiftedMap, port: str) -> list[int]:

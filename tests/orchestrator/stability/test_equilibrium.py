@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.orchestrator.stability import session
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap
+from hapticlink.orchestrator.stability.trajectory import Trajectory, trajectory
+from tests.orchestrator.stability.test_virtual_coupling import HELD, POINT
 
 LINKAGES = Path(__file__).parents[3] / "orchestrator" / "study" / "linkages"
 FOUR_BAR, SLIDER_CRANK = LINKAGES / "four-bar.toml", LINKAGES / "slider-crank.toml"
@@ -21,11 +24,14 @@ def held(kind: str, k: float, b: float, *target: float, turn: float = 0.0) -> di
     return {"graphics.rate": 64, "hand": {**hand, "target": [[0.0, *target]]}}
 
 
+SERIAL = held("arm", 161.7, 18.0, 0.08416, 0.05309, -1.0502, turn=1.0)
+
+
 @pytest.mark.parametrize(
     ("scene", "options"),
     [
         (FOUR_BAR, held("arm", 184.86, 15.2, 0.01118, -0.02902, 0.4355)),
-        ("serial", held("arm", 161.7, 18.0, 0.08416, 0.05309, -1.0502, turn=1.0)),
+        ("serial", SERIAL | {"controller.teleoperation.damping": [70.0, 70.0, 0.1]}),
     ],
 )
 def test_it_is_the_one_at_which_the_run_rests(scene: str | Path, options: dict[str, Any]) -> None:
@@ -34,6 +40,7 @@ def test_it_is_the_one_at_which_the_run_rests(scene: str | Path, options: dict[s
     found = hl.stability(scene, options)
     run = hl.run(scene, options, figures=False)
     x, time = run["virtual_mechanism.x"], run.time("virtual_mechanism.x")
+    assert np.abs(run["virtual_mechanism.qd"][-2:]).max() < 1e-3
     assert found.verdict == "stable"
     assert found.where.run == "rests there"
     assert found.where.pose == pytest.approx(x[-1], abs=1e-5)
@@ -88,6 +95,55 @@ def test_a_run_that_diverges_is_told_with_the_time_of_the_run() -> None:
     assert found.where.ended.split(" at t = ")[1] == str(run.fault).split(" at t = ")[1]
 
 
+@pytest.mark.parametrize(("damping", "found"), [(0.6, True), (0.7, False)])
+def test_a_limit_cycle_that_divides_the_period_is_no_rest(damping: float, found: bool) -> None:
+    """A coupling beyond the limit of test_virtual_coupling.py shakes at half the haptic rate until
+    the motors saturate: after the 16 ticks of a period each state is the same."""
+    options = HELD | {
+        "graphics.rate": 32,
+        "duration": 2.0,
+        "hand.target": [[0.0, *POINT[:2], POINT[2] + 1e-3]],
+        "controller.teleoperation.damping": [70.0, 70.0, damping],
+    }
+    run = hl.run("closed-loop", options, figures=False)
+    speed = run["virtual_mechanism.qd"][-17:, 3]
+    assert speed[-1] == pytest.approx(speed[-17], rel=1e-4)
+    assert speed[-1] == pytest.approx(-speed[-2], rel=1e-3)
+    if not found:  # every search ends in the cycle
+        with pytest.raises(hl.InputFault, match=r"limit cycle that repeats after 0\.03125 s"):
+            hl.stability("closed-loop", options)
+        return
+    at = hl.stability("closed-loop", options)
+    assert at.verdict == "unstable"
+    assert at.where.run == "passes"
+
+
+def test_an_arm_that_shakes_between_the_limits_of_motors_does_not_rest() -> None:
+    """The pose of this run settles, while the speeds change their sign from tick to tick."""
+    options = SERIAL | {"duration": 8.0}
+    run = hl.run("serial", options, figures=False)
+    x, qd = run["virtual_mechanism.x"], run["virtual_mechanism.qd"]
+    assert x[-1] == pytest.approx(x[-512], abs=1e-5)
+    assert qd[-1, 1] == pytest.approx(-qd[-2, 1], rel=1e-3)
+    assert abs(qd[-1, 1]) > 1.0
+    found = hl.stability("serial", options)
+    assert found.verdict == "unstable"
+    assert found.where.run == "passes"
+
+
+def test_a_run_that_has_not_grown_yet_does_not_rest() -> None:
+    """A wall that is too stiff in both directions, off its rest by 1 nm."""
+    options = {
+        "fmu.wall.settings.unilateral": False,
+        "fmu.wall.start.stiffness": 6000.0,
+        "linkage.start.rail": 2 / 6000 + 1e-9,
+        "duration": 0.5,
+    }
+    found = hl.stability("virtual-wall", options)
+    assert found.verdict == "unstable"
+    assert found.where.run == "passes"
+
+
 def test_a_moving_target_is_told_before_a_search(monkeypatch: pytest.MonkeyPatch) -> None:
     def search(self: LiftedMap, *given: Any, **options: Any) -> NoReturn:
         raise AssertionError("a search has begun")
@@ -95,3 +151,25 @@ def test_a_moving_target_is_told_before_a_search(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(LiftedMap, "slopes", search)
     with pytest.raises(hl.InputFault, match="moves with time"):
         hl.stability("two-hands")
+
+
+def test_a_variant_without_an_equilibrium_nearby_is_run_from_its_own_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And not from where the variant before was when its map began."""
+    begun: list[np.ndarray] = []
+
+    def run(map_: LiftedMap, seconds: float) -> Trajectory:
+        begun.append(map_.start)
+        return trajectory(map_, seconds)
+
+    monkeypatch.setattr(session, "nearby", lambda map_, state: None)
+    monkeypatch.setattr(session, "trajectory", run)
+    scene = hl.scene("virtual-wall", {"linkage.start.rail": 0.001, "duration": 1.0})
+    soft, stiff = ([f"fmu.wall.start.stiffness={K}"] for K in (1000, 4000))
+    for variants in ((soft, stiff), (stiff,)):
+        with session.Session(scene) as judge:
+            for variant in variants:
+                judge.judge(variant)
+    assert begun[1] == pytest.approx(begun[2], rel=1e-12, abs=1e-15)
+    assert len(begun) == 3
