@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins, temporary_folders
@@ -23,8 +25,9 @@ from hapticlink.orchestrator.sweep.row import Row
 BAND, FAR = 0.02, 0.06
 """Points next to a boundary lie off it by more than the first and up to the second, relative."""
 SPANS = 8.0
-"""Time constants of the leading mode that a run lasts, within the limits."""
+"""Time constants of the leading mode over which the growth rate of a run is taken."""
 SHORTEST, LONGEST = 2.0, 30.0
+"""Times (s) of a run, the longer one that of its verdict."""
 MOVING = ("virtual_mechanism.qd", "virtual_mechanism.v")
 GONE = 1e-9
 """Velocity, relative to the largest of the run, that is taken for rest."""
@@ -71,36 +74,45 @@ def work(each: Line) -> Row:
         row = judged(session, "check", [])
     if "growth_rate" not in row:
         return {"end": DONE, "rows": [row]}
-    growth, verdict = of_run(each.scene, row["growth_rate"])
-    row |= {"run_growth_rate": growth, "run_verdict": verdict}
+    rate, verdict = of_run(each.scene, row["growth_rate"])
+    row |= {"run_growth_rate": rate, "run_verdict": verdict}
     return {"end": DONE, "rows": [row | {"agree": row["run_verdict"] == row["verdict"]}]}
 
 
 def of_run(scene: Scene, foretold: float) -> tuple[float, str]:
-    """Growth rate (1/s) and verdict of a run that lasts SPANS time constants of the rate that a map
-    has `foretold`, within the limits, and the longest time where its motion changes by less than a
-    factor e, or in the other sense than foretold: a slow decay is told from a limit cycle, and a
-    mode that starts small below decaying ones has time to show. A run is stable if its motion
-    decays: by a factor e, or half as fast as foretold if that is slower. One that keeps its
-    size is an instability that ended in a limit cycle, as where motors saturate, before the first
-    quarter of the run was over."""
+    """Growth rate (1/s) and verdict of a run of LONGEST. It is stable if its motion decays over the
+    whole of it: by a factor e, or half as fast as a map has `foretold` if that is slower. One that
+    keeps its size is an instability that ended in a limit cycle, as where motors saturate. The rate
+    is that of the first SPANS time constants of what was foretold, within the limits, or of the
+    whole where the motion changes by less than a factor e before; infinite if the run ends before.
+    """
+    speed, whole = _speeds(scene)
     seconds = min(LONGEST, max(SHORTEST, SPANS / max(abs(foretold), 1e-9)))
-    growth = _growth(scene, seconds)
-    unsure = abs(growth) * seconds < 1.0 or (growth < 0) != (foretold < 0)
-    if unsure and seconds < LONGEST:
-        seconds = LONGEST
-        growth = _growth(scene, seconds)
-    return growth, "stable" if growth < -min(1 / seconds, abs(foretold) / 2) else "unstable"
+    samples = math.ceil(seconds / LONGEST * whole)
+    rate = growth(speed[:samples], seconds) if len(speed) >= samples else np.inf
+    at_last = growth(speed, LONGEST) if len(speed) >= whole else np.inf
+    verdict = "stable" if at_last < -min(1 / LONGEST, abs(foretold) / 2) else "unstable"
+    return rate if abs(rate) * seconds >= 1.0 else at_last, verdict
 
 
-def _growth(scene: Scene, seconds: float) -> float:
-    """The growth rate (1/s) of the mechanism's velocities between the second and the last quarter
-    of a run of `seconds`, or between the first and the last if that is larger; that of a run that
-    diverges is infinite, that of one at rest minus infinite."""
+def growth(speed: NDArray[np.float64], seconds: float) -> float:
+    """The growth rate (1/s) of evenly spaced speeds within `seconds` between their second and last
+    quarter, or their first and last if that is larger; that of rest minus infinite."""
+    first, early, _, late = np.array_split(speed, 4)
+    if late.max() <= GONE * speed.max():
+        return -np.inf
+    rates = (
+        np.log(late.max() / since.max()) / (part * seconds)
+        for since, part in ((early, 0.5), (first, 0.75))
+    )
+    return float(max(rates))
+
+
+def _speeds(scene: Scene) -> tuple[NDArray[np.float64], int]:
+    """The largest of the mechanism's velocities at each sample of a run of LONGEST, up to its end,
+    and how many samples a whole one has."""
     with temporary_folders.room() as room:
-        experiment = simulate(open_scene.load(scene, [f"duration={seconds:.6g}"]), room)
-        if experiment.outcome.reason not in ("duration", "stop_when"):
-            return np.inf
+        experiment = simulate(open_scene.load(scene, [f"duration={LONGEST:g}"]), room)
         results = experiment.results
         signal = next(s for s in MOVING if table_of(results, s) is not None)
         table = table_of(results, signal)
@@ -108,11 +120,6 @@ def _growth(scene: Scene, seconds: float) -> float:
         speed = np.abs(table[signal]).max(axis=1)
         if not speed.any():
             raise InputFault("a run from rest shows no growth: give the scene a start off its rest")
-        first, early, _, late = np.array_split(speed, 4)
-        if late.max() <= GONE * speed.max():
-            return -np.inf
-        rates = (
-            np.log(late.max() / since.max()) / (part * seconds)
-            for since, part in ((early, 0.5), (first, 0.75))
-        )
-        return float(max(rates))
+        if experiment.outcome.reason in ("duration", "stop_when"):
+            return speed, len(speed)
+        return speed, math.ceil(LONGEST * len(speed) / max(float(table["time"][-1]), 1e-9)) + 1
