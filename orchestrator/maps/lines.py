@@ -11,7 +11,7 @@ from pathlib import Path
 from scipy.optimize import brentq
 
 from hapticlink.orchestrator.base import plugins
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability.session import Session
 from hapticlink.orchestrator.sweep.grid import Axis, Point
@@ -99,11 +99,11 @@ COLUMNS = ("at", "along", "verdict", "spectral_radius", "uncertainty", "growth_r
 
 
 def judged(session: Session, at: str, options: Sequence[str]) -> Row:
-    """The columns of a point of the kind `at`. A variant without a verdict is "refused",
-    with the reason."""
+    """The columns of a point of the kind `at`. A variant without a verdict, such as one that
+    diverges at its start, is "refused", with the reason."""
     try:
         found = session.judge(options)
-    except InputFault as fault:
+    except (InputFault, FmuFault) as fault:
         return {"at": at, "verdict": REFUSED, "message": " ".join(str(fault).split())}
     return {
         "at": at,

@@ -104,6 +104,8 @@ class Stability:
             f"{self.period:.6g} s, growth rate {self.growth:.5g} 1/s"
         )
         yield from self.where.lines()
+        if self.verdict == "unstable" and self.where.run == "rests there":
+            yield "and leaves it at the slightest push: that it rests shows no stability"
         neutral = "neutral modes"
         if self.neutral:
             most = max(min(mode.uncertainty, NEAR) for mode in self.neutral) / self.period

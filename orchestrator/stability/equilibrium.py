@@ -147,7 +147,8 @@ def _nearer(map_: LiftedMap, at: Linear, step: Vector) -> Vector:
 def _why_none(map_: LiftedMap, nearest: Linear | None, run: Trajectory, swings: bool) -> str:
     remedy = (
         "the map is linearised around a state of rest: take a hand that holds the mechanism, "
-        "such as an arm or a spring, and no wrench, drive or target that changes with time"
+        "such as an arm or a spring, gains with which it comes to rest, and no wrench, drive or "
+        "target that changes with time"
     )
     if swings:
         return (

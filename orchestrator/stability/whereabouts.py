@@ -96,8 +96,9 @@ class Whereabouts:
             )
         else:
             yield (
-                f"the run from the start does not rest there: it is nearest at {self.time:.4g} s, "
-                f"{self.nearest} away, and {self.at_end} away at its end, {self.end:.4g} s{fails}"
+                f"the run from the start has not come to rest there: it is nearest at "
+                f"{self.time:.4g} s, {self.nearest} away, and {self.at_end} away at its end, "
+                f"{self.end:.4g} s{fails}"
             )
 
 

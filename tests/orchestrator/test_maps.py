@@ -125,6 +125,21 @@ def test_a_map_is_continued_and_not_computed_again(wall: hl.Map, folder: Path) -
     assert (folder / "map.png").exists()
 
 
+def test_a_variant_that_diverges_at_its_start_is_refused_and_no_other_is_lost(
+    tmp_path: Path,
+) -> None:
+    vary = [f"{STIFFNESS}=1000,1e9,2000", f"{DAMPING}=5,10"]
+    found = hl.stability_map(
+        "virtual-wall", vary, WALL | {"hand.wrench": [1.0, 0.0, 0.0]}, out=tmp_path
+    )
+    grid = found.of("grid")
+    assert [row["verdict"] for row in grid].count("stable") == 4
+    refused = [row for row in grid if row["verdict"] == "refused"]
+    assert all(float(row[STIFFNESS]) == 1e9 for row in refused)
+    assert all("diverged" in row["message"] for row in refused)
+    assert len(refused) == 2
+
+
 def test_a_map_needs_a_key_of_numbers(tmp_path: Path) -> None:
     with pytest.raises(hl.InputFault, match="no key has two numbers"):
         hl.stability_map("virtual-wall", ["hold=zoh,foh"], out=tmp_path)

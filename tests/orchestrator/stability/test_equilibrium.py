@@ -75,7 +75,7 @@ def test_a_run_that_grows_away_is_told() -> None:
     found = hl.stability("virtual-wall", options)
     assert found.where.pose[0] == pytest.approx(2 / 6000)
     assert found.where.run == "passes"
-    assert "the run from the start does not rest there" in "\n".join(found.lines())
+    assert "the run from the start has not come to rest there" in "\n".join(found.lines())
     run = hl.run("virtual-wall", options, figures=False)
     x, time = run["virtual_mechanism.x"][:, 0], run.time("virtual_mechanism.x")
     near = x[np.argmin(np.abs(time - found.where.time))]
