@@ -54,7 +54,7 @@ from hapticlink.orchestrator.stability.harmonics import Complex, Hybrid, Scale, 
 from hapticlink.orchestrator.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.orchestrator.stability.linearise import Linear
 from hapticlink.orchestrator.stability.trajectory import trajectory
-from hapticlink.orchestrator.stability.two_port import ROUNDING, TwoPort, mixes
+from hapticlink.orchestrator.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator.system.built import built
 
 FREQUENCIES = 32
@@ -98,10 +98,10 @@ class Passivity:
 
     def lines(self) -> Iterator[str]:
         """The result as text."""
-        necessary = "" if self.needed == self.at_least else f"{max(0.0, self.at_least):.4g} to "
+        needed = between(max(0.0, self.at_least), max(0.0, self.needed))
         yield (
             f"user's port: {'passive' if self.passive else 'not passive'} for any hand; the device "
-            f"needs a damping of {necessary}{max(0.0, self.needed):.5g} N.s/m"
+            f"needs a damping of {needed} N.s/m"
             + (f" and {max(0.0, self.turning):.4g} N.m.s/rad" if self.turning else "")
             + f", it has {self.own:.4g}; least passive at {self.frequency:.4g} Hz"
         )

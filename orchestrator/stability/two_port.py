@@ -80,14 +80,19 @@ class TwoPort:
         if self.kept:
             yield f"  of the mechanism as at the equilibrium: {', '.join(self.kept)}"
         if self.needed > 0.0:
-            necessary = "" if self.needed == self.at_least else f"{self.at_least:.4g} to "
             yield (
-                f"  it takes a damping of {necessary}{self.needed:.4g} N.s/m"
+                f"  it takes a damping of {between(self.at_least, self.needed)} N.s/m"
                 + (f" and {self.turning:.3g} N.m.s/rad" if self.turning else "")
                 + f" at both ports ({max(0.0, self.hand):.4g} at the hand's, "
                 f"{max(0.0, self.mechanism):.4g} at the mechanism's whatever the other has); least "
                 f"passive at {self.frequency:.4g} Hz, nothing lacks below {self.below:.3g} Hz"
             )
+
+
+def between(necessary: float, sufficient: float) -> str:
+    """A damping, or both bounds of it where they differ."""
+    least, most = f"{necessary:.5g}", f"{sufficient:.5g}"
+    return most if least == most else f"{least} to {most}"
 
 
 def judged(
