@@ -1,24 +1,32 @@
 """Nonlinearities that a linearisation cannot follow, and what becomes of each.
 
 Quantisation and Coulomb friction are taken out: their slope is 0, or that of a joint that sticks,
-whatever the loop does. So are passivity controllers, which act by what has been. Switches stay as
-they are at the equilibrium.
+whatever the loop does. So are passivity controllers, and the friction of the hold `passive`, which
+act by what has been. Switches stay as they are at the equilibrium.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+
+import numpy as np
 
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.stability.state_vector import Coordinate
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 NEXT_TO_NOTHING = 1e-18
 """Of friction (N, N.m), which sets a stiffness by a quotient and so must not be 0."""
-DISCRETE = ("n_constrained", "deflection", "contact_deflection")
-"""States of our blocks that are a count, or the deflection of friction that is taken out."""
+DISCRETE = {
+    ("fmu", "n_constrained"),
+    ("fmu", "deflection"),
+    ("fmu", "contact_deflection"),
+    ("hold", "beta"),
+}
+"""States that are a count, or belong to friction that is taken out."""
 
 
 def without(system: System) -> tuple[System, list[str]]:
@@ -32,7 +40,21 @@ def without(system: System) -> tuple[System, list[str]]:
         set_anew = {scalar.name for scalar, _ in starts}
         others = (start for start in fmu.starts if start[0].name not in set_anew)
         fmus.append(replace(fmu, starts=(*others, *starts)))
+    for c in system.connections:
+        if _has_friction(c):
+            lines.append(f"{c.name}: the friction of hold {c.hold}, taken out")
     return replace(system, fmus=tuple(fmus)), lines
+
+
+def _has_friction(c: Connection) -> bool:
+    return c.hold is not None and issubclass(HOLDS[c.hold], Passive)
+
+
+def without_friction(holds: Iterable[object]) -> None:
+    """Takes the friction beta c out of holds `passive`: beta stays 0."""
+    for hold in holds:
+        if isinstance(hold, Passive):
+            hold.beta = np.zeros_like(hold.beta)
 
 
 def _removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:
@@ -65,7 +87,7 @@ def kept(system: System) -> list[str]:
         if any(s.port.rpartition(".")[2] == "n_constraints" for s in description.outputs):
             lines.append(f"{fmu.name}: number of constrained directions")
     for c in system.connections:
-        if c.hold and HOLDS[c.hold].needs in ("power", "spring"):
+        if c.hold and HOLDS[c.hold].needs in ("power", "spring") and not _has_friction(c):
             lines.append(f"{c.name}: the regime of hold {c.hold}")
     return [f"{line}, as at the equilibrium" for line in lines]
 
@@ -73,4 +95,4 @@ def kept(system: System) -> list[str]:
 def discrete(coordinate: Coordinate) -> bool:
     """Whether a coordinate is a switch or belongs to what is taken out."""
     variable = coordinate.variable.partition("[")[0].rpartition(".")[2]  # left.n_constrained
-    return coordinate.kind == "fmu" and variable in DISCRETE
+    return (coordinate.kind, variable) in DISCRETE

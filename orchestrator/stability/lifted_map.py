@@ -24,7 +24,7 @@ from hapticlink.orchestrator.run.bind import Binder, Bound
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.stability.closures import Closures
-from hapticlink.orchestrator.stability.frozen import discrete
+from hapticlink.orchestrator.stability.frozen import discrete, without_friction
 from hapticlink.orchestrator.stability.state_vector import Coordinate, StateVector, Vector
 from hapticlink.orchestrator.stability.tangent import SAME, Columns, Instruction, Matrix, Tangent
 from hapticlink.orchestrator.system.system import System
@@ -264,4 +264,5 @@ def opened(
         simulation = Simulation(system, results, stack)
         simulation.step_checks.clear()
         simulation.start()
+        without_friction(simulation.holds.values())
         yield LiftedMap(Plan(system), simulation, at, Tangent(simulation, closures))

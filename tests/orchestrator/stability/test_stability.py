@@ -363,3 +363,22 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert record["modes"][0]["participation"].keys() == {
         "virtual_mechanism.q[1]", "virtual_mechanism.qd[1]"
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("pspm", [False, True])
+def test_the_hold_passive_is_judged_without_its_friction(pspm: bool) -> None:
+    """As zoh; the recovery of its friction after a step back is no motion that grows."""
+    hand = {"type": "spring", "stiffness": [300.0, 300.0, 1.0], "damping": [5.0, 5.0, 0.01]}
+    options = {"graphics.rate": 64, "hand": hand | {"target": [[0.0, 0.0445, 0.0148, -0.7878]]}}
+    held: dict[str, Any] = {"hold": "passive"}
+    if pspm:
+        poses = ("virtual_mechanism.x -> controller.x_S", "virtual_mechanism.v -> controller.v_S")
+        held["holds"] = dict.fromkeys(poses, "pspm")
+    found = hl.stability("closed-loop-direct", options | held)
+    assert found.verdict == "stable"
+    assert any("the friction of hold passive, taken out" in line for line in found.frozen)
+    plain = hl.stability("closed-loop-direct", options)
+    assert found.radius == pytest.approx(plain.radius, abs=1e-6)
+    run = hl.run("closed-loop-direct", options | held | {"duration": 10.0}, figures=False)
+    speed = np.abs(run["virtual_mechanism.qd"]).max(axis=1)
+    assert speed[-64:].max() < 0.1 * speed.max()
