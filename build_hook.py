@@ -1,7 +1,7 @@
 """Build hook: compiles the event loop, and links what editable installs import.
 
 Wheels map the top-level folders through `sources` in pyproject.toml. For an editable install
-`.editable/hapticlink/` gets links to them, and to the package's own files, which are in `api/`.
+`.editable/hapticlink/` gets links to them, and to the package's own files, which are in `public/`.
 """
 
 import os
@@ -14,7 +14,9 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-FOLDERS = ("components", "fmus", "orchestrator", "scenes")
+FOLDERS = (
+    "components", "fmus", "orchestrator", "analysis", "visualization", "api", "commands", "scenes",
+)  # fmt: skip
 LOOP = Path("orchestrator", "run", "compiled")
 
 
@@ -50,7 +52,7 @@ class Build(BuildHookInterface):
         package = root / ".editable" / "hapticlink"
         package.mkdir(parents=True, exist_ok=True)
         targets = [root / name for name in FOLDERS]
-        targets += [path for path in (root / "api").iterdir() if path.is_file()]
+        targets += [path for path in (root / "public").iterdir() if path.is_file()]
         for target in targets:
             link = package / target.name
             if sys.platform == "win32" and target.is_file():

@@ -17,13 +17,13 @@ from typing import Any
 
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.figure_axes import short
-from hapticlink.orchestrator.results.real_time_figure import real_time
+from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.real_time import RealTimeRun
+from hapticlink.visualization.figures.real_time_figure import real_time
 
 SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 3
 NEVER = 2**62

@@ -7,9 +7,9 @@ import zipfile
 from pathlib import Path
 
 from benchmarks.peers.masters import SCENE, SSP
+from hapticlink.api.files import export
 from hapticlink.components.blocks import BLOCKS
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.orchestrator.api.files import export
 
 PACKAGINGS = ("native", "python", "pythonfmu")
 """C of this project's builder; its Python FMUs; a slave of pythonfmu, packed by its own builder."""

@@ -29,10 +29,10 @@ from benchmarks import state
 from benchmarks.rows import Rows
 from hapticlink.orchestrator import experiment
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.fmi import in_process, kept
+from hapticlink.orchestrator.fmi import in_process, process_cache
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.scene import blocks, find
+from hapticlink.orchestrator.scene import blocks, find_scene
 from hapticlink.orchestrator.system import costs
 from hapticlink.orchestrator.system.timeline import timeline
 
@@ -125,7 +125,7 @@ def measure(out: Path, scenes: Sequence[str], rounds: int, told: Told) -> tuple[
     """The rows of runs and of comparisons, of which those on disk are not made again."""
     rows, same = Rows(out / "runs.csv", COLUMNS, keys=3), Rows(out / "same.csv", SAME, keys=1)
     total = len(scenes) * (rounds + 1)
-    with kept.unpacked_once(), tempfile.TemporaryDirectory() as room:
+    with process_cache.unpacked_once(), tempfile.TemporaryDirectory() as room:
         for k, scene in enumerate(scenes):
             told(f"{scene}: the same results", k, total)
             if (scene,) not in same:
@@ -147,6 +147,6 @@ def bench(out: Path, quick: bool, told: Told, command: str) -> None:
     from benchmarks import skip_page  # loads Matplotlib
 
     state.begin(out, ("runs.csv", "same.csv"), hapticlink.orchestrator, hapticlink.scenes)
-    scenes = list(find.shipped())
+    scenes = list(find_scene.shipped())
     rows, same = measure(out, scenes[::6] if quick else scenes, 2 if quick else ROUNDS, told)
     skip_page.write(out, rows, same, command)

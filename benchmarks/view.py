@@ -26,14 +26,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hapticlink.orchestrator.api.real_time import RealTime
-from hapticlink.orchestrator.results.figure_axes import short
-from hapticlink.orchestrator.view.link import Link
-from hapticlink.orchestrator.view.scene import viewed
-from hapticlink.orchestrator.view.session import Session
+import hapticlink as hl
+from hapticlink.orchestrator.results.numbers import short
+from hapticlink.visualization.live.link import Link
+from hapticlink.visualization.live.mouse_hand import viewed
+from hapticlink.visualization.live.session import Session
 
 SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 5
-SERVER = "hapticlink.orchestrator.view.server"
+SERVER = "hapticlink.visualization.live.server"
 
 
 class Done(Exception):
@@ -53,7 +53,7 @@ class Measured(Session):
         with suppress(Done):
             self.run()
 
-    def _turn(self, live: RealTime) -> None:
+    def _turn(self, live: hl.RealTime) -> None:
         pace = live._run.pace
         self.ahead.append((live.time, time.time() - 1e-9 * (pace.now() - pace.c.origin)))
         if not self.before and self.acted:
@@ -65,7 +65,7 @@ class Measured(Session):
             self.after = live.report()
             raise Done
 
-    def _note_pulls(self, live: RealTime) -> None:
+    def _note_pulls(self, live: hl.RealTime) -> None:
         given = live.set
 
         def noted(name: str, value: ArrayLike) -> None:
@@ -92,7 +92,7 @@ def bench(folder: Path, quick: bool, told: Callable[[str, int, int], object], co
             root = Path(__file__).parents[1]
             driver = subprocess.Popen(dragging, cwd=root, stdout=out, text=True)
         try:
-            session = Measured(scene, link, Path(room, "made"))
+            session = Measured(scene, link, Path(room, "made"), hl.RealTime)
             session.begin(driver)
         finally:
             driver.kill()

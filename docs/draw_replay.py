@@ -12,12 +12,12 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 import hapticlink as hl
-from hapticlink.orchestrator.compare import overlay
-from hapticlink.orchestrator.compare import page as report
-from hapticlink.orchestrator.results import figures
-from hapticlink.orchestrator.results.whole_run import named
-from hapticlink.orchestrator.view import replay
-from hapticlink.orchestrator.view.recorded import Recorded
+from hapticlink.orchestrator.results.checked_run import named
+from hapticlink.visualization.compare import overlay
+from hapticlink.visualization.compare import page as report
+from hapticlink.visualization.figures import run_figures
+from hapticlink.visualization.replay import replay_page
+from hapticlink.visualization.replay.recorded_frames import Recorded
 
 OUT = Path(__file__).parents[1] / "results" / "view"
 RUNS = {"joint constraints rendered": True, "without them": False}
@@ -37,16 +37,16 @@ def main() -> None:
             options = {"graphics.rate": 10, "controller.topology": topology}
             hl.run("closed-loop", options, out=folder, figures=False)
         OUT.joinpath("figures").mkdir(exist_ok=True)
-        figures.save(figures.figures(hl.run("enclosure")), OUT / "figures")
+        run_figures.save(run_figures.figures(hl.run("enclosure")), OUT / "figures")
         over = overlay.figures(named(folders))
-        figures.save({f"compare_{name}": f for name, f in over.items()}, OUT / "figures")
+        run_figures.save({f"compare_{name}": f for name, f in over.items()}, OUT / "figures")
         runs = [Recorded(str(folder)) for folder in folders]
-        replay.write(runs, OUT / "topology.gif")
+        replay_page.write(runs, OUT / "topology.gif")
         page = started.chromium.launch(
             executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
         ).new_page()
         file = Path(room) / "page.html"
-        replay.write(runs, file)
+        replay_page.write(runs, file)
         for name, ((width, height), act) in SHOTS.items():
             page.set_viewport_size({"width": width, "height": height})
             page.goto(file.as_uri())

@@ -12,9 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import hapticlink as hl
-from hapticlink.orchestrator.commands.info import at_start, coordinates
-from hapticlink.orchestrator.results import block_diagram, mechanism_drawing, workspace
+from hapticlink.commands.info import at_start, coordinates
 from hapticlink.orchestrator.system.built import built
+from hapticlink.visualization.figures import block_diagram
+    from hapticlink.visualization.mechanism import workspace_drawing
+from hapticlink.visualization.mechanism import drawing
 
 PAGE = Path(__file__).with_name("own-linkage.md")
 PICTURES, FIGURES = (Path(__file__).with_name(name) for name in ("pictures", "figures"))
@@ -36,7 +38,7 @@ def draw(scene: str | Path) -> Path:
     with built(read) as system:
         q = coordinates(at_start(system))
     path = PICTURES / f"{Path(scene).stem}.png"
-    mechanism_drawing.figure(read, q).savefig(path, dpi=DPI, **SAME)
+    drawing.figure(read, q).savefig(path, dpi=DPI, **SAME)
     return path
 
 
@@ -54,7 +56,7 @@ def device(scene: str) -> Path:
     with built(read) as system:
         start = at_start(system)
     pose = [start[f"x[{i}]"] for i in (1, 2, 3)]
-    figure = workspace.draw(read.device, pose, f"Device and its workspace: {read.title}")
+    figure = workspace_drawing.draw(read.device, pose, f"Device and its workspace: {read.title}")
     figure.savefig(FIGURES / "device.png", dpi=90, **SAME)
     return FIGURES / "device.png"
 

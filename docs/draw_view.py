@@ -53,7 +53,7 @@ def main(names: Collection[str]) -> None:
         )
         for name in names or SHOTS:
             scene, (width, height), path = SHOTS[name]
-            command = [sys.executable, "-m", "hapticlink.orchestrator", "view", scene]
+            command = [sys.executable, "-m", "hapticlink", "view", scene]
             served = subprocess.Popen(
                 [*command, "--no-browser", "--port", "0"],
                 cwd=folder, stdout=subprocess.PIPE, text=True,

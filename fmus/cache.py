@@ -75,7 +75,7 @@ def sources(*packages: ModuleType) -> str:
     sha = hashlib.sha256()
     for package in packages:
         root = Path(next(iter(package.__path__)))
-        for path in sorted(p for p in root.rglob("*") if p.suffix in (".py", ".c", ".png")):
+        for path in sorted(p for p in root.rglob("*") if p.suffix in (".py", ".c", ".h", ".png")):
             sha.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return sha.hexdigest()
 

@@ -18,9 +18,9 @@ from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Results, Table, load, size
 from hapticlink.orchestrator.run import crash_monitor
-from hapticlink.orchestrator.run.beside import SAMPLES, beside
+from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, beside
 from hapticlink.orchestrator.run.event_loop import Outcome, Progress, run
-from hapticlink.orchestrator.run.fetched import with_fetched
+from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.open_fmus import isolated
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector

@@ -10,11 +10,11 @@ from hapticlink.orchestrator.base.faults import Finding, SceneFault
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
-from hapticlink.orchestrator.scene.find import find, folder_of
-from hapticlink.orchestrator.scene.load import from_source
+from hapticlink.orchestrator.scene.find_scene import find, folder_of
+from hapticlink.orchestrator.scene.load_scene import from_source
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
-from hapticlink.orchestrator.scene.source import Source
+from hapticlink.orchestrator.scene.scene_source import Source
 
 
 def load(scene: str | FilePath | Scene, options: Options = ()) -> Scene:

@@ -22,3 +22,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # pythonfmu is imported above from where it is installed: after a test in which FMPy runs a Python
 # FMU, it would be the copy of that FMU, whose folder is gone, and runs in this process could not
 # tell that theirs is the same.
+
+# After the settings above, which are read when NumPy is imported.
+from tests.shared_fixtures import (  # noqa: E402, F401
+    bar,
+    loop,
+    own_temporary_folder,
+    stamped,
+)

@@ -9,8 +9,9 @@ from pathlib import Path
 
 RUNNER = """
 import json, os, shlex, sys
-import hapticlink.orchestrator.experiment, hapticlink.orchestrator.results.figures  # once for all
-from hapticlink.orchestrator.commands import main
+# Once for all.
+import hapticlink.orchestrator.experiment, hapticlink.visualization.figures.run_figures
+from hapticlink.commands import main
 for line in json.load(sys.stdin):
     with open("said", "w+") as said:
         child = os.fork()

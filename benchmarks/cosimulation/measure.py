@@ -14,7 +14,7 @@ from benchmarks.cosimulation.points import Point
 from benchmarks.rows import Rows
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.fmi import kept
+from hapticlink.orchestrator.fmi import process_cache
 
 SETTINGS = tuple(f.name for f in fields(Point))
 COLUMNS = (*SETTINGS, "round", "run_s", "first_mm", "max_mm", "rms_mm", "end", "end_s")
@@ -53,7 +53,7 @@ def measure(
     """Run what `path` lacks. All points of a round come before the next round, so that a busy
     machine slows all of them alike; a refused point is not asked again."""
     rows = Rows(path, COLUMNS, keys=len(SETTINGS) + 1)
-    with kept.unpacked_once(), tempfile.TemporaryDirectory() as room:
+    with process_cache.unpacked_once(), tempfile.TemporaryDirectory() as room:
         for number in range(rounds):
             for k, point in enumerate(points):
                 told(str(point), number * len(points) + k, rounds * len(points))

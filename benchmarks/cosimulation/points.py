@@ -9,7 +9,7 @@ from itertools import product
 from benchmarks.continuous import CONTINUOUS, DETECTED, GRID
 from hapticlink.components.integrators import METHODS
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.study import design
+from studies.mismatch import design
 
 LOOP, CONTACT = "closed-loop", "obstacles"
 STUDY = design.REFERENCE

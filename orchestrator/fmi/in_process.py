@@ -21,7 +21,7 @@ import numpy as np
 from fmpy import fmi2
 
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi import kept, messages, python_libraries
+from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
@@ -54,7 +54,7 @@ class InProcess(WithStates):
     def _load(self) -> None:
         before = os.getcwd()
         try:
-            self._folder = kept.unpack(self.description, self._folder)
+            self._folder = process_cache.unpack(self.description, self._folder)
             self.slave = self._instantiate()
         except Exception as error:  # FMPy raises bare Exception
             said = str(error)
@@ -314,4 +314,4 @@ class InProcess(WithStates):
             messages.closed(self._key)
             # pythonfmu puts resources/ on sys.path for good.
             sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]
-            kept.leave(self._folder)
+            process_cache.leave(self._folder)

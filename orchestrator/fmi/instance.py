@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import Diverged, Fault, FmuFault
-from hapticlink.orchestrator.fmi.bounds import Bounds
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.place import Place
+from hapticlink.orchestrator.fmi.instance_location import Place
+from hapticlink.orchestrator.fmi.output_bounds import Bounds
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:  # a worker process need not load what reads scenes

@@ -9,7 +9,7 @@ from typing import Any
 
 from hapticlink.orchestrator.fmi.capabilities import STATE, VARIABLE_STEP
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.place import Place
+from hapticlink.orchestrator.fmi.instance_location import Place
 from hapticlink.orchestrator.fmi.status import DISCARD, WARNING
 
 HALVINGS = 10

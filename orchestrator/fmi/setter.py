@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.fmi.place import Place
+from hapticlink.orchestrator.fmi.instance_location import Place
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.units import SAME, Linear
 

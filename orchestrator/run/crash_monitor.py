@@ -43,7 +43,7 @@ def watched(folder: Path) -> Iterator[None]:
 def record_crash(folder: Path, process: int) -> None:
     """Records in run.json that the run with the given process ID has crashed, and removes its
     temporary folders. Without a row of that run, only prints a message."""
-    from hapticlink.orchestrator.results.figure_axes import last_time
+    from hapticlink.orchestrator.results.numbers import last_time
     from hapticlink.orchestrator.results.recover import recover
     from hapticlink.orchestrator.results.tables import load
 

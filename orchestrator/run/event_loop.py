@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Inte
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import Delay, delays
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.bind import Stop
+from hapticlink.orchestrator.run.bind_operations import Stop
 from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.machine import too_long

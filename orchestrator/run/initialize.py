@@ -14,10 +14,10 @@ import numpy as np
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.results.summary import outside
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.solvers import Matrix, Newton, Vector
+from hapticlink.orchestrator.scene.start_pose import outside
 from hapticlink.orchestrator.system.system import System
 
 SWEEPS = 50

@@ -9,7 +9,7 @@ from typing import Protocol
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Event, Firing
 from hapticlink.orchestrator.plan.plan import Moment
-from hapticlink.orchestrator.run.beside import Side
+from hapticlink.orchestrator.run.concurrent_fmus import Side
 from hapticlink.orchestrator.run.pace import Pace
 
 PATIENCE = 20_000_000

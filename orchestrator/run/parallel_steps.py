@@ -10,8 +10,8 @@ from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 
 from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Operation, Set, Step
-from hapticlink.orchestrator.run.beside import Collect
-from hapticlink.orchestrator.run.metered import Feed, Metering
+from hapticlink.orchestrator.run.concurrent_fmus import Collect
+from hapticlink.orchestrator.run.metered_operations import Feed, Metering
 
 
 @dataclass(frozen=True)

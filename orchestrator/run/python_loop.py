@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import Event, Part
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.run.bind import Binder, Bound
+from hapticlink.orchestrator.run.bind_operations import Binder, Bound
 from hapticlink.orchestrator.run.fixed_point import Iterations, total
 from hapticlink.orchestrator.run.paced_events import PacedEvents, Points
 from hapticlink.orchestrator.run.simulation import Call, Simulation

@@ -9,8 +9,8 @@ from typing import Any
 
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.run import beside
-from hapticlink.orchestrator.run.beside import ThreadWorker, Worker
+from hapticlink.orchestrator.run import concurrent_fmus
+from hapticlink.orchestrator.run.concurrent_fmus import ThreadWorker, Worker
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.simulation import Simulation
@@ -48,9 +48,9 @@ class RealTimeRun:
         """Context of the run of a simulation, which has no loop yet; threads end with it."""
         self._simulation = simulation
         simulation.pace = self.pace
-        simulation.beside, self._in_loop = beside.beside(plan)
+        simulation.beside, self._in_loop = concurrent_fmus.beside(plan)
         now = self.pace.now
-        simulation.sides = beside.sides(plan, simulation.beside, now, self._worker)
+        simulation.sides = concurrent_fmus.sides(plan, simulation.beside, now, self._worker)
         try:
             yield
         finally:

@@ -12,7 +12,7 @@ from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.beside import COLUMNS, SAMPLES, Side
+from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meters import Meters
 from hapticlink.orchestrator.run.initialize import initialize

@@ -8,9 +8,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
-from hapticlink.orchestrator.scene import drop as dropping
+from hapticlink.orchestrator.scene import dropped_keys as dropping
 from hapticlink.orchestrator.scene import families, toml_keys
-from hapticlink.orchestrator.scene.find import find, folder_of
+from hapticlink.orchestrator.scene.find_scene import find, folder_of
 from hapticlink.orchestrator.scene.overrides import told
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml import loads

@@ -41,7 +41,7 @@ from hapticlink.orchestrator.scene.records import (
     StepControl,
     Wire,
 )
-from hapticlink.orchestrator.scene.source import Origin, Source
+from hapticlink.orchestrator.scene.scene_source import Origin, Source
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 

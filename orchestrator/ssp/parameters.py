@@ -18,7 +18,7 @@ from urllib.parse import unquote
 from xml.etree.ElementTree import Element, tostring
 
 from hapticlink.orchestrator.base.faults import SHOWN, InputFault
-from hapticlink.orchestrator.base.say import printable
+from hapticlink.orchestrator.base.terminal_output import printable
 from hapticlink.orchestrator.fmi.archive import read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
 from hapticlink.orchestrator.ssp.connections import Reach, Wires

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.fmi.kept import described
+from hapticlink.orchestrator.fmi.process_cache import described
 from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.records import Wire

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from hapticlink.orchestrator.base.faults import near
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
-from hapticlink.orchestrator.fmi.kinds import misfit
+from hapticlink.orchestrator.fmi.kind_check import misfit
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene

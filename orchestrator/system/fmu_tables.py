@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.fmi.description import Description, describe
-from hapticlink.orchestrator.fmi.kept import described
+from hapticlink.orchestrator.fmi.process_cache import described
 from hapticlink.orchestrator.fmi.start_values import Starts, fitting
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import ForeignFmu, Value

@@ -15,7 +15,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.capabilities import takes_input_derivatives
-from hapticlink.orchestrator.fmi.kinds import MATRICES
+from hapticlink.orchestrator.fmi.kind_check import MATRICES
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.system.system import Connection, System
 

@@ -21,8 +21,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from hapticlink.orchestrator import api as api  # casadi and all: once, not in every process
-from hapticlink.orchestrator import commands
+from hapticlink import commands
 from hapticlink.orchestrator.base import internal_error
 
 ENOUGH = 0.5

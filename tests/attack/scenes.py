@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hapticlink.orchestrator.scene import find, overrides
+from hapticlink.orchestrator.scene import find_scene, overrides
 from tests.attack import mutations
 from tests.attack.cases import Made, command
 from tests.attack.commands import Place
@@ -31,7 +31,7 @@ def written(tables: dict[str, Any]) -> str:
 def cases(number: int, seed: int) -> Iterator[tuple[str, str, bytes]]:
     """Kind, what was changed, and the scene's file."""
     draw = random.Random(seed)
-    scenes = {name: find.find(name)[1] for name in find.shipped()}
+    scenes = {name: find_scene.find(name)[1] for name in find_scene.shipped()}
     for i in range(number):
         kind = KINDS[i % 6] if i % 6 < len(KINDS) else "values"
         name = draw.choice([*SMALL, *SMALL, *scenes])

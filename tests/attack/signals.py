@@ -25,7 +25,7 @@ from hapticlink.orchestrator.results import tables
 from tests.attack.cases import Made, command
 
 MARK = "HAPTICLINK_ATTACK"
-COMMAND = [sys.executable, "-m", "hapticlink.orchestrator", "run", "closed-loop"]
+COMMAND = [sys.executable, "-m", "hapticlink", "run", "closed-loop"]
 KINDS = {
     "in process": [],
     "isolated": ["--set", "isolate=true"],

@@ -16,7 +16,7 @@ from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 
-from hapticlink.orchestrator import api
+import hapticlink as hl
 from tests.attack import mutations
 from tests.attack.cases import Made, command
 from tests.attack.commands import Place
@@ -116,7 +116,7 @@ def attack(number: int, seed: int) -> Iterator[Made]:
     draw = random.Random(seed)
     with tempfile.TemporaryDirectory(prefix="attack-") as folder:
         whole = [
-            api.export(name, {"duration": 0.05}, out=Path(folder) / f"{name}.ssp").read_bytes()
+            hl.export(name, {"duration": 0.05}, out=Path(folder) / f"{name}.ssp").read_bytes()
             for name in SCENES
         ]
         place = Place(Path(folder))

@@ -19,10 +19,10 @@ import jsonschema
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.commands import COMMANDS, _commands, app
+from hapticlink.analysis.sweep.grid import grid, parse
+from hapticlink.commands import COMMANDS, _commands, app
 from hapticlink.orchestrator.plan import schemes  # noqa: F401 (registers the schemes)
 from hapticlink.orchestrator.scene.json_schema import json_schema
-from hapticlink.orchestrator.sweep.grid import grid, parse
 from tests.docs.pages import PAGES, ROOT, Block, blocks, name, prose
 from tests.plugins import hapticlink
 
@@ -40,14 +40,14 @@ NOT_RUN = {
     "--vary fmu.wall.start.damping=0.5..60.5:9 --vary fmu.wall.start.stiffness=200..12200:9 "
     "--vary haptics.rate=512,1024 --vary 'holds.\"wall.F\"=zoh,foh' "
     "--vary 'delays.\"wall.F\"=0,0.001953125' --check 180 --seed 1 --out results/stability/wall":
-        "700 points; tests/orchestrator/test_maps.py",
+        "700 points; tests/analysis/maps/test_maps.py",
     "hapticlink tune closed-loop --set sensing=encoders":
-        "takes minutes; tests/orchestrator/test_tune.py",
+        "takes minutes; tests/analysis/tune/test_tune.py",
     "hapticlink tune enclosure --set sensing=encoders --margin 2 --out tuned/enclosure":
-        "takes minutes; tests/orchestrator/test_tune.py",
+        "takes minutes; tests/analysis/tune/test_tune.py",
     "hapticlink --install-completion":
-        "writes to the files of the user's shell; tests/orchestrator/commands/test_options.py",
-    "hapticlink study": "thousands of runs; tests/orchestrator/study/test_study.py",
+        "writes to the files of the user's shell; tests/commands/test_options.py",
+    "hapticlink study": "thousands of runs; tests/studies/mismatch/test_study.py",
     "hapticlink reproduce": "its runs: tests/reference/test_closed_loop.py",
     "hapticlink bench mechanism": "needs other codes",
     "hapticlink bench singular": "is long",
@@ -63,13 +63,13 @@ NOT_RUN = {
     "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
         "compiles for minutes; tests/orchestrator/scene/test_packaging.py",
     "hapticlink sweep closed-loop --vary graphics.rate=10..60 --scheduler tcp://10.0.0.5:8786":
-        "needs a cluster; tests/orchestrator/sweep/test_sweep.py",
+        "needs a cluster; tests/analysis/sweep/test_sweep.py",
     "hapticlink run their.ssp --set haptics.rate=100 --set duration=10 --set fmu.engine.rate=20":
         "is of somebody else's file; tests/orchestrator/ssp/test_ssp.py",
 }  # fmt: skip
 """Commands that are parsed, with their scene, keys and values, but not run; the reason."""
 UNTIL_STOPPED = re.compile("hapticlink view (?!.*--export)")
-"""Commands that run until Ctrl-C, parsed but not run; tests/orchestrator/view."""
+"""Commands that run until Ctrl-C, parsed but not run; tests/visualization/live."""
 TOOLS = ("fmpy", "pythonfmu")
 """Commands of other packages, which are installed beside Python."""
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.scene import extends, find, schema
+from hapticlink.orchestrator.scene import extends, find_scene, schema
 from hapticlink.orchestrator.scene.rates import Exact
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -66,12 +66,12 @@ def entries(kind: Any, value: Any, path: tuple[str | int, ...]) -> Iterator[Numb
             yield Number(path, (i, *number.place), value, number.quantity, number.whole)
 
 
-SCENES = tuple(find.shipped())
+SCENES = tuple(find_scene.shipped())
 
 
 @cache
 def document(name: str) -> dict[str, Any]:
-    return extends.document(find.find(name)[1], name, None)[0]
+    return extends.document(find_scene.find(name)[1], name, None)[0]
 
 
 def tables(name: str) -> dict[str, Any]:

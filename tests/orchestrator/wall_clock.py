@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from hapticlink.orchestrator.run.beside import Job
+from hapticlink.orchestrator.run.concurrent_fmus import Job
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 
 MS = 1_000_000

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tracking import tracking
 
 
 @pytest.fixture(scope="module")

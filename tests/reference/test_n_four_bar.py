@@ -17,9 +17,9 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipkinc
 
+from hapticlink.commands import main
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.commands import main
 from tests.blocks import Running
 
 G = 9.81

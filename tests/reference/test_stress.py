@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from benchmarks import stress
-from tests.orchestrator.conftest import status
+from tests.shared_fixtures import status
 
 CASES = stress.cases()
 

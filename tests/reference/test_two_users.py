@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.components.blocks.virtual_environment import virtual_environment
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Mechanism
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.user_port import user_port
 from tests.blocks import Running
 from tests.reference.absolute_coordinates import Absolute
 

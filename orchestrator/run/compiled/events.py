@@ -10,9 +10,9 @@ import numpy as np
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Event, Firing
-from hapticlink.orchestrator.run.beside import Side
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.machine import PATIENCE, Machine
+from hapticlink.orchestrator.run.concurrent_fmus import Side
 from hapticlink.orchestrator.run.pace import Pace
 
 WINDOW = 4096

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Get, Push, Set, Step
-from hapticlink.orchestrator.run.beside import Collect
-from hapticlink.orchestrator.run.bind import Instruction
+from hapticlink.orchestrator.run.bind_operations import Instruction
 from hapticlink.orchestrator.run.compiled.holds import parts
-from hapticlink.orchestrator.run.metered import Read
+from hapticlink.orchestrator.run.concurrent_fmus import Collect
+from hapticlink.orchestrator.run.metered_operations import Read
 from hapticlink.orchestrator.run.parallel_steps import Finish
 from hapticlink.orchestrator.run.simulation import Simulation
 

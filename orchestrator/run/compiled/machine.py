@@ -23,7 +23,7 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
-from hapticlink.orchestrator.run.bind import Bound, Instruction, Stop
+from hapticlink.orchestrator.run.bind_operations import Bound, Instruction, Stop
 from hapticlink.orchestrator.run.compiled import fmus, in_python, structures
 from hapticlink.orchestrator.run.compiled.holds import (
     CompiledHold,
@@ -36,7 +36,7 @@ from hapticlink.orchestrator.run.compiled.holds import (
 from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
-from hapticlink.orchestrator.run.metered import Feed, Move, Read, Sample
+from hapticlink.orchestrator.run.metered_operations import Feed, Move, Read, Sample
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from hapticlink.orchestrator.fmi.place import Place
+from hapticlink.orchestrator.fmi.instance_location import Place
 from hapticlink.orchestrator.run.compiled.build import HERE
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.S)

@@ -223,7 +223,7 @@ def test_an_installed_plugin(tmp_path: Path) -> None:
     (site / "my_parts" / "holds.py").write_text(
         HOLD.format(name="mine")
         + """
-from hapticlink.orchestrator.commands import COMMANDS
+from hapticlink.commands import COMMANDS
 
 def greet() -> int:
     print("good day")

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.orchestrator.conftest import status
 from tests.orchestrator.foreign_fmus import c_fmu3, python_fmu, run, scene, stair_fmu
+from tests.shared_fixtures import status
 
 STAIR = '[[fmu]]\nname = "stair"\npath = "stair.fmu"\nrate = {}\n'
 BESIDE = '[[fmu]]\nname = "beside"\npath = "Beside.fmu"\n'

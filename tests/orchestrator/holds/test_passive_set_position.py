@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import hapticlink as hl
+from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.results.tracking import tracking
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.built import built

@@ -11,7 +11,7 @@ import pytest
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.conftest import status
+from tests.shared_fixtures import status
 
 
 def test_explain_tells_blocks_and_the_samples_behind_inputs(

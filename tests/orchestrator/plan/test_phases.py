@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hapticlink.analysis.sweep.job import jobs
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.sweep.job import jobs
 from hapticlink.orchestrator.system.timeline import timeline
-from tests.orchestrator.conftest import sets, status
+from tests.shared_fixtures import sets, status
 
 
 @given(st.sampled_from([(1, 4), (1, 2), (3, 4), (1, 1)]), st.sampled_from(["haptics", "graphics"]))

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import summary
 from hapticlink.orchestrator.results.tables import Table
 
 TOUCHED = "duration=0.6"

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.event_loop import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged
-from hapticlink.orchestrator.scene.load import read
+from hapticlink.orchestrator.scene.load_scene import read
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.scene.scene import Scene
 from tests.orchestrator.coupled import (

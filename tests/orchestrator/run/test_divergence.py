@@ -6,8 +6,8 @@ import pytest
 
 from hapticlink.orchestrator.base.faults import Diverged
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.conftest import status
 from tests.orchestrator.foreign_fmus import SLAVE, python_fmu, python_fmu_of, run, with_units
+from tests.shared_fixtures import status
 
 ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
 

@@ -12,8 +12,8 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.conftest import status
 from tests.orchestrator.foreign_fmus import SLAVE, c_fmu, python_fmu_of, run, scene
+from tests.shared_fixtures import status
 
 ONE = '[[fmu]]\nname = "one"\npath = "faults.fmu"\n'
 

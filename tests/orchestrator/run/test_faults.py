@@ -237,7 +237,7 @@ def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path: Path) ->
 
 # --- the commands from outside ------------------------------------------------------------
 
-COMMAND = [sys.executable, "-c", "from hapticlink.orchestrator.commands import main; main()"]
+COMMAND = [sys.executable, "-c", "from hapticlink.commands import main; main()"]
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
@@ -261,7 +261,7 @@ def test_threads_that_an_fmu_leaves_running_keep_no_process(tmp_path: Path, comm
     arguments = [command.split()[0], str(path), "--out", str(tmp_path / "out")]
     arguments += ["--vary", "duration=0.1,0.2", "--jobs", "2"] if command == "sweep" else []
     ended = subprocess.run(
-        [sys.executable, "-m", "hapticlink.orchestrator", *arguments],
+        [sys.executable, "-m", "hapticlink", *arguments],
         capture_output=True, timeout=60, text=True, check=False,
     )  # fmt: skip
     assert (ended.returncode, ended.stderr) == (0, "")

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.results import summary
 from tests.orchestrator.foreign_fmus import python_fmu, scene
 
 SCENE, SHORT = "closed-loop", ("duration=0.5",)

@@ -23,9 +23,9 @@ from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from tests.orchestrator import coupled
-from tests.orchestrator.conftest import status
 from tests.orchestrator.holds.test_order_of_accuracy import error, growth
 from tests.orchestrator.native_mass import FLAGS, native
+from tests.shared_fixtures import status
 
 Fmus = Mapping[str, Description]
 

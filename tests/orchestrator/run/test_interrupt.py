@@ -20,7 +20,7 @@ from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
-COMMAND = [sys.executable, "-m", "hapticlink.orchestrator"]
+COMMAND = [sys.executable, "-m", "hapticlink"]
 ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
 ISOLATED = "isolate = true\n"
 
@@ -50,7 +50,7 @@ def test_a_signal_before_the_run_says_so(bar: Path, tmp_path: Path) -> None:
         "    os.kill(os.getpid(), signal.SIGINT)\n"
         "    return load(*a)\n"
         "s.load = interrupted\n"
-        "from hapticlink.orchestrator.__main__ import main\n"
+        "from hapticlink.__main__ import main\n"
         "import sys\n"
         f"sys.argv = ['hapticlink', 'run', {str(bar)!r}, '--out', {str(tmp_path / 'out')!r}]\n"
         "main()"

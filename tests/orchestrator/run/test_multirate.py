@@ -18,6 +18,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from hapticlink.analysis.stability.equilibrium import equilibrium
+from hapticlink.analysis.stability.lifted_map import opened
+from hapticlink.analysis.stability.modes import modes
+from hapticlink.analysis.stability.switching import joint_spectral_radius
+from hapticlink.analysis.stability.trajectory import trajectory
+from hapticlink.analysis.stability.varying_rate import edges_of
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.frames import Frames
@@ -27,12 +33,6 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
-from hapticlink.orchestrator.stability.equilibrium import equilibrium
-from hapticlink.orchestrator.stability.lifted_map import opened
-from hapticlink.orchestrator.stability.modes import modes
-from hapticlink.orchestrator.stability.switching import joint_spectral_radius
-from hapticlink.orchestrator.stability.trajectory import trajectory
-from hapticlink.orchestrator.stability.varying import edges_of
 from hapticlink.orchestrator.system.system import Fmu, System
 from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed

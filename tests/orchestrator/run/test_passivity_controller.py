@@ -11,13 +11,13 @@ import pytest
 from scipy.optimize import least_squares
 
 import hapticlink as hl
+from hapticlink.analysis.stability import wall_limits
 from hapticlink.components.blocks.controller import controller
 from hapticlink.components.device.encoder_count import count_energies
 from hapticlink.components.device.pantograph import base_angles, dynamics
 from hapticlink.components.device.torques import numbers
 from hapticlink.components.specs.control import Controller, Passivity
 from hapticlink.components.specs.device import Device
-from hapticlink.orchestrator.stability import wall_limits
 from tests.blocks import Running
 
 MASS, T = 0.3, 1 / 512

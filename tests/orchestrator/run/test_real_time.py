@@ -14,18 +14,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import summary
-from hapticlink.orchestrator.results.figures import figures
-from hapticlink.orchestrator.results.real_time_figure import exceedance
 from hapticlink.orchestrator.results.tables import read_table
-from hapticlink.orchestrator.run import beside, pace
+from hapticlink.orchestrator.run import concurrent_fmus, pace
 from hapticlink.orchestrator.run.compiled.library import CHOICE
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.real_time import RealTimeRun
-from tests.orchestrator.conftest import LOOPS
+from hapticlink.visualization.figures.real_time_figure import exceedance
+from hapticlink.visualization.figures.run_figures import figures
 from tests.orchestrator.foreign_fmus import python_fmu, scene
 from tests.orchestrator.wall_clock import MS, WallClock
+from tests.shared_fixtures import LOOPS
 
 HAPTIC, GRAPHICS = Fraction(1, 512), Fraction(1, 60)
 FAST = ("duration=0.3", "graphics.rate=60")
@@ -181,7 +181,7 @@ def test_an_fmu_that_hangs_beside_the_loop_is_named(
     tmp_path: Path, loop: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is in its step when the run ends, and is not called again; the loop went on meanwhile."""
-    monkeypatch.setattr(beside, "GRACE", 0.01)
+    monkeypatch.setattr(concurrent_fmus, "GRACE", 0.01)
     go = tmp_path / "go"
     hang = f"while not __import__('os').path.exists({str(go)!r}): __import__('time').sleep(0.01)"
     path = beside_the_loop(tmp_path, hang, timeout=0.3)

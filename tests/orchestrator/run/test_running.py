@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.orchestrator.results import summary, tables
-from tests.orchestrator.conftest import status
+from hapticlink.analysis.findings import summary
+from hapticlink.orchestrator.results import tables
 from tests.orchestrator.foreign_fmus import python_fmu, run, scene
+from tests.shared_fixtures import status
 
-COMMAND = [sys.executable, "-m", "hapticlink.orchestrator"]
+COMMAND = [sys.executable, "-m", "hapticlink"]
 ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
 SHORT = ("--set", "duration=0.2")
 ROCKER = "linkage.start.rocker=2.9"

@@ -19,9 +19,9 @@ from hapticlink.orchestrator.run.event_loop import Outcome
 from hapticlink.orchestrator.run.step_control import rounded
 from hapticlink.orchestrator.scene.records import StepControl
 from hapticlink.orchestrator.system.system import System
-from tests.orchestrator.conftest import clock
 from tests.orchestrator.coupled import POWER, ROWS, described, error, simulate, system
 from tests.orchestrator.native_mass import held
+from tests.shared_fixtures import clock
 
 Fmus = Mapping[str, Description]
 BASE = Fraction(1, 50000)

@@ -9,8 +9,8 @@ import pytest
 from scipy.linalg import expm
 
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.conftest import status
 from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
+from tests.shared_fixtures import status
 
 GAIN = PAIR.replace("takes.u", "takes.gain")
 

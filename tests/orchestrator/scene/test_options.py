@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.scene import overrides
-from hapticlink.orchestrator.scene.find import shipped
-from tests.orchestrator.conftest import BAR
+from hapticlink.orchestrator.scene.find_scene import shipped
+from tests.shared_fixtures import BAR
 
 SCALARS = (
     st.booleans()

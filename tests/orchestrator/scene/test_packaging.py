@@ -10,7 +10,7 @@ import pytest
 from hapticlink.fmus.native import compiler, host_platform
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.conftest import sets, status
+from tests.shared_fixtures import sets, status
 
 SHORT = ("duration=0.2", "graphics.rate=60")
 NATIVE = (*SHORT, "packaging=native")

@@ -6,7 +6,7 @@ from hapticlink.components.specs.hand import SpringHand
 from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
-from hapticlink.orchestrator.scene import find, load
+from hapticlink.orchestrator.scene import find_scene, load_scene
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.toml_keys import key_lines
 
@@ -42,13 +42,13 @@ wrench = [
 
 def findings(text: str, *options: str) -> dict[str, tuple[int | None, str]]:
     with pytest.raises(SceneFault) as refused:
-        load.read(text, options)
+        load_scene.read(text, options)
     assert refused.value.exit_status == 2
     return {f.key: (f.line, f.message) for f in refused.value.findings}
 
 
 def test_a_good_scene_is_read() -> None:
-    scene = load.read(GOOD)
+    scene = load_scene.read(GOOD)
     assert scene.hand is not None
     assert scene.hand.type == "constant"
     assert scene.ends_when == "haptic_device.workspace_margin < 0"
@@ -60,10 +60,10 @@ def test_a_path_is_rows_or_a_sine_which_replaces_them_in_a_scene_that_extends(tm
     (tmp_path / "base.toml").write_text(GOOD[: GOOD.index("[hand]")] + rows)
     sine = "target = { amplitude = [0.1, 0.0, 0.0], frequency = [2.0, 1.0, 0.0] }\n"
     text = 'title = "t"\nextends = "base.toml"\n[hand]\n'
-    scene = load.read(text + sine, folder=tmp_path)
+    scene = load_scene.read(text + sine, folder=tmp_path)
     assert isinstance(scene.hand, SpringHand)
     assert scene.hand.target == PoseSine(amplitude=(0.1, 0.0, 0.0), frequency=(2.0, 1.0, 0.0))
-    scene = load.read(text + 'interpolation = "spline"\n', folder=tmp_path)
+    scene = load_scene.read(text + 'interpolation = "spline"\n', folder=tmp_path)
     assert isinstance(scene.hand, SpringHand)
     assert scene.hand.interpolation == "spline"
     found = findings(GOOD[: GOOD.index("[hand]")] + hand + sine.replace("2.0", "-2.0"))
@@ -114,7 +114,7 @@ def test_options_change_the_scene_and_are_named_in_faults() -> None:
         "linkage.body.bar.mass=2.5",
         "title=two words",
     ]
-    scene = load.read(GOOD, options)
+    scene = load_scene.read(GOOD, options)
     assert scene.controller is not None
     assert scene.controller.topology is False
     assert scene.graphics is not None
@@ -123,29 +123,29 @@ def test_options_change_the_scene_and_are_named_in_faults() -> None:
     assert scene.linkage.body[0].mass == 2.5
     assert scene.title == "two words"
     with pytest.raises(SceneFault) as refused:
-        load.read(GOOD, ["linkage.body.0.mass=-1", "sensing=encoder"])
+        load_scene.read(GOOD, ["linkage.body.0.mass=-1", "sensing=encoder"])
     told = str(refused.value)
     assert "--set linkage.body.0.mass=-1: linkage.body[0] (bar).mass" in told
     with pytest.raises(SceneFault, match=r"--set duration.x=1: duration: \{'x': 1\} should be"):
-        load.read(GOOD, ["duration.x=1"])
+        load_scene.read(GOOD, ["duration.x=1"])
     assert "--set sensing=encoder: sensing: 'encoder' should be 'ideal' or 'encoders'" in told
 
 
 @pytest.mark.parametrize("option", ["novalue", "=3", "linkage.body.bax.mass=1"])
 def test_options_that_cannot_be_applied(option: str) -> None:
     with pytest.raises(InputFault, match=f"--set {option}"):
-        load.read(GOOD, [option])
+        load_scene.read(GOOD, [option])
 
 
 def test_sensing_reaches_the_device() -> None:
-    device = load.read(GOOD, ["sensing=encoders"]).device
+    device = load_scene.read(GOOD, ["sensing=encoders"]).device
     assert device is not None
     assert device.sensing == "encoders"
 
 
 def test_every_shipped_scene_is_good_and_found_by_name() -> None:
-    assert "closed-loop" in find.shipped()
-    for name in find.shipped():
+    assert "closed-loop" in find_scene.shipped()
+    for name in find_scene.shipped():
         assert open_scene.load(name).title
     with pytest.raises(InputFault, match="did you mean 'closed-loop'"):
         open_scene.load("closed-lop")
@@ -153,7 +153,7 @@ def test_every_shipped_scene_is_good_and_found_by_name() -> None:
 
 def test_not_toml() -> None:
     with pytest.raises(SceneFault, match="line 1, column"):
-        load.read("title = =")
+        load_scene.read("title = =")
 
 
 def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:
@@ -168,7 +168,7 @@ def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:
 
 def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
     base, top = tmp_path / "base.toml", tmp_path / "top.toml"
-    base.write_text(find.find("closed-loop")[1])
+    base.write_text(find_scene.find("closed-loop")[1])
     top.write_text(f'extends = "{base}"\nduration = 1.0\n[hand]\nwrench = [1.0, 0.0, 0.0]\n')
     scene = open_scene.load(str(top))
     assert scene.duration == 1.0

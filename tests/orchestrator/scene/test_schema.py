@@ -14,11 +14,17 @@ from typing import Any
 import jsonschema
 import pytest
 
-from hapticlink.orchestrator.scene import find, key_descriptions, load, reference, schema
+from hapticlink.orchestrator.scene import (
+    find_scene,
+    key_descriptions,
+    load_scene,
+    reference,
+    schema,
+)
 from hapticlink.orchestrator.scene.json_schema import json_schema
 from hapticlink.orchestrator.scene.scene import Scene
-from tests.orchestrator.conftest import status
 from tests.orchestrator.scene.test_scene import GOOD
+from tests.shared_fixtures import status
 
 ROOT = Path(__file__).parents[3]
 SCHEMA = jsonschema.Draft202012Validator(json_schema())
@@ -31,9 +37,9 @@ def test_the_command_prints_a_valid_schema(capsys: pytest.CaptureFixture[str]) -
     assert printed == json.loads(json.dumps(json_schema()))
 
 
-@pytest.mark.parametrize("name", find.shipped())
+@pytest.mark.parametrize("name", find_scene.shipped())
 def test_shipped_scenes_follow_it(name: str) -> None:
-    SCHEMA.validate(tomllib.loads(find.find(name)[1]))
+    SCHEMA.validate(tomllib.loads(find_scene.find(name)[1]))
 
 
 @pytest.mark.parametrize(
@@ -55,7 +61,7 @@ def test_every_way_to_write_a_key_follows_it(more: str) -> None:
     text = f"{more}\n{text.replace('[graphics]', '')}" if "graphics" in more else f"{more}\n{text}"
     if more.startswith("controller"):
         text = text.replace("[controller]\n", "")
-    load.read(text)
+    load_scene.read(text)
     SCHEMA.validate(tomllib.loads(text))
 
 

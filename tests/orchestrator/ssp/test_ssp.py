@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd
 
-from hapticlink.orchestrator import api, open_scene
+import hapticlink as hl
+from hapticlink.commands import main
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
-from hapticlink.orchestrator.commands import main
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.fmi.test_archives import SSD
 from tests.orchestrator.foreign_fmus import (
@@ -166,7 +167,7 @@ def test_with_the_cache_off_no_folder_stays(tmp_path: Path) -> None:
     path = foreign(tmp_path)
     (tmp_path / "temporary").mkdir()
     code = (
-        "from hapticlink.orchestrator.commands import main; import sys; "
+        "from hapticlink.commands import main; import sys; "
         f"main(['run', {path!r}, '--out', {str(tmp_path / 'out')!r}, "
         "'--set', 'haptics.rate=50', '--set', 'duration=0.1'])"
     )
@@ -231,5 +232,5 @@ def test_a_start_that_no_ssp_can_hold_is_refused(tmp_path: Path) -> None:
     c_fmu3(tmp_path)
     source = scene(tmp_path, SIZES.replace("size = 3", "in_Int64 = 2147483648, size = 3"))
     with pytest.raises(InputFault, match=r"start\.in_Int64: 2147483648: integers of an SSP"):
-        api.export(source, out=tmp_path / "made.ssp")
+        hl.export(source, out=tmp_path / "made.ssp")
     assert not (tmp_path / "made.ssp").exists()

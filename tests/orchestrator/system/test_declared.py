@@ -19,8 +19,8 @@ from hapticlink.orchestrator.system.assemble import from_scene
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
-from tests.orchestrator.conftest import sets, status
 from tests.orchestrator.foreign_fmus import python_fmu, python_fmu_of, run, scene, with_units
+from tests.shared_fixtures import sets, status
 
 
 def system(path: object, folder: Path, *options: str) -> System:

@@ -9,9 +9,9 @@ import pytest
 from pythonfmu.builder import FmuBuilder
 
 import hapticlink as hl
+from hapticlink.commands.options import options
 from hapticlink.orchestrator.base.faults import SceneFault
-from hapticlink.orchestrator.commands.options import options
-from tests.orchestrator.conftest import status
+from tests.shared_fixtures import status
 
 SHORT = {"duration": 0.2, "graphics.rate": 40}
 SPRING = """

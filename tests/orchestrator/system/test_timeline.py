@@ -27,9 +27,9 @@ from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks, timeline
-from tests.orchestrator.conftest import status
 from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
 from tests.orchestrator.timelines import CAUSAL, LOOP, scene_of, scenes
+from tests.shared_fixtures import status
 
 Make = Callable[[Timeline, str], System]
 

@@ -1,0 +1,78 @@
+"""Warnings of contacts that are deeper than their geometry means, or too stiff for the steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hapticlink.analysis.findings.tracking import of_block
+from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.contact.depth import depths, middle, overlaps
+from hapticlink.components.contact.stiffness import STABLE, poles, sticking_poles
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.linkage import Linkage, Mechanism
+from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.scene_part import scene_part
+from hapticlink.orchestrator.results.tables import Results, Table
+
+GAP, COORDINATES = "virtual_mechanism.contact_gap", "virtual_mechanism.q"
+ROWS = 500
+"""Largest number of rows whose depths are computed."""
+
+
+def lines(results: Results) -> Iterator[str]:
+    """A line for the deepest contact beyond the middle of a shape, and for the stiffest
+    pair that pushes or sticks."""
+    scene = results.run["scene"]
+    table = of_block(results, GAP)
+    if table is None or not len(table["time"]) or not scene["linkage"] or not scene["contacts"]:
+        return
+    linkage = scene_part(results, "linkage", Linkage)
+    contacts = scene_part(results, "contacts", Contacts)
+    if COORDINATES in table:  # both are recorded
+        yield from _deep(linkage, contacts, table)
+    mechanism = scene_part(results, "mechanism", Mechanism)
+    if mechanism.integrator != "passive-midpoint" and len(table["time"]) > 1:
+        rate = results.run["fmus"][GAP.partition(".")[0]]["rate"]
+        step_s = results.run["clocks"][rate]["longest"] / mechanism.substeps
+        implicit = mechanism.integrator == "linearly-implicit"
+        yield from _stiff(linkage, contacts, step_s, implicit)
+
+
+def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
+    most = {pair: middle(linkage, contacts, pair) for pair in near(linkage, contacts)}
+    time, q = table["time"], table[COORDINATES]
+    found = [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
+    deep = np.flatnonzero(table[GAP] < -min(most.values()))
+    if len(deep):
+        chosen = deep[np.linspace(0, len(deep) - 1, min(len(deep), ROWS)).astype(int)]
+        found += [(*item, time[chosen]) for item in depths(linkage, contacts, q[chosen])]
+    if not found:
+        return
+    pair, depth, times = max(found, key=lambda item: float(item[1].max()) - most[item[0]])
+    if (worst := float(depth.max())) > most[pair]:
+        yield (
+            f"warning: at {times[depth.argmax()]:.4g} s {pair.body} is {short(worst * 1e3)} mm "
+            f"deep in {pair.obstacle}, past the middle of the thinner one "
+            f"({short(most[pair] * 1e3)} mm), where it goes through or its side changes, and "
+            "energy with it: take a larger contacts.stiffness, or a start at which they are apart"
+        )
+
+
+def _stiff(linkage: Linkage, contacts: Contacts, step_s: float, implicit: bool) -> Iterator[str]:
+    pushing = () if implicit else poles(linkage, contacts)
+    sticking = sticking_poles(linkage, contacts, step_s)
+    kinds = (
+        (pushing, "", "damping or stiffness", "linearly-implicit"),
+        (sticking, " that stick", "stiffness", "passive-midpoint"),
+    )
+    for found, which, less, method in kinds:
+        pair, pole = max(found, key=lambda item: item[1], default=(None, 0.0))
+        if pair and pole * step_s > STABLE:
+            yield (
+                f"warning: contacts of {pair.body} with {pair.obstacle}{which} have a pole at "
+                f"{pole:.3g} 1/s, too fast for steps of {step_s:.3g} s: take a smaller "
+                f"contacts.{less}, steps below {STABLE / pole:.2g} s (mechanism.substeps), or "
+                f"mechanism.integrator = {method!r}"
+            )

@@ -1,0 +1,49 @@
+"""Warns of joints whose friction is far from Coulomb's law at the speeds of a run.
+
+Friction that sticks changes its sign while a joint's rate goes from v_f to -v_f
+(components/forces/friction.py), so that each turn of the joint costs up to about v_f of its rate:
+
+    error = turns v_f / max |rate|
+
+By default v_f is proportional to the integration step (components/dynamics/friction_scale.py).
+Cut joints have no output of their rate and are not judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.analysis.findings.tracking import of_block
+from hapticlink.components.specs.linkage import COORDINATE_UNITS
+from hapticlink.orchestrator.results.tables import Results
+
+RATES = "virtual_mechanism.qd"
+BOUND = 0.1
+
+
+def coarse(results: Results) -> Iterator[str]:
+    """A line for each joint whose friction errs by more than BOUND of its largest rate."""
+    linkage, speeds = results.run["scene"]["linkage"], results.run.get("friction_speeds", {})
+    if not linkage or not speeds:
+        return
+    units = [(j["name"], unit) for j in linkage["joint"] for unit in COORDINATE_UNITS[j["type"]]]
+    table = of_block(results, RATES, len(units))
+    if not table or not len(table["time"]):
+        return
+    for (name, unit), rate in zip(units, table[RATES].T, strict=True):
+        speed = speeds.get(name, 0.0)
+        if (error := _turns(rate, speed) * speed) > BOUND * (most := np.abs(rate).max()):
+            yield (
+                f"warning: friction of {name} is Coulomb's beyond {speed:.2g} {unit}/s only, and "
+                f"its rate of up to {most:.2g} {unit}/s may be off by about {error / most:.0%} "
+                "after so many turns: take more mechanism.substeps or a higher rate"
+            )
+
+
+def _turns(rate: NDArray[np.float64], least: float) -> int:
+    """How often `rate` changes its sign, counted once it is beyond `least`."""
+    signs = np.sign(rate[np.abs(rate) > least])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))

@@ -1,0 +1,211 @@
+"""The energy generated at the user's port, by the block that generates it.
+
+With works over the mechanism (S) and the handle (D) of each user, `held` those of the wrenches as
+they are held and `ideal` those of their sources, linear in the displacement between samples
+(energy/meter.py),
+
+    drift        ideal(F_drift on D) + ideal(-F_drift on S)
+    topology     ideal(F_T on D)
+    environment  ideal(F_env on D) - ideal(F_env on S)
+    hold of C    held - ideal, of each connection C that works on the handle or the mechanism
+    shaping      F_hand on S - F_hand on D + ideal(F_env on S) - ideal(F_drift + F_T + F_env on D)
+                 - the holds in it
+    mechanism    E - E(0) - held works on S
+
+The sum is E - E(0) - F_hand on D. In an ideal rendering the handle has the motion and the kinetic
+energy of the operational point, and all are 0 but what springs and dampers store and lose: drift
+then is that of a spring-damper, mechanism that of friction, drives and the error of integration.
+Shaping is what the device, shaped by M_d Lambda^-1, has taken less than the mechanism was given: by
+a mobility or directions that are held or differ, velocity terms left out, saturation and stops.
+
+Works on the handle and the mechanism are those of the energy meters, of the wrenches as they act:
+a sample that comes late, by a latency or in the order of Jacobi, or is lost is paired with the
+displacement over which it acts (`arrivals.py`). Where a hold gives other values than samples, the
+work is known at the meter's last sample alone, and reached there in proportion to that of the
+samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from hapticlink.analysis.findings.sample_arrivals import known_from
+from hapticlink.analysis.findings.tracking import of_block, poses, table_of
+from hapticlink.orchestrator.results.tables import Results, Table, Vector
+
+BLOCK, CONTROLLER, HAND = "virtual_mechanism", "controller", "hand.F"
+CONTACT = f"{BLOCK}.F_env"
+
+
+class User(NamedTuple):
+    """The signals of a user: poses of the point and the handle, the wrenches on them, and the
+    mechanism's inputs `virtual_mechanism.<inputs>F_hand`, F_drift."""
+
+    point: str
+    handle: str
+    drift: str
+    topology: str
+    motors: str
+    contact: str
+    inputs: str
+
+
+def user(name: str = "") -> User:
+    """The signals of the user at a further point; the first user's name is empty."""
+    controller = f"{CONTROLLER}_{name}" if name else CONTROLLER
+    inputs = f"{BLOCK}.{name}." if name else f"{BLOCK}."
+    point, handle = poses(name)
+    return User(
+        point,
+        handle,
+        drift=f"{controller}.F_drift",
+        topology=f"{controller}.F_constraint",
+        motors=f"{controller}.F_motor",
+        contact=f"{inputs}F_env",
+        inputs=inputs,
+    )
+
+
+def needed(results: Results, users: Iterable[str]) -> set[str]:
+    """The signals from which the blocks of these users are found, as far as a run has them."""
+    found: set[str] = set()
+    for each in map(user, users):
+        found |= {*each[:-1], *(source for source, _ in _sources(results, each))}
+    return found
+
+
+def by_block(
+    results: Results, time: Vector, stored: Vector, put_in: Mapping[str, Vector]
+) -> dict[str, Vector]:
+    """The energy (J) that each block has generated at the times (s), those of all users' blocks
+    added up. stored: E - E(0) less the work of hands without a device; put_in: the work of each
+    user's hand on the handle, by the user's name."""
+    blocks: dict[str, Vector] = {}
+    shaping, mechanism = np.zeros(len(time)), stored.copy()
+
+    def add(name: str, energy: Vector) -> None:
+        blocks[name] = blocks.get(name, 0.0) + energy
+
+    def on(signal: str, position: str) -> tuple[Vector, Vector] | None:
+        if of_block(results, signal, 3) is None or of_block(results, position, 3) is None:
+            return None
+        return works(results, signal, position, time)
+
+    for each, done in ((user(name), done) for name, done in put_in.items()):
+        shaping = shaping - done
+        wrenches = {"drift": each.drift, "topology": each.topology, "environment": each.contact}
+        for name, signal in wrenches.items():
+            if found := on(signal, each.handle):
+                add(name, found[1])
+                shaping = shaping - found[1]
+        if motors := on(each.motors, each.handle):
+            add(f"hold of {each.motors}", motors[0] - motors[1])
+            shaping = shaping - (motors[0] - motors[1])
+        if contact := on(each.contact, each.point):
+            add("environment", -contact[1])
+            shaping = shaping + contact[1]
+        for name, (held, source) in _into_mechanism(results, each, time).items():
+            mechanism = mechanism - held
+            if name == each.drift:
+                add("drift", source)
+                add(f"hold of {name} on the mechanism", held - source)
+            else:
+                shaping = shaping + held
+    return {"shaping": shaping, **blocks, "mechanism": mechanism}
+
+
+def _into_mechanism(results: Results, each: User, time: Vector) -> dict[str, tuple[Vector, Vector]]:
+    """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
+    from, by that signal."""
+    found = {}
+    for source, target in _sources(results, each):
+        if table_of(results, source) and of_block(results, each.point, 3):
+            sign = -1.0 if target.endswith("F_drift") else 1.0
+            name = f"{source} -> {target}"
+            found[source] = works(results, source, each.point, time, sign, name)
+    return found
+
+
+def _sources(results: Results, each: User) -> Iterator[tuple[str, str]]:
+    """Where F_hand and F_drift of the mechanism come from, and that input."""
+    for name in meters(results):
+        source, _, target = name.partition(" -> ")
+        if target in (f"{each.inputs}F_hand", f"{each.inputs}F_drift"):
+            yield source, target
+
+
+def meters(results: Results) -> dict[str, dict[str, float]]:
+    """The energy meters of a run, by connection."""
+    across = results.run.get("energies", "none")
+    return ({} if across == "none" else across) | results.run.get("energies_within_a_rate", {})
+
+
+def works(
+    results: Results,
+    signal: str,
+    position: str,
+    at: Vector,
+    sign: float = 1.0,
+    connection: str | None = None,
+) -> tuple[Vector, Vector]:
+    """The work (J) of a wrench at a position until the times `at`: as it acts, and that of its
+    source. `connection` is that with which it acts; by default one from the signal to the FMU of
+    the position, without which the newest sample acts."""
+    table, moved = table_of(results, signal), table_of(results, position)
+    if not (table and moved):
+        raise KeyError(f"work needs the signals {signal} and {position}")
+    force, stamps, booked = sign * table[signal], table["time"], meters(results)
+    start = f"{signal} -> {position.partition('.')[0]}."
+    name = connection or next((n for n in booked if n.startswith(start)), None)
+    if name is None:
+        return (
+            work(force, stamps, moved, position, at),
+            ideal(force, stamps, moved, position, at),
+        )
+    known = known_from(results, name, stamps, table is moved)
+    meter = booked[name]
+    until = meter["until"]
+    to = np.union1d(at, until)  # where the meter stops may be beside or after the times
+    acts, source = (
+        _passing(series, to, until, meter[kind])[np.searchsorted(to, at)]
+        for kind, series in (
+            ("held", work(force, known, moved, position, to)),
+            ("ideal", ideal(force, stamps, moved, position, to)),
+        )
+    )
+    return acts, source
+
+
+def _passing(series: Vector, at: Vector, until: float, value: float) -> Vector:
+    """`series` at the times `at`, changed in proportion to its own path so that it passes `value`
+    at the time `until`."""
+    path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
+    to, reached = (float(np.interp(until, at, y)) for y in (path, series))
+    if not to:
+        path, to = at - at[0], max(until - float(at[0]), 1e-300)
+    changed: Vector = series + (value - reached) * path / to
+    return changed
+
+
+def work(force: Vector, known: Vector, moved: Table, position: str, at: Vector) -> Vector:
+    """The work (J) of the newest of the forces (n, 3), known from the times `known` on, over the
+    steps of a position until the times `at`. A force that comes after a newer one does not act."""
+    x, time = moved[position], moved["time"]
+    order = np.argsort(known, kind="stable")
+    newest = np.maximum.accumulate(order)
+    rows = np.searchsorted(known[order], time[:-1] + 1e-12, "right") - 1
+    held = force[newest[np.maximum(rows, 0)]]
+    done = np.concatenate([[0.0], (held * np.diff(x, axis=0)).sum(axis=1).cumsum()])
+    return np.interp(at, time, done)
+
+
+def ideal(force: Vector, stamps: Vector, moved: Table, position: str, at: Vector) -> Vector:
+    """The work (J) of forces (n, 3) that are linear in the displacement between their stamps."""
+    x, time = moved[position], moved["time"]
+    at_stamps = np.stack([np.interp(stamps, time, column) for column in x.T], axis=1)
+    mean = (force[:-1] + force[1:]) / 2
+    done = np.concatenate([[0.0], (mean * np.diff(at_stamps, axis=0)).sum(axis=1).cumsum()])
+    return np.interp(at, stamps, done)

@@ -1,0 +1,159 @@
+"""Energy at the user's port: what the rendering has stored beyond what the hands put in.
+
+The handle shall move as the mechanism would in the hand. So the hand's work on the handle, and that
+of further hands on the mechanism, should be what the mechanism has gained:
+
+    generated(t) = E(t) - E(0) - sum F_hand . dx_D - sum F_k . dx_k
+
+summed over the users with a device each, and over hands k at further points, with E the mechanism's
+energy (kinetic, of gravity, springs and contacts) and each force, as it acts, paired with the
+displacement of the step that it acts over. A positive value is energy that the hand could get back
+without having put it in; friction makes it negative, drives positive. `port_blocks.py` tells which
+block it comes from.
+
+`works` are of single wrenches: on each handle of its hand, its motors, F_T, F_env; of F_env on the
+mechanism; and of what a mobility held from another rate adds to the motors' wrench,
+M_d (Lambda_held^-1 - Lambda^-1) (F_h + F_drift + F_env): no force crosses a rate there, but a held
+mobility modulates power. It needs the mechanism's own (`mechanism.directions`) and a hold of `zoh`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hapticlink.analysis.findings.port_blocks import (
+    BLOCK,
+    CONTACT,
+    HAND,
+    by_block,
+    ideal,
+    needed,
+    work,
+    works,
+)
+from hapticlink.analysis.findings.tracking import (
+    DEVICE,
+    MECHANISM,
+    further_users,
+    of_block,
+    of_user,
+    table_of,
+)
+from hapticlink.orchestrator.results.tables import Results, Table, Vector
+
+MOBILITY = "Lambda_inv"
+ENERGY = f"{BLOCK}.energy"
+
+
+class UserPort(NamedTuple):
+    """Energy generated (J) at times (s), the mechanism's samples; that of each block, of which it
+    is the sum; and the works of single wrenches at the end (J), by name."""
+
+    time_s: Vector
+    generated_J: Vector
+    blocks_J: dict[str, Vector]
+    works: dict[str, float]
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """For run.json."""
+        peak = int(np.argmax(self.generated_J))
+        found = {"generated": self.generated_J[-1], "peak": self.generated_J[peak]}
+        found |= {"time_of_peak": self.time_s[peak]}
+        blocks = {
+            name: {"generated": float(energy[-1]), "peak": float(energy.max())}
+            for name, energy in self.blocks_J.items()
+        }
+        return {k: float(v) for k, v in found.items()} | {"blocks": blocks, "works": self.works}
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
+def user_port(results: Results) -> UserPort | None:
+    """The energy at the user's port; None without hand, handle and mechanism, where something else
+    than its hand pushes a handle, or where the work of another hand is not recorded. Without all
+    signals that its blocks need there are none."""
+    mechanism, device = of_block(results, ENERGY), of_block(results, DEVICE, 3)
+    if mechanism is None or device is None or of_block(results, HAND, 3) is None:
+        return None
+    if pushed_by_others(results) or not (len(device["time"]) and len(mechanism["time"])):
+        return None
+    time = mechanism["time"]
+    time = time[time <= device["time"][-1]]
+    energy = mechanism[ENERGY][: len(time)]
+    stored = energy - energy[0]
+    put_in = {"": works(results, HAND, DEVICE, time)[0]}
+    further = np.zeros(len(time))
+    for name in results.run["connections"]:
+        hand, _, target = name.partition(" -> ")
+        point = target.removesuffix(".F_hand").removeprefix(f"{BLOCK}.")
+        if target != f"{BLOCK}.{point}.F_hand":
+            continue
+        if with_device := f"haptic_device_{point}" in results.run["fmus"]:
+            hand, position = of_user(HAND, point), of_user(DEVICE, point)
+        else:
+            position = f"{BLOCK}.{point}.x"
+        moved, pushing = of_block(results, position, 3), table_of(results, hand)
+        if moved is None or pushing is None or pushing[hand].shape[1:] != (3,):
+            return None
+        done = works(results, hand, position, time)[0]
+        if with_device:
+            put_in[point] = done
+        else:
+            further += done
+    generated = stored - further - sum(put_in.values())
+    lacks = needed(results, put_in) & {*results.run.get("not_recorded", ())}
+    blocks = {} if lacks else by_block(results, time, stored - further, put_in)
+    return UserPort(time, generated, blocks, _works(results, device, time))
+
+
+def pushed_by_others(results: Results) -> list[str]:
+    """The connections to handles from other sources than the hands of their users."""
+    return [
+        name
+        for name in results.run["connections"]
+        for user in ("", *further_users(results))
+        if name.endswith(f" -> {of_user(DEVICE, user).partition('.')[0]}.F_hand")
+        and not name.startswith(f"{of_user(HAND, user)} ")
+    ]
+
+
+def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
+    """The works (J) of single wrenches on the handles, those of further users named by their
+    points, and of contacts on the mechanism."""
+    signals = {
+        "hand": HAND,
+        "motors": "controller.F_motor",
+        "F_T": "controller.F_constraint",
+        "F_env": CONTACT,
+    }
+    found = {
+        f"{user}: {name}" if user else name: float(works(results, at, handle, time)[0][-1])
+        for user in ("", *further_users(results))
+        for name, signal in signals.items()
+        if of_block(results, at := of_user(signal, user), 3)
+        and of_block(results, handle := of_user(DEVICE, user), 3)
+    }
+    if contact := of_block(results, CONTACT, 3):
+        on = ideal(contact[CONTACT], contact["time"], contact, MECHANISM, time)
+        found["F_env on the mechanism"] = float(on[-1])
+    if (added := _held_mobility(results, device)) is not None:
+        found["held mobility"] = float(work(added, device["time"], device, DEVICE, time)[-1])
+    return found
+
+
+def _held_mobility(results: Results, device: Table) -> Vector | None:
+    """What holding the mobility adds to the motors' wrench, (n, 3) at the device's samples; None
+    where it is not held, or not by zoh, or the mechanism's own is not put out."""
+    held, own = (of_block(results, f"{b}.{MOBILITY}", 3, 3) for b in ("virtual_environment", BLOCK))
+    crossing = f"virtual_environment.{MOBILITY} -> controller.{MOBILITY}"
+    if not held or own is not device or results.run["holds"].get(crossing) != "zoh":
+        return None
+    rows = np.searchsorted(held["time"], device["time"] + 1e-12, "right") - 1
+    change = held[f"virtual_environment.{MOBILITY}"][rows] - device[f"{BLOCK}.{MOBILITY}"]
+    wrench = device[HAND]
+    for signal in ("controller.F_drift", CONTACT):
+        wrench = wrench + device[signal] if signal in device else wrench
+    added: Vector = np.einsum("kij,kjl,kl->ki", device["haptic_device.M"], change, wrench)
+    return added

@@ -1,0 +1,39 @@
+"""The extent of a device's workspace, as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from hapticlink.components.device.workspace import Range, margin, workspace
+from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator.scene.start_pose import outside
+
+Pose = Sequence[float]
+"""x m, y m, theta rad."""
+
+
+def lines(device: Device, start: Pose) -> Iterator[str]:
+    """The extent of the workspace, and whether the start pose of a scene is inside it."""
+    space = workspace(device)
+    for which, field in (("some", space.some), ("every", space.every)):
+        extent = space.extent(field)
+        where = f"x {_range(extent[0])} m, y {_range(extent[1])} m" if extent else "nowhere"
+        yield f"at {which} theta: {where}"
+    turns = space.turns
+    yield f"theta: {'any' if turns == [_TURN] else ', '.join(map(_range, turns)) + ' rad'}"
+    found = float(margin(device, np.array([start]))[0])
+    if found < 0:
+        yield f"warning: {outside(start, found)}"
+    else:
+        pose = ", ".join(f"{value:.4g}" for value in start)
+        yield f"the handle starts at ({pose}), {found:.3g} m from the nearest stop"
+
+
+_TURN = (-math.pi, math.pi)
+
+
+def _range(of: Range) -> str:
+    return f"{of[0]:.2g} to {of[1]:.2g}"

@@ -1,0 +1,84 @@
+"""Directions within the loop closures, in which the state of a mechanism is perturbed.
+
+Where closures are redundant, a pose off them contradicts them, and a step from there has no result.
+The coordinates q of such a block, and their rates qd, are moved along an orthonormal basis of
+null(W), W = dh/dq, in place of one by one. Other mechanisms are moved off their closures as well,
+so that the map has the modes of their stabilisation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+
+from hapticlink.analysis.stability.state_vector import Coordinate
+from hapticlink.components.dynamics.closure_jacobian import Matrix, closure_jacobian
+from hapticlink.orchestrator.scene.scene import Scene
+
+Vector = NDArray[np.float64]
+BLOCKS = ("virtual_mechanism", "virtual_environment")
+RANK = 1e-6
+"""Singular values of W, relative to the largest, that count as 0."""
+
+
+@dataclass(frozen=True)
+class Closures:
+    """The closures of a scene's linkage."""
+
+    scene: Scene
+
+    def directions(
+        self, coordinates: Sequence[Coordinate], free: NDArray[np.intp], point: Vector
+    ) -> Iterator[Vector]:
+        """Orthonormal directions (n,) that span the coordinates `free`, within the closures."""
+        bound: set[int] = set()
+        for block in BLOCKS:
+            places = {
+                name: [
+                    i
+                    for i in free
+                    if (c := coordinates[i]).kind == "fmu"
+                    and (c.owner, c.variable.partition("[")[0]) == (block, name)
+                ]
+                for name in ("q", "qd")
+            }
+            basis = self._basis(point[places["q"]][-self._n :] if places["q"] else None)
+            if basis is None:
+                continue
+            for indices in places.values():
+                # Inputs and outputs of the same name come before the states.
+                bound.update(indices)
+                for first in range(0, len(indices), self._n):
+                    for column in basis.T:
+                        direction = np.zeros(len(point))
+                        direction[indices[first : first + self._n]] = column
+                        yield direction
+        for i in free:
+            if i not in bound:
+                direction = np.zeros(len(point))
+                direction[i] = 1.0
+                yield direction
+
+    @property
+    def _n(self) -> int:
+        linkage = self.scene.linkage
+        return sum(3 if j.type == "free" else 1 for j in linkage.joint) if linkage else 0
+
+    @cached_property
+    def _jacobian(self) -> Callable[[Vector], Matrix]:
+        assert self.scene.linkage is not None
+        return closure_jacobian(self.scene.linkage)
+
+    def _basis(self, q: Vector | None) -> Matrix | None:
+        """A basis of null(W) at q, None where no closure is redundant."""
+        linkage = self.scene.linkage
+        if q is None or linkage is None or not linkage.closed:
+            return None
+        W = self._jacobian(q)
+        basis: Matrix = null_space(W, rcond=RANK)
+        return basis if len(W) > W.shape[1] - basis.shape[1] else None

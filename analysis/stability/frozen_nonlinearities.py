@@ -1,0 +1,98 @@
+"""Nonlinearities that a linearisation cannot follow, and what becomes of each.
+
+Quantisation and Coulomb friction are taken out: their slope is 0, or that of a joint that sticks,
+whatever the loop does. So are passivity controllers, and the friction of the hold `passive`, which
+act by what has been. Switches stay as they are at the equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from hapticlink.analysis.stability.state_vector import Coordinate
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.holds.passive import Passive
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
+
+NEXT_TO_NOTHING = 1e-18
+"""Of friction (N, N.m), which sets a stiffness by a quotient and so must not be 0."""
+DISCRETE = {
+    ("fmu", "n_constrained"),
+    ("fmu", "deflection"),
+    ("fmu", "contact_deflection"),
+    ("hold", "beta"),
+}
+"""States that are a count, or belong to friction that is taken out."""
+
+
+def without(system: System) -> tuple[System, list[str]]:
+    """The system without quantisation, friction and passivity controllers, and a line on each."""
+    fmus, lines = [], []
+    for fmu in system.fmus:
+        starts = []
+        for scalar, value, what in _removed(system, fmu):
+            starts.append((scalar, value))
+            lines.append(f"{fmu.name}.{scalar.name}: {what}, taken out")
+        set_anew = {scalar.name for scalar, _ in starts}
+        others = (start for start in fmu.starts if start[0].name not in set_anew)
+        fmus.append(replace(fmu, starts=(*others, *starts)))
+    for c in system.connections:
+        if _has_friction(c):
+            lines.append(f"{c.name}: the friction of hold {c.hold}, taken out")
+    return replace(system, fmus=tuple(fmus)), lines
+
+
+def _has_friction(c: Connection) -> bool:
+    return c.hold is not None and issubclass(HOLDS[c.hold], Passive)
+
+
+def without_friction(holds: Iterable[object]) -> None:
+    """Takes the friction beta c out of holds `passive`: beta stays 0."""
+    for hold in holds:
+        if isinstance(hold, Passive):
+            hold.beta = np.zeros_like(hold.beta)
+
+
+def _removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:
+    """Parameters that are set, their values, and what they are."""
+    block = system.block(fmu.name)
+    for scalar in fmu.description.scalars:
+        if scalar.causality != "parameter":
+            continue
+        if (block, scalar.name) == ("haptic_device", "encoder_resolution"):
+            yield scalar, 0.0, "quantisation of the encoders"
+        elif (block, scalar.name) == ("virtual_wall", "quantum"):
+            yield scalar, 0.0, "quantisation of the encoder"
+        elif block in ("controller", "virtual_wall") and scalar.name == "passivity_limit":
+            yield scalar, 0.0, "the passivity controller"
+        elif block == "virtual_mechanism" and scalar.name.endswith((".friction", "mu_contact")):
+            yield scalar, NEXT_TO_NOTHING, "Coulomb friction"
+
+
+def kept(system: System) -> list[str]:
+    """A line of text on each switch that stays as it is at the equilibrium."""
+    lines = []
+    for fmu in system.fmus:
+        block, description = system.block(fmu.name), fmu.description
+        if block == "haptic_device":
+            lines.append(f"{fmu.name}: saturation of the motors, and the stops")
+        if block == "virtual_wall":
+            lines.append(f"{fmu.name}: contact, if the wall is unilateral")
+        if description.port("contact_gap", "output"):
+            lines.append(f"{fmu.name}: which places touch")
+        if any(s.port.rpartition(".")[2] == "n_constraints" for s in description.outputs):
+            lines.append(f"{fmu.name}: number of constrained directions")
+    for c in system.connections:
+        if c.hold and HOLDS[c.hold].needs in ("power", "spring") and not _has_friction(c):
+            lines.append(f"{c.name}: the regime of hold {c.hold}")
+    return [f"{line}, as at the equilibrium" for line in lines]
+
+
+def discrete(coordinate: Coordinate) -> bool:
+    """Whether a coordinate is a switch or belongs to what is taken out."""
+    variable = coordinate.variable.partition("[")[0].rpartition(".")[2]  # left.n_constrained
+    return (coordinate.kind, variable) in DISCRETE

@@ -1,0 +1,268 @@
+"""The lifted map of a co-simulation: its state after one hyperperiod of all clocks as a function of
+the state before, z_{k+1} = F(z_k), carried out by the FMUs, holds and operations that really run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from itertools import takewhile
+
+import numpy as np
+
+from hapticlink.analysis.stability.closure_directions import Closures
+from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
+from hapticlink.analysis.stability.state_vector import Coordinate, StateVector, Vector
+from hapticlink.analysis.stability.tangent import SAME, Columns, Instruction, Matrix, Tangent
+from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.frames import Frames
+from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.plan.operations import Event, Operation, Part, Record, StopWhen
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.run.bind_operations import Binder, Bound
+from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import timeline
+
+Watch = Callable[[Vector], None]
+CONVERGED = 1e-12
+"""Tolerance of iterations: far below the differences by which slopes are found."""
+
+
+def hyperperiod(time: Timeline) -> int:
+    """The ticks after which the events of all clocks repeat. Raises InputFault for a clock whose
+    period varies at random or follows a trace."""
+    return math.lcm(*(_round(clock) for clock in time.clocks))
+
+
+def _round(clock: Clock) -> int:
+    starts = clock.starts
+    if isinstance(starts, Frames):
+        return starts.repeats
+    if clock.period is None or clock.first != clock.period:
+        raise InputFault(
+            f"the period of {clock.name} varies: no period after which all repeats, and so no map; "
+            "take a fixed rate"
+        )
+    return clock.period
+
+
+class LiftedMap:
+    """F of a system, from the first multiple of the hyperperiod on that is behind its start and not
+    before the time `at` (s).
+
+    initial: the numbers of the FMUs at the start of the scene. begin: that time (s). period: the
+    hyperperiod (s), of a number of `events`. coordinates: of the state, in order. start: the state
+    at `begin`.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        simulation: Simulation,
+        at: float,
+        tangent: Tangent,
+        window: tuple[int, int] | None = None,
+    ) -> None:
+        self._simulation, time = simulation, plan.system.timeline
+        self._bound: dict[Event | Part, Bound] = {}
+        self._plan, self.system = plan, plan.system
+        self._binder = Binder(simulation, self._calls)
+        self._tangent = tangent
+        self._state = StateVector(simulation)
+        length = window[1] if window else hyperperiod(time)
+        self.period, self.seconds = time.seconds(length), time.seconds
+        first = window[0] if window else length * math.ceil(behind_start(plan.system, at) / length)
+        self._begin, self.begin = self._state.save(), time.seconds(first)
+        self.initial = np.concatenate(self._state.parts(self._begin)[: len(simulation.instances)])
+        moments = list(takewhile(lambda moment: moment.tick < first + 2 * length, plan))
+        for tick, event in moments:
+            if tick < first:
+                self._run(tick, event)
+        self._moments = [m for m in moments if first <= m.tick < first + length]
+        self._later = [m for m in moments if m.tick >= first + length]
+        self.events = len(self._moments)
+        self._template = self._state.save()
+        self.coordinates: Sequence[Coordinate] = self._state.coordinates(self._template)
+        self.start = self._state.numbers(self._template)
+        free = [i for i, c in enumerate(self.coordinates) if not discrete(c)]
+        self._free, self._closures = np.array(free, dtype=np.intp), tangent.closures
+
+    def over(self, system: System, window: tuple[int, int]) -> LiftedMap:
+        """The map of the same FMUs on the timeline of another `system`, from the first tick of a
+        `window` on and over its length."""
+        self._state.restore(self._begin)
+        return LiftedMap(Plan(system), self._simulation, 0.0, self._tangent, window)
+
+    def image(self, state: Vector, watch: Watch | None = None) -> Vector:
+        """F(state). watch: called after each event with the numbers of the FMUs and signals, and
+        behind them those of holds, of which a latency can leave more or fewer than at the end."""
+        self._state.restore(self._state.put(self._template, state))
+        for tick, event in self._moments:
+            self._run(tick, event)
+            if watch:
+                watch(self._state.numbers(self._state.save()))
+        interrupt.check()
+        return self._numbers()
+
+    def slopes(
+        self,
+        point: Vector,
+        V: Matrix,
+        same: float = SAME,
+        after: Callable[[Instruction, Columns], None] | None = None,
+    ) -> tuple[Vector, Matrix, Matrix]:
+        """F(point), its derivatives along the columns of V, and their errors; slopes of operations
+        are shared by numbers that differ by up to `same`, relative. `after` each operation is
+        called with the perturbations, which it may change."""
+        state = self._state
+        state.restore(state.put(self._template, point))
+        ends = np.cumsum([len(part) for part in state.parts(self._template)])[:-1]
+        M = dict(zip(state.owners, np.split(V, ends), strict=True))
+        D = {owner: np.zeros_like(rows) for owner, rows in M.items()}
+        alive = np.arange(V.shape[1])
+        self._tangent.begin()
+        for tick, event in self._moments:
+            for instruction, call in self._instructions(event):
+                self._tangent.carry(tick, instruction, call, M, D, same)
+                if after:
+                    after(instruction, M)
+            if not after:  # a column that is zero once remains so
+                kept = np.any([X.any(axis=0) for Y in (M, D) for X in Y.values()], axis=0)
+                alive = alive[kept]
+                for Y in (M, D):
+                    Y.update({owner: X[:, kept] for owner, X in Y.items()})
+            interrupt.check()
+        image, found = self._numbers(), []
+        for Y in (M, D):
+            found.append(np.zeros((len(image), V.shape[1])))
+            found[-1][:, alive] = np.vstack([Y[owner] for owner in state.owners])
+        return image, found[0], found[1]
+
+    def ways(self) -> dict[str, str]:
+        """By FMU, how the slopes of the last linearisation were found."""
+        return self._tangent.ways()
+
+    def count(self, kind: type[Operation], fmu: str) -> int:
+        """The number of operations of a kind on an FMU within a period."""
+        return sum(
+            isinstance(operation, kind) and getattr(operation, "fmu", None) == fmu
+            for _, event in self._moments
+            for operation, _ in self._instructions(event)
+        )
+
+    def outputs(self, fmu: str) -> slice:
+        """The indices of an FMU's outputs in the signal vector."""
+        return self._simulation.signals.fmu(fmu)
+
+    def set_parameters(self, values: Sequence[tuple[str, Scalar, float]]) -> None:
+        """Sets tunable parameters, by FMU, from here on."""
+        self._state.restore(self._template)
+        for fmu, scalar, value in values:
+            self._simulation.instances[fmu].connect([scalar], [0])(np.array([float(value)]))
+        self._template = self._state.save()
+        self._tangent.forget({fmu for fmu, _, _ in values})
+
+    def forget(self) -> None:
+        """Slopes of FMUs that were found so far are not taken again."""
+        self._tangent.forget(self.system.fmu)
+
+    def directions(self, point: Vector) -> Iterator[Vector]:
+        """Orthonormal directions in which the state can be moved from `point`, that of the
+        coordinates that are no switches."""
+        if self._closures:
+            yield from self._closures.directions(self.coordinates, self._free, point)
+        else:
+            yield from np.eye(len(point))[self._free]
+
+    def second(self, state: Vector) -> Vector:
+        """The state after two periods, of which the second one is run at its own time: F(F(state))
+        if nothing in the system changes with time."""
+        self._state.restore(self._state.put(self._template, state))
+        for tick, event in (*self._moments, *self._later):
+            self._run(tick, event)
+        return self._numbers()
+
+    def _numbers(self) -> Vector:
+        found = self._state.numbers(self._state.save())
+        if len(found) != len(self.start):
+            raise InputFault(
+                "the number of samples that holds keep changes from period to period: the map "
+                "needs constant latencies"
+            )
+        return found
+
+    def _run(self, tick: int, event: Event) -> None:
+        for _, call in self._instructions(event):
+            call(tick)
+
+    def _calls(self, kind: Event | Part) -> list[Call]:
+        return [call for _, call in self._instructions(kind)]
+
+    def _instructions(self, kind: Event | Part) -> Bound:
+        """The operations of a kind of event, without those that write rows or end a run, and their
+        calls."""
+        if kind not in self._bound:
+            operations: list[Operation] = [
+                operation
+                for operation in self._plan.block(kind)
+                if not isinstance(operation, Record | StopWhen)
+            ]
+            self._bound[kind] = self._binder.instructions(operations)
+        return self._bound[kind]
+
+
+def behind_start(system: System, at: float = 0.0) -> int:
+    """Ticks, at least up to the time `at` (s), after which holds have all the samples that they
+    keep: four steps of the slowest clock, and the longest latency."""
+    time = system.timeline
+    late = max((c.latency.max or c.latency.min for c in system.connections if c.latency), default=0)
+    kept = 4 * max(clock.longest for clock in time.clocks) + math.ceil(late / time.base)
+    return max(kept, math.ceil(at / time.base))
+
+
+def long_enough(scene: Scene, system: System, at: float = 0.0) -> System:
+    """`system` with the timeline of a scene that lasts as long as its map from `at` (s) needs."""
+    needed = (behind_start(system, at) + 4 * hyperperiod(system.timeline)) * system.timeline.base
+    duration = float(max(scene.duration, math.ceil(needed)))
+    return replace(system, timeline=timeline(replace(scene, duration=duration)))
+
+
+@contextmanager
+def opened(
+    system: System, at: float = 0.0, closures: Closures | None = None
+) -> Iterator[LiftedMap]:
+    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; `closures` are
+    those of its mechanism.
+
+    Raises InputFault where there is none: adaptive step sizes, rates and latencies that vary, an
+    FMU whose state cannot be read.
+    """
+    if system.step_control:
+        raise InputFault("step_control adapts the steps to the state: the map needs fixed ones")
+    for c in system.connections:
+        if c.latency and (c.latency.loss or c.latency.max not in (None, c.latency.min)):
+            raise InputFault(
+                f"delays of {c.name}: latency and loss are random, so that no two periods are "
+                "alike; the map needs a constant latency"
+            )
+    tolerance = min(system.iteration.tolerance, CONVERGED)
+    exactly = replace(system.iteration, method="newton", tolerance=tolerance)
+    system = replace(system, iteration=exactly)
+    with (
+        temporary_folders.room() as room,
+        RunFolder(room) as results,
+        ExitStack() as stack,
+        np.errstate(invalid="ignore", over="ignore"),
+    ):
+        simulation = Simulation(system, results, stack)
+        simulation.step_checks.clear()
+        simulation.start()
+        without_friction(simulation.holds.values())
+        yield LiftedMap(Plan(system), simulation, at, Tangent(simulation, closures))

@@ -1,0 +1,88 @@
+"""The linearisation of the lifted map: A = V' dF/dz V, by perturbations that are carried through
+the operations of a period (tangent.py).
+
+V_j are the unit vectors of the coordinates, or directions within the closures (closures.py). A
+number that is overwritten before anything reads it has a zero column and is left out. A number that
+nothing changes, a gain that a hold keeps, is a parameter of the map: its row is that of the
+identity, and it is left out too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import matrix_balance
+
+from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
+from hapticlink.analysis.stability.tangent import SAME, SMALL
+
+Matrix = NDArray[np.float64]
+ONE = 1e-7
+"""Largest deviation from 1 of the diagonal entry of a parameter."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The map around `point`: F(point) = image, with the Jacobian A (n, n) along the orthonormal
+    directions V, the columns of a matrix; its error E (n, n) by slopes to one side, and per
+    column the largest of them relative to the column (`kink`): of order 1 where the map is not
+    differentiable. Columns smaller than SMALL, which rounding can make, count as of that size."""
+
+    point: Vector
+    image: Vector
+    V: Matrix
+    A: Matrix
+    E: Matrix
+
+    @property
+    def taken(self) -> NDArray[np.intp]:
+        """The coordinates of the state that the directions move."""
+        return np.flatnonzero(self.V.any(axis=1))
+
+    @property
+    def change(self) -> Vector:
+        """Along each direction, F(point) - point."""
+        found: Vector = self.V.T @ (self.image - self.point)
+        return found
+
+    def moved(self, by: Vector) -> Vector:
+        """The point moved along the directions, with all that is overwritten as in the image."""
+        found: Vector = self.image + self.V @ (by - self.change)
+        return found
+
+    @property
+    def kink(self) -> Vector:
+        size = np.abs(self.A).max(axis=0, initial=0.0)
+        kinks: Vector = np.abs(self.E).max(axis=0, initial=0.0) / np.maximum(size, SMALL)
+        return kinks
+
+    @property
+    def scales(self) -> Vector:
+        """Scales d of the coordinates that balance A: rows of D^-1 A D as large as its columns."""
+        found: Vector = matrix_balance(self.A, permute=False, separate=True)[1][0]
+        return found
+
+
+def linearised(map_: LiftedMap, point: Vector, same: float = SAME) -> Linear:
+    """The Jacobian of the map at `point`, along the directions that act on it; `same` as in
+    tangent.py."""
+    V = np.stack(list(map_.directions(point)), axis=1)
+    image, M, D = map_.slopes(point, V, same)
+    taken = M.any(axis=0) | D.any(axis=0)
+    if not taken.any():
+        raise AssertionError("a map without a state")
+    V, M, D = V[:, taken], M[:, taken], D[:, taken]
+    A, E = V.T @ M, V.T @ D
+    kept = ~_constant(A, V.T @ (image - point) == 0.0)
+    return Linear(point, image, V[:, kept], A[kept][:, kept], E[kept][:, kept])
+
+
+def _constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which coordinates nothing changes, not even in turn the others."""
+    n = len(A)
+    own = np.abs(np.diag(A) - 1.0) < ONE
+    alone = np.count_nonzero(A - np.diag(np.diag(A)), axis=1) == 0
+    found: NDArray[np.bool_] = own & alone & same if n else np.zeros(0, bool)
+    return found

@@ -1,0 +1,99 @@
+"""The modes of a linearised map: eigenvalues z of A over a period P.
+
+    s = ln(z)/P = sigma + i omega,   zeta = -sigma/|s|,   p_k = |v_k w_k| / sum |v_k w_k|
+
+sigma is the growth rate (1/s), zeta the damping ratio. p is the participation of coordinate k, from
+the right and left eigenvectors v and w; it does not depend on the units of the coordinates
+(Perez-Arriaga, Verghese, Schweppe, IEEE Trans. Power Apparatus and Systems 101 (1982), 3117). An
+error E of A moves a simple eigenvalue by at most |w||E||v| / |w v| entry by entry, which is taken
+for its uncertainty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eig
+
+from hapticlink.analysis.stability.lifted_map import Vector
+from hapticlink.analysis.stability.linearise import Linear
+
+FLOOR = 1e-9
+"""Relative error of the entries of A by rounding."""
+NEAR = 1e-4
+"""Largest |z - 1| of a neutral mode, however uncertain z is: one further off may grow."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode: its eigenvalue z over a period, |z - exact| at most `uncertainty`; growth rate
+    (1/s), angular frequency (rad/s), and the participation (n,) of the coordinates taken."""
+
+    z: complex
+    uncertainty: float
+    growth: float
+    omega: float
+    participation: Vector
+    vector: np.ndarray
+
+    @property
+    def damping(self) -> float:
+        """The damping ratio; 1 and more without oscillation is 1, a growing one is negative."""
+        size = float(np.hypot(self.growth, self.omega))
+        return -self.growth / size if size else 0.0
+
+    @property
+    def neutral(self) -> bool:
+        """Whether z is 1 within its uncertainty: a motion that neither grows nor decays."""
+        return abs(self.z - 1.0) <= min(self.uncertainty, NEAR)
+
+
+def verdict(radius: float, uncertainty: float) -> str:
+    """stable, unstable, or marginal where the radius is 1 within its uncertainty."""
+    if abs(radius - 1.0) <= uncertainty:
+        return "marginal"
+    return "unstable" if radius > 1.0 else "stable"
+
+
+def counted(found: Sequence[Mode]) -> Sequence[Mode]:
+    """The modes by which a scene is judged: neutral ones only where there are no others."""
+    return [mode for mode in found if not mode.neutral] or found
+
+
+def modes(at: Linear, period: float) -> list[Mode]:
+    """The modes, that of the largest |z| first; of a complex pair the one with omega > 0."""
+    scale = at.scales
+    A, E = at.A * scale / scale[:, None], np.abs(at.E * scale / scale[:, None])
+    E = np.maximum(E, FLOOR * np.abs(A))
+    values, left, right = eig(A, left=True, right=True)
+    found = []
+    for i, z in enumerate(values):
+        if z.imag < 0.0:
+            continue
+        v, w = right[:, i], left[:, i].conj()
+        overlap = abs(w @ v)
+        shares = np.abs((at.V @ (v * scale)) * (at.V @ (w / scale)))[at.taken]
+        uncertainty = float(np.abs(w) @ E @ np.abs(v)) / overlap if overlap else np.inf
+        s = np.log(z) / period if z else complex(-np.inf)
+        found.append(
+            Mode(
+                complex(z),
+                uncertainty,
+                float(s.real),
+                float(s.imag),
+                shares / shares.sum() if shares.any() else shares,
+                at.V @ (v * scale),
+            )
+        )
+    return sorted(found, key=lambda mode: -abs(mode.z))
+
+
+def leading(mode: Mode, names: Sequence[str], most: int = 3) -> list[tuple[str, float]]:
+    """The names with the largest shares in a mode; those that have one together are summed up."""
+    shares: dict[str, float] = {}
+    for name, share in zip(names, mode.participation.tolist(), strict=True):
+        shares[name] = shares.get(name, 0.0) + share
+    ranked = sorted(shares.items(), key=lambda item: -item[1])
+    return [(name, share) for name, share in ranked[:most] if share > 0.02]

@@ -1,0 +1,353 @@
+"""Perturbations of a co-simulation, carried along with it from operation to operation.
+
+Each operation changes few numbers: a doStep those of one FMU, the evaluation of a hold those of one
+connection. With the slopes J of what it writes with respect to what it reads, perturbations M, a
+column each, and their errors D follow
+
+    M <- J M,   D <- J D + E M
+
+J is found by central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
+difference of its slopes to both sides. For a doStep and a get of an FMU with a graph, J
+is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
+have a slope in one way only, or another one to each side, keep those by differences. Slopes at the
+same numbers, with the same age of samples, are the same, so that around a state of rest each
+operation is differentiated once.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Container, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.analysis.stability.closure_directions import Closures
+from hapticlink.analysis.stability.frozen_nonlinearities import discrete
+from hapticlink.analysis.stability.graph_slopes import GraphSlopes, graph_slopes
+from hapticlink.analysis.stability.state_vector import (
+    SIGNALS,
+    Coordinate,
+    StateVector,
+    Template,
+    Vector,
+    doubles,
+    keepers,
+)
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.plan.operations import (
+    Blend,
+    Evaluate,
+    Get,
+    Push,
+    Repeat,
+    Rollback,
+    Set,
+    Step,
+    flat,
+)
+from hapticlink.orchestrator.run.bind_operations import Instruction
+from hapticlink.orchestrator.run.parallel_steps import Finish
+from hapticlink.orchestrator.run.simulation import Call, Simulation
+
+Matrix = NDArray[np.float64]
+Columns = dict[str, Matrix]
+"""Perturbations by owner, a column each."""
+STEP = 1e-6
+KINK = 1e-3
+"""Difference of slopes, relative to the largest of a column, above which there is none."""
+SMALL = 1e-3
+"""Columns of smaller slopes, in which the rounding of differences would pass for a kink, count as
+of this size."""
+SAME = 1e-8
+"""Largest difference of numbers, relative to max(1, |z|), at which slopes are the same."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What an operation touches: the state of its FMUs and holds, and which signals it reads and
+    writes."""
+
+    state: StateVector
+    reads: NDArray[np.intp]
+    writes: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """J and E of an operation where it reads the numbers `at`; `apart` are the variables with
+    slopes by differences beside those of the graph, None where all are by differences."""
+
+    at: Vector
+    J: Matrix
+    E: Matrix
+    apart: frozenset[str] | None
+
+
+class Tangent:
+    """The slopes of the operations of a simulation; `closures` are those of its mechanism."""
+
+    def __init__(self, simulation: Simulation, closures: Closures | None) -> None:
+        self._simulation, self.closures = simulation, closures
+        self._reach: dict[Instruction, Reach | None] = {}
+        self._known: dict[Any, list[Slopes]] = {}
+        self._apart: dict[str, frozenset[str] | None] = {}
+        self._graphs: dict[str, GraphSlopes | None] = {}
+        self._named: dict[Any, list[Coordinate]] = {}
+
+    def forget(self, fmus: Container[str]) -> None:
+        """Slopes of these FMUs hold no longer, since parameters of theirs were changed."""
+        for key in list(self._known):
+            if isinstance(key[0], Repeat) or getattr(key[0], "fmu", None) in fmus:
+                del self._known[key]
+
+    def begin(self) -> None:
+        """A period begins, of which `ways` tells."""
+        self._apart.clear()
+
+    def ways(self) -> dict[str, str]:
+        """By FMU, how its slopes were found since `begin`."""
+        found = {}
+        for fmu in self._simulation.system.fmus:
+            if (apart := self._apart.get(fmu.name)) is None:
+                found[fmu.name] = "differences"
+            else:
+                others = ", ".join(sorted(apart))
+                found[fmu.name] = f"graph; by differences: {others}" if others else "graph"
+        return found
+
+    def carry(
+        self,
+        tick: int,
+        operation: Instruction,
+        call: Call,
+        M: Columns,
+        D: Columns,
+        same: float = SAME,
+    ) -> None:
+        """Carries out an operation, and perturbations with it, with slopes at numbers that differ
+        by up to `same` max(1, |z|)."""
+        if isinstance(operation, Finish):
+            return
+        if isinstance(operation, Step) and operation.fmu in self._simulation.isolated:
+            call = self._awaited(operation.fmu, call)
+        if isinstance(operation, Repeat):
+            call = self._from_here(operation, call)
+        reach = self._of(operation)
+        if reach is None:
+            call(tick)
+            return
+        found, sizes = self._slopes(tick, operation, call, reach, same)
+        for fmu in reach.state.owners if isinstance(operation, Step | Get | Repeat) else ():
+            apart = self._apart.get(fmu, frozenset())
+            if apart is not None:
+                self._apart[fmu] = None if found.apart is None else apart | found.apart
+        J, E = found.J, found.E
+        owners = [o for o in reach.state.owners if o != SIGNALS]
+        before = [np.vstack([*(X[o] for o in owners), X[SIGNALS][reach.reads]]) for X in (M, D)]
+        m, d = before
+        for X, Y in ((M, J @ m), (D, J @ d + E @ m)):
+            at = 0
+            for owner, size in zip(owners, sizes, strict=True):
+                X[owner] = Y[at : at + size]
+                at += size
+            X[SIGNALS] = X[SIGNALS].copy()
+            X[SIGNALS][reach.writes] = Y[at:]
+
+    def _awaited(self, fmu: str, step: Call) -> Call:
+        """A doStep of an FMU in a process of its own, whose end is waited for."""
+        finish = self._simulation.instances[fmu].finish
+
+        def call(tick: int) -> None:
+            step(tick)
+            finish()
+
+        return call
+
+    def _from_here(self, operation: Repeat, repeat: Call) -> Call:
+        """The iteration of a loop from the state that its FMUs have at the call: to that it rolls
+        back, and not to the one that was saved before it was perturbed."""
+        fmus = [op.fmu for op in operation.again if isinstance(op, Rollback)]
+        saves = [self._simulation.instances[fmu].save for fmu in fmus]
+
+        def call(tick: int) -> None:
+            for save in saves:
+                save()
+            repeat(tick)
+
+        return call
+
+    def _slopes(
+        self, tick: int, operation: Instruction, call: Call, reach: Reach, same: float
+    ) -> tuple[Slopes, list[int]]:
+        """Slopes of an operation that is carried out, and the numbers of each owner after it."""
+        state = reach.state
+        template = state.save()
+        z, (read, _) = state.numbers(template), self._places(reach, template)
+        call(tick)
+        after = state.save()
+        image, (_, written) = state.numbers(after), self._places(reach, after)
+        own = zip(state.owners, state.parts(after), strict=True)
+        sizes = [len(part) for owner, part in own if owner != SIGNALS]
+        key = operation, len(z), len(image), _ages(template.holds, tick)
+        known = self._known.setdefault(key, [])
+        wide = same * np.maximum(1.0, np.abs(z[read]))
+        for slopes in known:
+            if isinstance(operation, Set) or (np.abs(z[read] - slopes.at) <= wide).all():
+                return slopes, sizes
+        exact = self._exact(operation, template, after)
+        apart = np.zeros(len(written), bool)
+        J, E = np.zeros((2, len(written), len(read)))
+        inert = [False] * len(read)
+        if known:  # what nothing reads, as outputs, has the slopes that it has anywhere
+            coordinates = self._coordinates(key, state, template)
+            inert = [coordinates[i].inert for i in read]
+            J[:, inert], E[:, inert] = known[0].J[:, inert], known[0].E[:, inert]
+        inverse = {int(place): i for i, place in enumerate(read)}
+        for places, weights in self._directions(key, state, template, read[~np.array(inert)], z):
+            d = STEP * max(1.0, float(np.abs(z[places]).max()))
+            sides = []
+            for way in (d, -d):
+                shifted = z.copy()
+                shifted[places] += way * weights
+                state.restore(state.put(template, shifted))
+                call(tick)
+                width = weights @ (shifted[places] - z[places])
+                sides.append((state.numbers(state.save())[written] - image[written]) / width)
+            columns = [inverse[int(place)] for place in places]
+            slope, error = (sides[0] + sides[1]) / 2, (sides[0] - sides[1]) / 2
+            if exact is not None:
+                along = exact[:, columns] @ weights
+                slope, error, differ = decided(along, slope, error)
+                apart |= differ
+            J[:, columns] += np.outer(slope, weights)
+            E[:, columns] += np.outer(error, weights)
+        state.restore(after)
+        coordinates = self._coordinates(key, state, template)
+        names = frozenset(coordinates[i].variable for i in written[apart])
+        known.insert(0, Slopes(z[read], J, E, None if exact is None else names))
+        return known[0], sizes
+
+    def _exact(self, operation: Instruction, before: Template, after: Template) -> Matrix | None:
+        """J of a doStep or a get of an FMU with a graph."""
+        if not isinstance(operation, Step | Get):
+            return None
+        fmu = operation.fmu
+        description = self._simulation.system.fmu[fmu].description
+        if fmu not in self._graphs:
+            scene = self.closures.scene if self.closures else None
+            self._graphs[fmu] = graph_slopes(description, fmu, scene)
+        graph = self._graphs[fmu]
+        if graph is None:
+            return None
+        if isinstance(operation, Step):
+            return graph.step(doubles(before.fmus[fmu]), doubles(after.fmus[fmu]))
+        J, outputs = graph.get(doubles(before.fmus[fmu])), description.outputs
+        ranks = np.argsort(np.argsort([s.reference for s in outputs]))
+        return np.vstack([J, J[graph.n_u + ranks]])
+
+    def _coordinates(self, key: Any, state: StateVector, template: Any) -> list[Coordinate]:
+        if key not in self._named:
+            self._named[key] = state.coordinates(template)
+        return self._named[key]
+
+    def _directions(
+        self, key: Any, state: StateVector, template: Any, read: NDArray[np.intp], z: Vector
+    ) -> Iterator[tuple[NDArray[np.intp], Vector]]:
+        """The numbers that a direction moves, and by how much."""
+        coordinates = self._coordinates(key, state, template)
+        free = np.array([i for i in read if not discrete(coordinates[i])], dtype=np.intp)
+        if not self.closures:
+            yield from ((free[i : i + 1], np.ones(1)) for i in range(len(free)))
+            return
+        for along in self.closures.directions(coordinates, free, z):
+            places = np.flatnonzero(along)
+            yield places, along[places]
+
+    def _places(self, reach: Reach, template: Any) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Of the numbers of a saved state: which an operation reads, and which it writes."""
+        parts = reach.state.parts(template)
+        at, own, signals = 0, [], 0
+        for owner, part in zip(reach.state.owners, parts, strict=True):
+            if owner == SIGNALS:
+                signals = at
+            else:
+                own.append(np.arange(at, at + len(part)))
+            at += len(part)
+        mine = np.concatenate(own) if own else np.zeros(0, dtype=np.intp)
+        return (
+            np.concatenate([mine, reach.reads + signals]),
+            np.concatenate([mine, reach.writes + signals]),
+        )
+
+    def _of(self, operation: Instruction) -> Reach | None:
+        if operation not in self._reach:
+            self._reach[operation] = self._found(operation)
+        return self._reach[operation]
+
+    def _found(self, operation: Instruction) -> Reach | None:
+        """None for what changes no state: meters, barriers."""
+        simulation = self._simulation
+        system, signals = simulation.system, simulation.signals
+        every = np.arange(len(signals.values))
+
+        def reach(fmus: set[str], holds: set[str], reads: Any = (), writes: Any = ()) -> Reach:
+            state = StateVector(simulation, fmus, holds)
+            return Reach(state, np.array(reads, dtype=np.intp), np.array(writes, dtype=np.intp))
+
+        match operation:
+            case Get(fmu):
+                return reach({fmu}, set(), (), every[signals.fmu(fmu)])
+            case Set(fmu):
+                into = system.into(fmu)
+                places = {p for c in into for p in (*signals.places(c), *signals.sources(c))}
+                for c in into:
+                    places.update(every[signals.derivatives(c.name)], signals.mean(c))
+                return reach({fmu}, set(), sorted(places))
+            case Step(fmu):
+                return reach({fmu}, set())
+            case Push(connection) | Evaluate(connection) | Blend(connection):
+                c = system.connection[connection]
+                shared = HOLDS[c.hold or ""].needs
+                holds = set(keepers(simulation)) - set(simulation.holds) if shared else set()
+                held, derived = every[signals.hold(connection)], signals.derivatives(connection)
+                mean = signals.mean(c) if derived.stop else []
+                writes = sorted({*held, *every[derived], *mean})
+                pushed = isinstance(operation, Push)
+                reads = every if shared else signals.sources(c) if pushed else writes
+                written = every if shared else () if pushed else writes
+                return reach(set(), {connection} | holds, reads, written)
+            case Repeat(body=body):
+                fmus = {op.fmu for op in flat(body) if isinstance(op, Step)}
+                return reach(fmus, set(keepers(simulation)), every, every)
+            case _:
+                return None
+
+
+def decided(
+    exact: Vector, slope: Vector, error: Vector
+) -> tuple[Vector, Vector, NDArray[np.bool_]]:
+    """Slopes and their errors from exact ones, and where they are by differences all the same."""
+    most = KINK * max(SMALL, np.abs(slope).max(initial=0.0))
+    differ = ~(np.abs(slope - exact) <= most) | (np.abs(error) > most)
+    gap = slope - exact
+    wider = ~differ & (np.abs(gap) > np.abs(error))
+    return np.where(differ, slope, exact), np.where(wider, gap, error), differ
+
+
+def _ages(value: Any, tick: int) -> Any:
+    """The whole numbers in the attributes of holds: stamps of samples relative to the tick, sizes,
+    which are far smaller, as they are. What is no whole number is left out."""
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, int):
+        return tick - value if 8 * value > tick else value
+    if isinstance(value, dict):
+        return tuple(_ages(v, tick) for v in value.values())
+    if isinstance(value, np.ndarray | float | str | type) or callable(value) or value is None:
+        return None
+    if isinstance(value, list | tuple | deque):
+        return tuple(_ages(v, tick) for v in value)
+    return _ages(vars(value), tick) if hasattr(value, "__dict__") else None

@@ -1,0 +1,154 @@
+"""Absolute stability of the rendering between the hand and the virtual mechanism: is it stable with
+any passive hand and any passive mechanism? The method is that of Adams, Hannaford, IEEE Trans.
+Robotics and Automation 15 (1999), 465, with sampled ports (cut.py) of any number of degrees of
+freedom (absolute.py) and rates (harmonics.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hapticlink.analysis.stability.absolute_stability import lacking, lacking_of_two, least
+from hapticlink.analysis.stability.harmonics import Hybrid, hertz
+
+ROUNDING = 1e-6
+"""Of the impedance: damping that is none, and harmonics that do not mix."""
+
+
+@dataclass(frozen=True)
+class TwoPort:
+    """The rendering between hand and mechanism. needed: damping (N.s/m) at both ports that suffices
+    for absolute stability, at_least: that which is necessary; they are the same where the
+    rendering mixes no frequencies. turning: `needed` for rotations (N.m.s/rad), 0 without any.
+    hand, mechanism: what each port needs by itself, whatever the other has. frequency: where
+    `at_least` is needed (Hz). below: the frequency (Hz) up to which nothing is. radius: spectral
+    radius with the hand gone and the mechanism held. kept: ports of the mechanism that others read
+    besides its pose and velocity, as at the equilibrium here. curve: frequencies (Hz) and the
+    damping that is necessary there."""
+
+    needed: float
+    at_least: float
+    turning: float
+    hand: float
+    mechanism: float
+    frequency: float
+    below: float
+    radius: float
+    kept: tuple[str, ...]
+    curve: tuple[tuple[float, float], ...]
+
+    @property
+    def verdict(self) -> str:
+        """absolutely stable, not absolutely stable, or undecided between both bounds."""
+        if self.at_least > 0.0 or not self.held:
+            return "not absolutely stable"
+        return "undecided" if self.needed > 0.0 else "absolutely stable"
+
+    @property
+    def held(self) -> bool:
+        """Whether it comes to rest with the hand gone and the mechanism held."""
+        return self.radius <= 1.0 + ROUNDING
+
+    def record(self) -> dict[str, Any]:
+        """The part of stability.json on the two-port."""
+        return {
+            "verdict": self.verdict,
+            "damping_needed": self.needed,
+            "damping_necessary": self.at_least,
+            "damping_needed_in_rotation": self.turning,
+            "damping_needed_at_hand": self.hand,
+            "damping_needed_at_mechanism": self.mechanism,
+            "least_passive_frequency": self.frequency,
+            "passive_below": self.below,
+            "radius_with_hand_gone_and_mechanism_held": self.radius,
+            "outputs_as_at_the_equilibrium": list(self.kept),
+            "damping_necessary_by_frequency": [list(pair) for pair in self.curve],
+        }
+
+    def lines(self) -> Iterator[str]:
+        """The result as text."""
+        yield f"between hand and mechanism: {self.verdict}, for any passive hand and mechanism"
+        if not self.held:
+            yield (
+                "  unstable by itself, with the hand gone and the mechanism held (spectral radius "
+                f"{self.radius:.6g})"
+            )
+        if self.kept:
+            yield f"  of the mechanism as at the equilibrium: {', '.join(self.kept)}"
+        if self.needed > 0.0:
+            yield (
+                f"  it takes a damping of {between(self.at_least, self.needed)} N.s/m"
+                + (f" and {self.turning:.3g} N.m.s/rad" if self.turning else "")
+                + f" at both ports ({max(0.0, self.hand):.4g} at the hand's, "
+                f"{max(0.0, self.mechanism):.4g} at the mechanism's whatever the other has); least "
+                f"passive at {self.frequency:.4g} Hz, nothing lacks below {self.below:.3g} Hz"
+            )
+
+
+def between(necessary: float, sufficient: float) -> str:
+    """A damping, or both bounds of it where they differ."""
+    least, most = f"{necessary:.5g}", f"{sufficient:.5g}"
+    return most if least == most else f"{least} to {most}"
+
+
+def judged(
+    ports: Sequence[tuple[float, Hybrid]],
+    period: float,
+    turns: float,
+    radius: float,
+    kept: tuple[str, ...] = (),
+) -> TwoPort:
+    """The verdict on ports at angles; `turns` converts a damping to one of rotations."""
+    curve: list[tuple[float, float]] = []
+    hand, mechanism, needed = -np.inf, -np.inf, -np.inf
+    for angle, port in ports:
+        N, r = len(port.Y) // port.r, port.r
+        alone = [port.harmonic(h).impedance for h in range(N)]
+        scales = []
+        for h, Z in enumerate(alone):
+            found, scale = lacking_of_two(Z, r)
+            none = ROUNDING * float(np.abs(Z).max())
+            curve.append((hertz(angle, h, N, period), found if found > none else min(found, 0.0)))
+            scales.append(scale)
+            hand, mechanism = max(hand, least(Z[:r, :r])), max(mechanism, least(Z[r:, r:]))
+        if mixes(port):
+            start = np.array([*scales, *np.zeros(len(port.own) // r)])
+            needed = max(needed, lacking(port.impedance, [r] * len(start), start))
+    frequency, at_least = max(curve, key=lambda pair: pair[1])
+    needed = max(needed, at_least)
+    lacks = [f for f, b in curve if b > 0.0]
+    return TwoPort(
+        needed,
+        at_least,
+        needed * turns,
+        hand,
+        mechanism,
+        frequency,
+        min(lacks, default=max(f for f, _ in curve)),
+        radius,
+        kept,
+        tuple(sorted(curve)),
+    )
+
+
+def most_lacking(port: Hybrid) -> float:
+    """The damping that is necessary in the harmonic that lacks most."""
+    alone = (port.harmonic(h) for h in range(len(port.Y) // port.r))
+    return max(lacking_of_two(one.impedance, one.r)[0] for one in alone)
+
+
+def mixes(port: Hybrid) -> bool:
+    """Whether the answer to a harmonic has others in it."""
+    N, n = len(port.Y) // port.r, len(port.own) // port.r
+    if n not in (0, N):
+        return True
+    blocks = np.kron(np.eye(N), np.ones((port.r, port.r)))
+    return any(
+        bool((np.abs(X * (1 - blocks)) > ROUNDING * np.abs(X).max()).any())
+        for X in (port.Y, port.there, port.back, port.own)
+        if X.size
+    )

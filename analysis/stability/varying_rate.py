@@ -1,0 +1,262 @@
+"""The stability of a scene in which the period of one rate is drawn at random, in whole ticks.
+
+Between the starts of two steps of that rate the state is carried by the matrix of a frame, A_pN: of
+N ticks, after one of p ticks. Holds that extrapolate read two samples, and so depend on p; with the
+others A_pN is A_N. All matrices are of the co-simulation that runs, around the same equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hapticlink.analysis.stability import frozen_nonlinearities
+from hapticlink.analysis.stability.closure_directions import Closures
+from hapticlink.analysis.stability.equilibrium import equilibrium
+from hapticlink.analysis.stability.lifted_map import behind_start, opened
+from hapticlink.analysis.stability.linearise import Matrix
+from hapticlink.analysis.stability.switching import (
+    Bounds,
+    Edge,
+    joint_spectral_radius,
+    lyapunov,
+    mean_square,
+)
+from hapticlink.analysis.stability.trajectory import trajectory
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.frames import Frames
+from hapticlink.orchestrator.base.ticks import Clock, Timeline, bounds, exact
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.rates import VariableRate
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import clocks
+
+SAME = 1e-6
+"""Difference of the matrices after frames of different lengths, relative, that is none."""
+
+
+@dataclass(frozen=True)
+class VaryingStability:
+    """The result for a rate that varies. frames: the periods that may occur (ticks of `tick` s).
+    bounds: of the joint spectral radius, per frame. worst: the periods of its fastest sequence.
+    second_moment: spectral radius of the map of second moments, per frame. exponent: Lyapunov's
+    (1/s), with the half-width of its 95 % confidence interval on a sequence drawn with `seed`."""
+
+    title: str
+    frames: tuple[int, ...]
+    tick: float
+    bounds: Bounds
+    worst: tuple[int, ...]
+    second_moment: float
+    exponent: float
+    confidence: float
+    seed: int
+    frozen: tuple[str, ...]
+
+    @property
+    def any_sequence(self) -> str:
+        """stable, unstable, or undecided where the bounds of the joint spectral radius hold 1."""
+        if self.bounds.upper < 1.0:
+            return "stable"
+        return "unstable" if self.bounds.lower > 1.0 else "undecided"
+
+    @property
+    def mean_square(self) -> str:
+        return "stable" if self.second_moment < 1.0 else "unstable"
+
+    @property
+    def almost_surely(self) -> str:
+        """By the Lyapunov exponent; undecided where its confidence interval holds 0."""
+        if abs(self.exponent) <= self.confidence:
+            return "undecided"
+        return "stable" if self.exponent < 0.0 else "unstable"
+
+    @property
+    def verdict(self) -> str:
+        """In mean square, for the rate as the scene draws it."""
+        return self.mean_square
+
+    def record(self) -> dict[str, Any]:
+        """The content of stability.json."""
+        return {
+            "title": self.title,
+            "verdict": self.verdict,
+            "frames": list(self.frames),
+            "tick": self.tick,
+            "joint_spectral_radius": [self.bounds.lower, self.bounds.upper],
+            "fastest_sequence": list(self.worst),
+            "any_sequence": self.any_sequence,
+            "second_moment_radius": self.second_moment,
+            "mean_square": self.mean_square,
+            "lyapunov_exponent": self.exponent,
+            "confidence": self.confidence,
+            "seed": self.seed,
+            "almost_surely": self.almost_surely,
+            "frozen": list(self.frozen),
+        }
+
+    def lines(self) -> Iterator[str]:
+        """The result as text."""
+        yield f"the period varies: {self.frames[0]} to {self.frames[-1]} ticks of {self.tick:.6g} s"
+        yield (
+            f"any sequence: {self.any_sequence}; joint spectral radius a frame "
+            f"{self.bounds.lower:.6g} to {self.bounds.upper:.6g}, fastest by frames of "
+            f"{', '.join(map(str, self.worst))} ticks"
+        )
+        yield (
+            f"mean square: {self.mean_square}; second moments times {self.second_moment:.6g} a "
+            "frame"
+        )
+        yield (
+            f"almost surely: {self.almost_surely}; Lyapunov exponent {self.exponent:.4g} +- "
+            f"{self.confidence:.2g} 1/s (95 %, seed {self.seed})"
+        )
+        if self.frozen:
+            yield "frozen:"
+            yield from (f"  {line}" for line in self.frozen)
+
+
+def varies(scene: Scene) -> bool:
+    """Whether a rate of the scene is drawn at random."""
+    return any(isinstance(pace.rate, VariableRate) for pace in clocks(scene).paces.values())
+
+
+def varying_stability(
+    scene: str | Path | Scene, options: Options = (), *, products: int = 20_000
+) -> VaryingStability:
+    """The stability of a scene in which one rate is drawn between bounds and all others are the
+    haptic one. `products`: the most that the joint spectral radius takes.
+
+    Raises InputFault for a scene without an equilibrium, with further rates, and where holds reach
+    back by more than two frames.
+    """
+    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
+        read = open_scene.load(scene, options)
+        with built(read) as whole:
+            system, removed = frozen_nonlinearities.without(whole)
+            place = _clock(system)
+            rate = next(
+                p.rate for p in clocks(read).paces.values() if isinstance(p.rate, VariableRate)
+            )
+            # All that may be drawn, not only what this run draws.
+            low, high = bounds(exact(rate.min), exact(rate.max), system.timeline.base)
+            lengths, seed = range(low, high + 1), rate.seed
+            edges, names = edges_of(read, system, place, list(lengths))
+    found = joint_spectral_radius(edges, 1e-4, products)
+    exponent, width = lyapunov(edges, seed)
+    return VaryingStability(
+        title=read.title,
+        frames=tuple(lengths),
+        tick=float(system.timeline.base),
+        bounds=found,
+        worst=tuple(names[i] for i in found.worst),
+        second_moment=mean_square(edges),
+        exponent=exponent,
+        confidence=width,
+        seed=seed,
+        frozen=(*removed, *frozen_nonlinearities.kept(system)),
+    )
+
+
+def _clock(system: System) -> int:
+    """The place of the clock that varies. Raises InputFault unless the haptic clock alone is beside
+    it."""
+    paces = system.timeline.clocks
+    found = [i for i, clock in enumerate(paces) if not isinstance(clock.starts, range | Frames)]
+    if len(found) != 1 or len(paces) > 2:
+        names = ", ".join(clock.name for clock in paces)
+        raise InputFault(
+            f"clocks {names}: the matrices of frames need one rate that varies beside the haptic "
+            "one; give the other FMUs one of both"
+        )
+    return found[0]
+
+
+def edges_of(
+    scene: Scene | None, system: System, place: int, lengths: list[int]
+) -> tuple[list[Edge], list[int]]:
+    """The matrices of frames of the clock at `place`, of equally probable lengths (ticks), and the
+    length of each."""
+    middle = lengths[len(lengths) // 2]
+    seconds = system.timeline.seconds
+    with opened(
+        alternating(system, place, middle, middle), 0.0, Closures(scene) if scene else None
+    ) as map_:
+        at = equilibrium(map_, trajectory(map_, 60.0))
+        V = np.stack(list(map_.directions(at.point)), axis=1)
+
+        def frame(before: int, length: int, further: int | None = None) -> Matrix:
+            other = alternating(system, place, before, length, further)
+            view = map_.over(other, window(other, place))
+            found: Matrix = V.T @ view.slopes(at.point, V)[1]
+            return found
+
+        low, high = lengths[0], lengths[-1]
+        remembers = not _close(frame(low, middle), frame(high, middle))
+        if remembers and not _close(frame(low, middle, low), frame(low, middle, high)):
+            raise InputFault(
+                "holds reach back by more than two frames: matrices of frames know the last one "
+                "only; take zoh, lead, foh or foh-derivative where the rate varies"
+            )
+        before = lengths if remembers else [middle]
+        made = {(p, n): frame(p, n) for p in before for n in lengths}
+    acting = np.any([A.any(axis=0) for A in made.values()], axis=0)
+    still = np.all([(np.eye(len(A)) == A).all(axis=1) for A in made.values()], axis=0)
+    kept = np.flatnonzero(acting & ~still)
+    edges, names = [], []
+    for (p, n), A in made.items():
+        A = A[np.ix_(kept, kept)]
+        ends = n if remembers else middle
+        edges.append(Edge(p, ends, A, 1 / len(lengths), seconds(n)))
+        names.append(n)
+    return edges, names
+
+
+def _close(A: Matrix, B: Matrix) -> bool:
+    return bool(np.abs(A - B).max() <= SAME * max(1.0, np.abs(A).max()))
+
+
+def alternating(
+    system: System, place: int, before: int, length: int, further: int | None = None
+) -> System:
+    """The system with frames of `further`, `before`, `length`, ... ticks at the clock `place`."""
+    cycle = [before, length] if further is None else [further, before, length]
+    ends = np.cumsum(cycle).tolist()
+    whole, count = ends[-1], len(cycle)
+    starts = [0, *ends[:-1]]
+    base = system.timeline
+    rounds = 4 + -(-_settled(system) // whole)
+    frames = Frames(lambda i: i // count * whole + starts[i % count], (rounds + 2) * count, count)
+    paces = list(base.clocks)
+    paces[place] = Clock(paces[place].name, frames)
+    step = paces[1 - place].starts[1] if len(paces) == 2 else whole
+    for i, clock in enumerate(paces):
+        if i != place:
+            paces[i] = Clock(clock.name, range(0, (rounds + 1) * whole + 2 * step, step))
+    return replace(system, timeline=Timeline(base.base, rounds * whole, tuple(paces), base.of))
+
+
+def _settled(system: System) -> int:
+    """Ticks after which frames are taken: so many that lengths, which holds keep beside stamps, are
+    far smaller than those, and slopes of one length are not taken for another (tangent.py)."""
+    return 4 * behind_start(system)
+
+
+def window(system: System, place: int) -> tuple[int, int]:
+    """The first tick of the last frame of a cycle behind the start, and its length."""
+    frames = system.timeline.clocks[place].starts
+    assert isinstance(frames, Frames)
+    i = next(
+        i
+        for i in range(len(frames))
+        if i % frames.round == frames.round - 1 and frames[i] >= _settled(system)
+    )
+    return frames[i], frames[i + 1] - frames[i]

@@ -1,0 +1,85 @@
+"""One run of a sweep, and the key under which its row is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from platform import python_version
+from typing import Any
+
+from pydantic_core import to_json
+
+import hapticlink.analysis
+import hapticlink.components
+import hapticlink.fmus
+import hapticlink.orchestrator
+from hapticlink.fmus.cache import sources
+from hapticlink.fmus.versions import version
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import interrupt, plugins
+from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.run_json import PACKAGES
+from hapticlink.orchestrator.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Job:
+    """A point of a sweep. scene: the checked scene, None if it was refused; then `refusal` says
+    why. plugins: the modules that it may need."""
+
+    point: Mapping[str, str]
+    scene: Scene | None
+    key: str = ""
+    refusal: str = ""
+    plugins: tuple[str, ...] = ()
+
+
+def jobs(
+    scene: str | Path | Scene, options: Sequence[str], points: Iterable[Mapping[str, str]]
+) -> list[Job]:
+    """The jobs of `points`, each of `scene` with the common `options` and those of its point.
+
+    A point without a valid scene is a refused job. Raises InputFault if all points are refused,
+    Interrupted for a signal.
+    """
+    made = []
+    for point in points:
+        interrupt.check()  # 100,000 points take minutes
+        made.append(job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point))
+    if made and all(each.scene is None for each in made):
+        raise InputFault(made[0].refusal)
+    return made
+
+
+def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, str]) -> Job:
+    """The job of `scene` with `options`, listed in the table as `point`."""
+    try:
+        found = open_scene.load(scene, options)
+        return Job(point, found, key(found), plugins=tuple(plugins.loaded()))
+    except Fault as fault:
+        return Job(point, None, refusal=str(fault))
+
+
+def key(scene: Scene) -> str:
+    """SHA-256 of everything that a run depends on: the resolved scene, its FMU files, versions and
+    sources, also those of plugins. Raises InputFault for an FMU file that cannot be read."""
+    made_with = [*_made_with(), plugins.loaded()]
+    whole: dict[str, Any] = {"scene": scene.tables(), "made_with": made_with}
+    try:
+        paths = [Path(f.path) for f in scene.fmu if f.path]
+        files = [sha256(path.read_bytes()).hexdigest() for path in paths]
+    except OSError as error:
+        raise InputFault(f"{error.filename}: cannot be read: {error.strerror}") from error
+    return sha256(to_json(whole | {"fmus": files}, inf_nan_mode="constants")).hexdigest()
+
+
+@cache
+def _made_with() -> list[str]:
+    """What computes a row: Python, packages and sources, in C too, but nothing that only draws."""
+    code = sources(
+        hapticlink.components, hapticlink.fmus, hapticlink.orchestrator, hapticlink.analysis
+    )
+    return [python_version(), *(version(name) for name in PACKAGES), code]

@@ -1,0 +1,150 @@
+"""Runs jobs in a pool of processes: a crash fails one run, and Ctrl-C ends all processes.
+
+Each process has at most one job. When a process dies its pool breaks without saying which job was
+the cause: the jobs in progress are repeated one by one, and one that dies alone has failed.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.process import BaseProcess
+from types import ModuleType
+from typing import Any
+
+from hapticlink.analysis.sweep.job import Job
+from hapticlink.analysis.sweep.row import DIED, Row, failed
+from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.process_end import leave_threads
+from hapticlink.orchestrator.fmi import process_cache
+
+Work = Callable[[Job], Row]
+Done = tuple[Job, Row]
+RUNS = 200
+"""Runs of a process before it is replaced, since libraries of FMUs stay loaded."""
+
+
+def in_processes(work: Work, jobs: Sequence[Job], count: int) -> Iterator[Done]:
+    """Each job with its row, as they finish. Raises Interrupted after SIGINT or SIGTERM, when all
+    processes have ended."""
+    queue = deque(jobs)
+    while queue:
+        suspects = yield from _spread(work, queue, count)
+        for job in suspects:
+            if (yield from _spread(work, deque([job]), 1)):
+                yield job, failed(DIED, "the process of this run crashed")
+
+
+def _spread(work: Work, queue: deque[Job], count: int) -> Generator[Done, None, list[Job]]:
+    """Runs jobs from `queue` until it is empty; if a process dies, returns the jobs in progress."""
+    in_progress: dict[Future[Row], Job] = {}
+    with _executor(min(count, len(queue))) as pool:
+        while queue or in_progress:
+            try:
+                while queue and len(in_progress) < count:
+                    with _signals_blocked():
+                        in_progress[pool.submit(work, queue[0])] = queue[0]
+                    queue.popleft()
+                ready = wait(in_progress, timeout=0.2, return_when=FIRST_COMPLETED).done
+                interrupt.check()
+                for future in ready:
+                    row = future.result()
+                    yield in_progress.pop(future), row
+            except BrokenProcessPool:
+                return list(in_progress.values())
+    return []
+
+
+class _Worker(SpawnProcess):
+    """A spawned process that does not import the caller's main script, as it would by default: a
+    script needs no `if __name__ == "__main__"`, and need not be a file."""
+
+    @staticmethod
+    def _Popen(process: BaseProcess) -> Any:
+        main = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            return SpawnProcess._Popen(process)
+        finally:
+            sys.modules["__main__"] = main
+
+    def run(self) -> None:
+        with process_cache.unpacked_once():
+            super().run()
+        leave_threads(0)
+
+
+@contextmanager
+def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
+    before = set(multiprocessing.active_children())
+
+    def kill() -> None:
+        for process in set(multiprocessing.active_children()) - before:
+            process.kill()
+            process.join(1.0)
+
+    context = SpawnContext()  # FMUs hold threads and libraries: no fork
+    context.Process = _Worker  # type: ignore[misc]
+    pool = ProcessPoolExecutor(
+        count, mp_context=context, initializer=_follow, max_tasks_per_child=RUNS
+    )
+    interrupt.add(kill)
+    try:
+        yield pool
+    except BaseException:
+        workers = set(multiprocessing.active_children()) - before
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in workers:
+            process.terminate()
+        for process in workers:  # time to remove their folders, since `shutdown` does not wait
+            process.join(5.0)
+            if process.is_alive():
+                process.kill()
+                process.join(1.0)
+            if process.pid:
+                temporary_folders.clear(process.pid)
+        raise
+    finally:
+        pool.shutdown()
+        interrupt.remove(kill)
+
+
+@contextmanager
+def _signals_blocked() -> Iterator[None]:
+    """Processes and threads that are created in this context get no Ctrl-C from the terminal, not
+    even during their imports."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _follow() -> None:
+    """Initialises a worker: it ignores SIGINT, which its parent handles, ends orderly by SIGTERM so
+    that its folders are removed, and ends with its parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    while True:  # the first signal ends the run, the second one the process
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.5)

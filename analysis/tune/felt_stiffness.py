@@ -1,0 +1,85 @@
+"""What a hand feels: the dynamic stiffness 1/|n' X n| (N/m) of the handle along a wrench n with a
+unit force, X its compliance at a frequency of pressing (held.py).
+
+Of a joint constraint n is a wrench that no motion of the mechanism answers, in null(S Lambda^-1 S),
+the one of them with the largest force; of a contact it is the contact's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.optimize import brentq
+
+from hapticlink.analysis.tune.gains import Scales
+from hapticlink.analysis.tune.held_equilibria import Complex, Held, Matrix, Vector
+from hapticlink.analysis.tune.largest_scale import DOUBLINGS
+from hapticlink.analysis.tune.spring_hand import FIRM
+from hapticlink.analysis.tune.stability_limits import FINE
+from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.base.faults import InputFault
+
+HERTZ = 2.0
+"""Frequency of pressing: the slower, the stiffer a constraint feels, whatever its gains."""
+RIGID = 1e7
+"""Felt stiffness (N/m) above which nothing gives way."""
+CONSTRAINED = 1e-6
+"""Of the largest scaled mobility, up to which a direction does not move."""
+
+
+class Feel:
+    """What is felt in a pose along unit wrenches, by name: "constraint", "contact"."""
+
+    def __init__(self, place: Held, along: Mapping[str, Vector]) -> None:
+        self._place, self.along, self.gains = place, along, place.gains
+
+    @classmethod
+    def of(cls, place: Held, linkage: Linkage) -> Feel:
+        """Raises InputFault where no direction is constrained and nothing touches."""
+        found = {}
+        blocks = ("virtual_environment", "virtual_mechanism")
+        mobilities = (place.signal(f"{block}.Lambda_inv") for block in blocks)
+        mobility = next(values for values in mobilities if len(values)).reshape(3, 3)
+        S: Matrix = np.diag([1.0, 1.0, mean_link_length(linkage)])
+        values, vectors = np.linalg.eigh(S @ mobility @ S)
+        null = [S @ vectors[:, i] for i in range(3) if values[i] < CONSTRAINED * values[-1]]
+        if null:
+            n = max(null, key=lambda wrench: float(np.hypot(*wrench[:2])))
+            found["constraint"] = n / np.hypot(*n[:2])
+        F = place.signal("virtual_mechanism.F_env")
+        if len(F) and (size := float(np.hypot(*F[:2]))):
+            found["contact"] = F / size
+        if not found:
+            raise InputFault(
+                "no direction of the handle is constrained, and nothing touches: no stiffness to "
+                "tune"
+            )
+        return cls(place, found)
+
+    def compliance(self, scales: Scales) -> Complex:
+        """That of the handle, (3, 3), in a firm grip."""
+        return self._place.compliance(scales, FIRM, HERTZ)
+
+    def felt(self, X: Complex) -> dict[str, float]:
+        """The felt stiffness (N/m) along each wrench; infinite where nothing gives way."""
+        gives = {name: float(abs(n @ X @ n)) for name, n in self.along.items()}
+        return {name: 1.0 / x if x * RIGID > 1.0 else np.inf for name, x in gives.items()}
+
+    def alike(self, scales: Scales) -> dict[str, float]:
+        """`scales` with the topology's one with which the constraint feels like the contact.
+        Raises InputFault where there is none."""
+
+        def apart(logarithm: float) -> float:
+            felt = self.felt(self.compliance({**scales, "topology": float(np.exp(logarithm))}))
+            return float(np.log(felt["constraint"] / felt["contact"]))
+
+        end = float(np.log(scales["topology"]))
+        way = -np.sign(apart(end)) * np.log(2.0)
+        for _ in range(DOUBLINGS):
+            start, end = end, end + way
+            if apart(end) * way >= 0.0:
+                root = brentq(apart, start, end, xtol=FINE)
+                return {**scales, "topology": float(np.exp(root))}
+        raise InputFault("no stiffness of the topology controller feels like the contact")

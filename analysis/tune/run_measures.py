@@ -1,0 +1,47 @@
+"""What gains do along the scene's own run.
+
+A projector on the constrained directions that is held is stale while the mechanism moves, which no
+map of a rest knows: gains that stiffen a constraint can throw the handle off. So the handle may
+leave the operational point by at most TRACKED times as far as with the scene's own gains, scaled to
+the margin where they lack it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hapticlink.analysis.findings.tracking import tracking
+from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.scene import overrides
+
+TRACKED = 1.2
+
+
+def simulated(
+    scene: str | Path, given: Sequence[str], gains: Mapping[str, float | list[float]] = {}
+) -> Results:
+    """A run of the scene with gains as options. Raises InputFault where it has no row."""
+    with temporary_folders.room() as room:
+        made = simulate(scene, room, (*given, *overrides.written(gains)), csv=False)
+        if not made.outcome.published:
+            raise InputFault(f"the scene's own run fails: {made.outcome.fault}")
+        return made.results
+
+
+def motion(run: Results, end: float = 0.0) -> dict[str, float]:
+    """The largest distance (m) of handle and operational point, infinite where the run fails or
+    ends before `end` (s), and the largest energy (J) that was generated at the user's port."""
+    times, distances = tracking(run)
+    fails = run.run["fault"] or times[-1] < end
+    port = user_port(run)
+    return {
+        "distance": np.inf if fails else float(distances.max()) / 1e3,
+        "energy_peak": float(port.told["peak"]) if port else np.nan,
+    }

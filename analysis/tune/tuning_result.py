@@ -1,0 +1,117 @@
+"""The result of a tuning."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from hapticlink.analysis.tune.felt_stiffness import HERTZ
+from hapticlink.analysis.tune.held_equilibria import Complex, Vector
+from hapticlink.analysis.tune.poses import Pose
+from hapticlink.analysis.tune.spring_hand import HANDS
+from hapticlink.orchestrator.results.scene_file import scene_file
+from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.scene import overrides
+
+EQUAL = 0.03
+"""Difference of felt stiffnesses, relative, that is equal."""
+
+
+@dataclass
+class Tuned:
+    """run: of the scene with its own gains, without its tables. asked: the margin. poses: where
+    gains were judged; felt_at: the one where stiffness is felt, along unit wrenches: "constraint",
+    "contact". With the gains of the "scene" and the "tuned" ones, margins: g, also at neighbouring
+    rates, once judged; felt: stiffness (N/m) along each wrench; motion: along the run, the largest
+    "distance" of handle and operational point (m), and "energy_peak", the largest energy generated
+    at the user's port (J). gains: the tuned ones, as options of the scene. compliance: (3, 3) of
+    the handle with them. limited_by: why larger gains do not hold."""
+
+    run: Results
+    asked: float
+    poses: Sequence[Pose]
+    felt_at: str
+    along: Mapping[str, Vector]
+    margins: dict[str, float]
+    felt: dict[str, dict[str, float]]
+    motion: dict[str, dict[str, float]]
+    gains: dict[str, float | list[float]] = field(default_factory=dict)
+    compliance: Complex | None = None
+    limited_by: str | None = None
+
+    @property
+    def title(self) -> str:
+        return str(self.run.run["scene"]["title"])
+
+    def record(self) -> dict[str, Any]:
+        """The content of tune.json."""
+        X = self.compliance
+        return {
+            "title": self.title,
+            "gains": self.gains,
+            "margin_asked": self.asked,
+            "margins": self.margins,
+            "limited_by": self.limited_by,
+            "frequency": HERTZ,
+            "felt_stiffness": self.felt,
+            "felt_at": self.felt_at,
+            "along": {name: n.tolist() for name, n in self.along.items()},
+            "compliance": None if X is None else np.stack([X.real, X.imag], axis=-1).tolist(),
+            "motion": self.motion,
+            "poses": [asdict(pose) for pose in self.poses],
+            "hands": list(HANDS),
+        }
+
+    def scene(self) -> str:
+        """The scene with the tuned gains, as a file that stands alone."""
+        scene = deepcopy(self.run.run["scene"])
+        scene["title"] = f"{self.title}, gains tuned to a margin of {self.asked:g}"
+        for key, value in self.gains.items():
+            *names, last = key.split(".")
+            table = scene
+            for name in names:
+                if not isinstance(table[name], Mapping):  # true: all by default
+                    table[name] = {}
+                table = table[name]
+            table[last] = value
+        return scene_file(replace(self.run, run={**self.run.run, "scene": scene}))
+
+    @property
+    def finding(self) -> str:
+        """What contact and constraint feel like, or the one of them that there is."""
+        judged = self.margins.get("tuned")
+        said = "margin not judged yet" if judged is None else f"margin {judged:.3g}"
+        before, felt = self.felt["scene"], self.felt["tuned"]
+        if len(felt) == 1:
+            ((name, value),) = felt.items()
+            times = value / before[name]
+            return f"the {name} feels {times:.2g} times as stiff as with the scene's gains; {said}"
+        stiff, soft = sorted(felt, key=lambda name: felt[name], reverse=True)
+        times = felt[stiff] / felt[soft]
+        if times > 1 + EQUAL:
+            return f"the {stiff} feels {times:.2g} times as stiff as the {soft}; {said}"
+        return f"{stiff} and {soft} both feel like {felt[soft]:.3g} N/m; {said}"
+
+    def lines(self) -> Iterator[str]:
+        """The result as text."""
+        yield self.finding
+        yield f"limited by {self.limited_by}"
+        for at, margin in self.margins.items():
+            yield f"margin, {at}: {margin:.3g}" + (" (unstable)" if margin < 1.0 else "")
+        for gains, felt in self.felt.items():
+            for name, value in felt.items():
+                yield f"{gains} gains: {name} feels like {value:.4g} N/m at {HERTZ:g} Hz"
+        for gains, run in self.motion.items():
+            far = f"handle at most {1e3 * run['distance']:.3g} mm off"
+            if not np.isfinite(run["distance"]):
+                far = "a fault, or not passive"
+            yield (
+                f"{gains} gains: along the run, {far}, "
+                f"at most {1e3 * run['energy_peak']:.3g} mJ generated at the user's port"
+            )
+        for option in overrides.written(self.gains):
+            yield f"--set '{option}'" if "[" in option else f"--set {option}"

@@ -1,0 +1,52 @@
+"""Maps the stability of a scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from hapticlink.analysis.maps import Map, made
+from hapticlink.analysis.sweep.points import Vary, axes
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.visualization.figures import sweep_figure
+
+
+def stability_map(
+    scene: str | Path | Scene,
+    vary: Vary,
+    options: Options = (),
+    *,
+    out: str | Path,
+    jobs: int | None = None,
+    check: int = 0,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Map:
+    """The stability of a scene over one or two keys of numbers, and any others (`vary`, as in
+    `sweep`), from the linearised map of its co-simulation.
+
+    The boundary is followed by bisection between neighbours with different verdicts, along every
+    numeric key but rates. `check` points, half of them off the boundary by 2 to 6 %, are chosen by
+    `seed` and run. Writes map.csv, after each line of points, and map.png to `out`; the same call
+    continues an interrupted map. `jobs` is the number of processes; `progress` is
+    called with the numbers of finished and of all lines of points. Raises InputFault for invalid
+    input, Fault if the map is interrupted.
+    """
+    from hapticlink.visualization.figures import map_figure as drawing
+
+    if jobs is not None and jobs < 1:
+        raise InputFault(f"--jobs {jobs}: give 1 or more")
+    if check < 0:
+        raise InputFault(f"--check {check}: give 0 or more")
+    folder = folders.ensure(out)
+    processes = jobs or os.cpu_count() or 1
+    tell = progress or (lambda done, of: None)
+    given = overrides.written(options)
+    found = made(scene, given, axes(vary), folder, processes, check, seed, tell)
+    sweep_figure.save(drawing.draw(found), folder / "map.png")
+    return found

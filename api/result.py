@@ -1,0 +1,87 @@
+"""The results of a run in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
+
+from hapticlink.analysis.findings import summary
+from hapticlink.analysis.findings.tracking import Tracking, pose_error, table_of
+from hapticlink.api.frame import frame
+from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.results.tables import Results, Table, Vector
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Run(Results):
+    """The results of a run, whether it failed or not.
+
+    `r["haptics"]` is the Table of a rate, `r["virtual_mechanism.x"]` a signal as a NumPy array:
+    (k,) of a scalar, (k, n) of a vector, (k, n, m) of a matrix, in the units of its FMU. Rates
+    differ, so that each signal has its own k times: `r.time("virtual_mechanism.x")`, in s.
+
+    `tables` are the Tables by rate, `run` is the content of run.json (the scene, versions, holds,
+    energies, ages of samples, timings), `folder` is the result folder, None for a run in memory.
+    """
+
+    def __getitem__(self, name: str) -> Any:
+        """The Table of a rate, or a signal of any rate. Raises KeyError with a hint for an unknown
+        name."""
+        return self.tables[name] if name in self.tables else self._table(name)[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.tables or any(name in table for table in self.tables.values())
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def time(self, name: str) -> Vector:
+        """The times (s) of a signal, or of a rate's rows. Raises KeyError for an unknown name."""
+        table: Table = self.tables[name] if name in self.tables else self._table(name)
+        return table["time"]
+
+    def frame(self, rate: str) -> pd.DataFrame:
+        """The Table of a rate as a pandas frame with the index `time` (s), a column per scalar.
+        Raises InputFault if pandas is not installed, KeyError for an unknown rate."""
+        if rate not in self.tables:
+            raise KeyError(unknown("rate", rate, self.tables))
+        return frame(self.tables[rate], "time")
+
+    @property
+    def fault(self) -> str | None:
+        """The message of the fault that ended the run, such as an FMU's error or a crash; None if
+        it ended regularly, also by `stop_when` or at the limit of the device's workspace."""
+        found = self.run.get("fault")
+        return found["message"] if found else None
+
+    def tracking(self) -> Tracking:
+        """Tracking error `(time_s, distance_mm, angle_rad)`: |x_S - x_D| and |theta_S - theta_D|
+        between operational point and handle at times (s). Raises KeyError if the scene does not
+        have both."""
+        return pose_error(self)
+
+    def figures(self) -> dict[str, Figure]:
+        """Matplotlib figures by name, as far as the scene has the signals: `mechanism`,
+        `trajectories`, `distance`, `forces`, `contact`, `constraints`, `energies`, `real_time`."""
+        from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
+
+        return run_figures.figures(self)
+
+    def _table(self, name: str) -> Table:
+        found = table_of(self, name)
+        if found is None or name == "time":
+            signals = [s for table in self.tables.values() for s in table.signals if s != "time"]
+            raise KeyError(unknown("rate or signal", name, [*self.tables, *signals]))
+        return found
+
+    def __repr__(self) -> str:
+        lines = [f"{self.run['scene']['title']}: {summary.ending(self)}"]
+        lines += [self.fault] if self.fault else []
+        lines += [f"{rate}: {shorten(repr(t), 88)}" for rate, t in self.tables.items()]
+        return "\n  ".join([*lines, f"folder: {self.folder or 'none, in memory'}"])

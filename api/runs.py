@@ -1,0 +1,145 @@
+"""Runs a scene, and reads results back."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from hapticlink.analysis.findings import summary
+from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.api.result import Run
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.plan import explain
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results import folders, tables
+from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.run.real_time import RealTimeRun
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.visualization import figure_axes
+from hapticlink.visualization.figures import figure_process
+
+MOST = 2**30
+"""Bytes of tables that a run in a folder reads back; as numbers they take half of that."""
+
+
+class RunInterrupted(Interrupted):
+    """A run was interrupted by Ctrl-C; `run` are its results up to then."""
+
+    def __init__(self, run: Run) -> None:
+        super().__init__(run.run["end"]["time"])
+        self.run = run
+
+
+def run(
+    scene: str | Path | Scene,
+    options: Options = (),
+    *,
+    out: str | Path | None = None,
+    figures: bool = True,
+    progress: Callable[[float], None] | None = None,
+    real_time: bool = False,
+) -> Run:
+    """Run a scene, changed by `options` (see `scene`).
+
+    The results are returned, and with `out` also written to that folder: a CSV per rate, run.json,
+    plan.txt and, where `figures` is true, figures. They replace those of an earlier run there from
+    the first row on. `progress` is called with the simulated time (s) from time to time.
+    `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
+    (docs/real-time.md).
+
+    Raises InputFault for invalid input, before anything runs. A fault during the run raises no
+    exception: it is the `fault` of the returned Run, which has the results up to then. Ctrl-C
+    raises RunInterrupted, with the results so far as its `run`. Tables of more than 1 GiB in `out`
+    are not read back; use `load` for them.
+    """
+    with interrupt.held():
+        read = open_scene.load(scene, options)
+        paced = RealTimeRun() if real_time else None
+        return run_paced(read, out, paced, figures, progress)
+
+
+def run_paced(
+    scene: Scene,
+    out: str | Path | None,
+    real_time: RealTimeRun | None,
+    figures: bool = True,
+    progress: Callable[[float], None] | None = None,
+    tables: bool = True,
+) -> Run:
+    """As `run`; without `out` and `tables` the results have no tables."""
+    with interrupt.held():
+        if out is None:
+            with temporary_folders.room() as room:
+                ended = simulate(scene, room, (), progress, csv=tables, real_time=real_time)
+                found = ended.results if tables else None
+            told = ended.run | _told(found) if found else ended.run
+            made = Run(None, told, found.tables if found else {})
+        else:
+            made = _in_folder(scene, Path(out), progress, figures, real_time)
+        if interrupt.came() or made.run["end"]["reason"] == "interrupted":
+            raise RunInterrupted(made)
+    return made
+
+
+def _told(results: Results) -> dict[str, Any]:
+    """What run.json says of the results: warnings, and the energy at the user's port."""
+    port = user_port(results)
+    return {"user_port": port and port.told, "warnings": list(summary.lines(results))}
+
+
+def _in_folder(
+    scene: Scene,
+    folder: Path,
+    progress: Callable[[float], None] | None,
+    figures: bool,
+    real_time: RealTimeRun | None,
+) -> Run:
+    ended = simulate(scene, folder, (), progress, real_time=real_time)
+    if ended.too_large(MOST):
+        said = "%s: tables of more than %d bytes are not read back and drawn; load them yourself"
+        logging.getLogger(__name__).warning(said, folder, MOST)
+        return Run(folder, ended.run, {})
+    found = ended.results
+    if not ended.outcome.published:
+        return Run(None, found.run, found.tables)
+    told = _told(found)
+    run = found.run | told
+    try:
+        run = folders.add(folder, (), told)
+        if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
+            run = folders.add(folder, _explained(ended))
+            run = folders.add(folder, _drawn(ended, found) if figures else ())
+    except Interrupted:
+        message = f"interrupted: {folder} has the results of the run, not all of its figures"
+        raise Fault(message) from None
+    except OSError as error:  # a full disk; the rows are there, and why the run ended is told
+        said = "%s has the results of the run, not all of its figures: %s"
+        logging.getLogger(__name__).warning(said, folder, error.strerror or error)
+    return Run(folder, run, found.tables)
+
+
+def _explained(ended: Experiment) -> list[str]:
+    """Writes the plan; returns its file's name. Raises Interrupted and OSError."""
+    (ended.folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed
+    with (ended.folder / "plan.txt").open("x", encoding="utf-8") as file:
+        for line in explain.explain(Plan(ended.system)):
+            interrupt.check()
+            file.write(f"{line}\n")
+    return ["plan.txt"]
+
+
+def _drawn(ended: Experiment, found: Results) -> list[str]:
+    """Writes the figures; returns their names. Raises Interrupted and OSError."""
+    return figure_axes.write(figure_process.pngs(found), ended.folder)
+
+
+def load(folder: str | Path) -> Run:
+    """Read the results of a run from its folder. Raises InputFault if it contains no run."""
+    found = tables.load(folder)
+    return Run(found.folder, found.run, found.tables)

@@ -1,0 +1,130 @@
+"""Runs many variants of a scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.analysis.sweep import Unfinished, grid, job, row, table
+from hapticlink.analysis.sweep import sweep as make
+from hapticlink.analysis.sweep.points import Runs, Vary, points
+from hapticlink.api.frame import frame
+from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base.faults import Fault, InputFault, unknown
+from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.visualization.figures import sweep_figure
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Sweep:
+    """The table of a sweep: `s["tracking_max_mm"]` is a column as a NumPy array, one entry per run.
+
+    `rows` are the runs, `keys` the varied keys, `folder` contains `files`, None in memory.
+    """
+
+    rows: list[dict[str, Any]]
+    keys: tuple[str, ...]
+    folder: Path | None
+    files: tuple[str, ...] = ()
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of the columns, varied keys first."""
+        return table.columns(self.rows)
+
+    @property
+    def failed(self) -> list[dict[str, Any]]:
+        """The rows of failed runs, with the reason in `end` and `message`."""
+        return [r for r in self.rows if r["end"] in row.FAILED]
+
+    def __getitem__(self, column: str) -> NDArray[Any]:
+        """A column as numbers, NaN where a run has none, or as text if an entry is no number.
+        Raises KeyError with a hint for an unknown name."""
+        if column not in self.columns:
+            raise KeyError(unknown("column", column, self.columns))
+        cells = [str(r.get(column, "")) for r in self.rows]
+        numbers = [grid.number(cell) if cell else np.nan for cell in cells]
+        return np.array(numbers if any(cells) and None not in numbers else cells)
+
+    def frame(self) -> pd.DataFrame:
+        """The table as a pandas frame. Raises InputFault if pandas is not installed."""
+        return frame({name: self[name] for name in self.columns})
+
+    def figure(self, metric: str | None = None) -> Figure | None:
+        """A Matplotlib figure of a column (`metric`, by default the largest tracking error) against
+        the varied keys; None if there is no number to draw. Raises InputFault for a metric that is
+        no column of numbers."""
+        return sweep_figure.draw(self.rows, self.keys, metric)
+
+    def __repr__(self) -> str:
+        ends = f"{len(self.rows)} runs over {', '.join(self.keys)}, {len(self.failed)} failed"
+        return f"{ends}\n  {', '.join(self.columns)}\n  folder: {self.folder or 'none, in memory'}"
+
+
+def sweep(
+    scene: str | Path | Scene,
+    vary: Vary = (),
+    options: Options = (),
+    *,
+    runs: Runs = (),
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    metric: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Sweep:
+    """Run many variants of a scene in parallel, in a pool of processes.
+
+    `vary` gives each key its values, `{"graphics.rate": range(10, 61, 10), "hold": ["zoh", "foh"]}`
+    or, as on the command line, `["graphics.rate=10..60..10", "hold=zoh,foh"]`; every combination is
+    run. Alternatively `runs` lists the options of each run, or is a file with them. `options` (see
+    `scene`) apply to all runs.
+
+    The table is returned, and with `out` also written to that folder: table.csv, sweep.png (of the
+    column `metric`) and a file per row, so that an interrupted sweep can be continued by the same
+    call. `jobs` is the number of runs at a time, by default one per processor; `scheduler` is the
+    address of a Dask scheduler to run on. `progress` is called with the numbers of finished and of
+    all runs.
+
+    A run that fails is a row of the table. Raises InputFault for invalid input and if every run is
+    refused, Fault if the sweep is interrupted.
+    """
+    if jobs is not None and jobs < 1:
+        raise InputFault(f"--jobs {jobs}: give 1 or more")
+    varied = points(vary, runs)
+    made = job.jobs(scene, overrides.written(options), varied)
+    if metric:
+        sweep_figure.check(metric, [j.scene for j in made if j.scene])
+    keys = tuple(dict.fromkeys(key for point in varied for key in point))
+
+    def into(folder: Path) -> list[row.Row]:
+        tell = progress or (lambda done, of: None)
+        processes = jobs or os.cpu_count() or 1
+        return make(made, folder, processes, scheduler, lambda done: tell(done, len(made)))
+
+    if out is None:
+        with temporary_folders.room() as room:
+            try:
+                return Sweep(into(room), keys, None)
+            except Unfinished as left:
+                advice = "with a folder `out` they are kept, and the same call continues"
+                raise Fault(f"interrupted: {left.done} of {left.of} runs; {advice}") from None
+    folder = folders.ensure(out)
+    found = Sweep(into(folder), keys, folder, ("table.csv",))
+    if drawn := found.figure(metric):
+        sweep_figure.save(drawn, folder / "sweep.png")
+        return replace(found, files=("table.csv", "sweep.png"))
+    return found

@@ -1,0 +1,77 @@
+"""`hapticlink bench`: needs a checkout, where benchmarks/ is."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from hapticlink.commands import checkout
+from hapticlink.commands.options import Out
+from hapticlink.commands.progress import timed
+from hapticlink.orchestrator.base import interrupt
+
+BENCHES = {
+    "mechanism": "benchmarks.run:mechanism_bench",
+    "singular": "benchmarks.singular:bench",
+    "local-model": "benchmarks.local_model:bench",
+    "master": "benchmarks.master:bench",
+    "cosimulation": "benchmarks.cosimulation:bench",
+    "skip": "benchmarks.skip:bench",
+    "real-time": "benchmarks.real_time:bench",
+    "stress": "benchmarks.stress:bench",
+    "view": "benchmarks.view:bench",
+}
+FOLDERS = {"stress": "stability"}
+"""Folders in results/ that are not named like the benchmark."""
+
+
+def bench(
+    what: Literal[
+        "mechanism",
+        "singular",
+        "local-model",
+        "master",
+        "cosimulation",
+        "skip",
+        "real-time",
+        "stress",
+        "view",
+    ],
+    /,
+    *,
+    out: Out = None,
+    quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
+) -> int:
+    """Measure run time, error and limits; WHAT is one of
+
+    - mechanism: run time against error, beside the multibody codes that are installed
+    - singular: errors over many rates on motions through singular poses
+    - local-model: cost and error of the local model
+    - master: the event loop, beside the masters that are installed
+    - cosimulation: run time against error of whole co-simulations
+    - skip: what leaving out the unneeded saves
+    - real-time: deadlines missed in real time
+    - stress: hard scenes at the edge of stability and beyond, each with the outcome it has to have
+    - view: deadlines missed and latencies while a browser drags
+
+    Writes a page with tables and figures to OUT (default results/WHAT, for stress
+    results/stability). An interrupted benchmark is continued by the same command.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    make = checkout.function("bench", BENCHES[what])
+    folder = out or checkout.folder("bench") / "results" / FOLDERS.get(what, what)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    command = f"hapticlink bench {what}{' --quick' * quick}"
+    with timed(command), Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(what)
+
+        def told(text: str, done: int, total: int) -> None:
+            interrupt.check()
+            bar.update(task, description=text, completed=done, total=total)
+
+        page = make(folder, quick, told, command)
+    print(page or folder / "README.md")
+    return 0

@@ -1,0 +1,122 @@
+"""`hapticlink doctor`."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Iterator
+from importlib import metadata
+from typing import Any
+
+from hapticlink.commands.options import Json, tell
+
+HIDDEN = ("test",)
+"""Extras for those who change the project, not for those who use it."""
+
+
+def doctor(*, json: Json = False) -> int:
+    """Tell versions, optional parts that are missing and how to install them, and the cache; build
+    a small FMU of each packaging that is there, and run it. The exit status is 1 if that fails."""
+    found = _found()
+    tell(_lines(found), found, quiet=False, as_json=json)
+    return 0 if all(state == "works" for state in found["runs"].values()) else 1
+
+
+def _found() -> dict[str, Any]:
+    from hapticlink.fmus import cache
+
+    folder = cache.folder()
+    fmus = [*folder.glob("**/*.fmu")] if folder else []
+    return {
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "processors": os.cpu_count(),
+        "versions": _versions(metadata.requires("hapticlink") or (), ""),
+        "extras": {
+            extra: _versions(metadata.requires("hapticlink") or (), extra)
+            for extra in metadata.metadata("hapticlink").get_all("Provides-Extra") or ()
+            if extra not in HIDDEN
+        },
+        "compiled_loop": _loop(),
+        "cache": {
+            "folder": str(folder) if folder else None,
+            "fmus": len(fmus),
+            "bytes": sum(f.stat().st_size for f in fmus),
+        },
+        "runs": _runs(),
+    }
+
+
+def _versions(requirements: Any, extra: str) -> dict[str, str | None]:
+    """The packages that an extra, or with "" the project itself, asks for on this platform, with
+    the versions that are there; None where one is missing or too old."""
+    from packaging.requirements import Requirement
+
+    found: dict[str, str | None] = {}
+    for text in requirements:
+        asked = Requirement(text)
+        needed = asked.marker is None or asked.marker.evaluate({"extra": extra})
+        if not needed or (extra and (asked.marker is None or asked.marker.evaluate({"extra": ""}))):
+            continue
+        if asked.name == "hapticlink":  # an extra that takes in others
+            for inner in asked.extras:
+                found |= _versions(requirements, inner)
+            continue
+        try:
+            version = metadata.version(asked.name)
+        except metadata.PackageNotFoundError:
+            found[asked.name] = None
+        else:
+            found[asked.name] = version if asked.specifier.contains(version, True) else None
+    return found
+
+
+def _loop() -> str:
+    from hapticlink.orchestrator.run.compiled import library
+
+    try:
+        library.load()
+    except library.Unavailable as why:
+        return f"no, events run in Python: {why}"
+    return "yes"
+
+
+def _runs() -> dict[str, str]:
+    """For each packaging of FMUs that can be built here, `works` or what went wrong."""
+    from importlib.util import find_spec
+
+    import hapticlink as hl
+    from hapticlink.orchestrator.base.faults import Fault
+
+    found = {}
+    for packaging in ("python", "native") if find_spec("ziglang") else ("python",):
+        try:
+            made = hl.run("pendulum", {"duration": 0.05, "packaging": packaging})
+            found[packaging] = str(made.fault) if made.fault else "works"
+        except Fault as fault:
+            found[packaging] = str(fault)
+    return found
+
+
+def _lines(found: dict[str, Any]) -> Iterator[str]:
+    versions = [f"{name} {version or 'MISSING'}" for name, version in found["versions"].items()]
+    yield f"hapticlink {metadata.version('hapticlink')} in {sys.prefix}"
+    yield (
+        f"Python {found['python']} on {found['platform']}, {found['processors']} processors; "
+        f"{', '.join(versions)}"
+    )
+    yield f"compiled event loop: {found['compiled_loop']}"
+    for packaging, state in found["runs"].items():
+        yield f"FMUs, packaging = {packaging!r}: {state}"
+    if "native" not in found["runs"]:
+        yield "FMUs, packaging = 'native': no compiler, pip install 'hapticlink[native]'"
+    for extra, packages in found["extras"].items():
+        missing = [name for name, version in packages.items() if version is None]
+        state = f"pip install 'hapticlink[{extra}]' ({', '.join(missing)})" if missing else "there"
+        yield f"extra {extra}: {state}"
+    kept = found["cache"]
+    if kept["folder"] is None:
+        yield "cache of FMUs: off (HAPTICLINK_CACHE)"
+    else:
+        yield f"cache of FMUs: {kept['folder']}, {kept['fmus']} FMUs, {kept['bytes'] / 1e6:.0f} MB"

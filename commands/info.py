@@ -1,0 +1,161 @@
+"""`hapticlink info`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from hapticlink.analysis.findings.summary import MECHANISM
+from hapticlink.commands.options import Out, Scene, Set, Swap, default_folder, options
+from hapticlink.orchestrator.base.terminal_output import say
+from hapticlink.orchestrator.fmi.versions import IN_PROCESS
+from hapticlink.orchestrator.system.system import System
+
+if TYPE_CHECKING:
+    from hapticlink.orchestrator.base.ticks import Timeline
+
+
+Draw = Annotated[
+    bool,
+    Parameter(
+        negative="",
+        help="Draw the blocks and their connections, the mechanism where it starts, and the device "
+        "in its workspace, into OUT (default info/SCENE).",
+    ),
+]
+
+
+def info(
+    scene: Scene | None = None,
+    /,
+    *,
+    set: Set = None,
+    swap: Swap = None,
+    draw: Draw = False,
+    out: Out = None,
+) -> int:
+    """Describe a scene: rates, FMUs, connections and holds; the device's workspace, and whether the
+    scene starts in it; the parts of the equations that it needs and leaves out, with their cost.
+    Without SCENE, list the shipped scenes.
+
+    For example:
+
+        hapticlink info closed-loop --draw
+    """
+    import hapticlink as hl
+    from hapticlink.analysis.findings import summary
+    from hapticlink.orchestrator.plan import sample_ages
+    from hapticlink.orchestrator.plan.plan import Plan
+    from hapticlink.orchestrator.run.fetched_outputs import with_fetched
+    from hapticlink.orchestrator.system.built import built
+
+    if scene is None:
+        for name, title in hl.shipped().items():
+            say(f"{name}: {title}")
+        return 0
+    read = hl.scene(scene, options(set, swap))
+    with built(read) as made:
+        time = made.timeline
+        start = at_start(made) if read.linkage else {}
+        fetched = with_fetched(made).fmu
+    say(f"{read.title}\n{read.description.strip()}".strip())
+    say(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
+    if read.linkage and start:
+        for line in summary.moved(asdict(read.linkage), coordinates(start)):
+            say(f"  {line}")
+    for fmu in made.fmus:
+        timing = fmu.description.timing
+        every, some = (len(of.description.outputs) for of in (fmu, fetched[fmu.name]))
+        say(f"  {fmu.name}: {timing}, at {fmu.clock}, {every} outputs, {some} fetched")
+    say("\nconnections (age of the newest sample when it is used, ms)")
+    ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(made)).items()}
+    for connection in made.connections:
+        if connection.initial:
+            note = "once, at the start"
+        elif age := ages.get(connection.name):
+            note = f"{age['min'] * 1e3:.3g} to {age['max'] * 1e3:.3g}"
+        else:
+            note = "at the start only"
+        say(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
+    for line in summary.replaced({n: asdict(r) for n, r in made.replacements.items()}):
+        say(f"  {line}")
+    if read.device:
+        from hapticlink.analysis.findings import workspace
+
+        say("\ndevice's workspace")
+        for line in workspace.lines(read.device, _pose(start)):
+            say(f"  {line}")
+    _needs(read, time)
+    if draw or out:
+        _draw(read, made, start, out or default_folder("info", scene))
+    return 0
+
+
+def _pose(start: dict[str, float]) -> list[float]:
+    """Of the operational point at the start: x m, y m, theta rad."""
+    return [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)]
+
+
+def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:
+    from hapticlink.orchestrator.results import folders
+    from hapticlink.visualization.figures import block_diagram
+    from hapticlink.visualization.mechanism import drawing, workspace_drawing
+
+    figures = {"blocks": block_diagram.figure(system, f"Blocks of: {scene.title}")}
+    if q := coordinates(start):
+        figures["start"] = drawing.figure(scene, q)
+    if scene.device:
+        title = f"Device and its workspace: {scene.title}"
+        figures["workspace"] = workspace_drawing.draw(scene.device, _pose(start), title)
+    for name, figure in figures.items():
+        path = folders.ensure(out) / f"{name}.png"
+        figure.savefig(path, dpi=150, metadata={"Software": None})  # the same bytes every time
+        say(f"  {path}")
+
+
+def _needs(scene: Any, time: Timeline) -> None:
+    from hapticlink.orchestrator.scene import requirements
+    from hapticlink.orchestrator.system import costs
+
+    found = list(requirements.needs(scene))
+    for title, needed in (("needed", True), ("left out", False)):
+        say(f"\n{title}")
+        for need in found:
+            if need.needed == needed:
+                say(f"  {need.part}: {need.why}")
+    say("\noperations of a step and its outputs, signals in and out")
+    rows = {}
+    for title, skip in (("as it is", True), ("nothing left out", False)):
+        rows[title] = costs.costs(scene, time, skip=skip)
+        say(f"  {title}")
+        for row in rows[title]:
+            ports = sum(row.cost.inputs.values()), sum(row.cost.outputs.values())
+            say(f"    {row.name}: {row.cost.step} operations, {ports[0]} + {ports[1]} signals")
+        operations, signals = (sum(getattr(r, k) for r in rows[title]) for k in _PER_TICK)
+        say(f"    a haptic tick: {operations:.0f} operations, {signals:.0f} signals")
+
+
+_PER_TICK = ("operations", "signals")
+
+
+def at_start(system: System) -> dict[str, float]:
+    """Start values of the mechanism's outputs, as its FMU assembles it in initialisation mode; {}
+    without a mechanism, and with another FMU in its place, which `info` does not run."""
+    fmu = system.fmu.get(MECHANISM)
+    if fmu is None or fmu.description.block != MECHANISM:
+        return {}
+    outputs = np.zeros(len(fmu.description.outputs))
+    made = IN_PROCESS[fmu.description.fmi](MECHANISM, fmu.description, outputs, fmu.starts)
+    with made as instance:
+        instance.enter_initialization(1.0)
+        instance.read()
+    return dict(zip((s.name for s in fmu.description.outputs), outputs.tolist(), strict=True))
+
+
+def coordinates(values: dict[str, float]) -> list[float]:
+    """The joint coordinates q[1], q[2], ... among named values."""
+    return [float(value) for name, value in values.items() if name.startswith("q[")]

@@ -1,0 +1,102 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from hapticlink.commands import completion
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.terminal_output import say
+
+Scene = Annotated[
+    str,
+    Parameter(
+        help="Name of a shipped scene, or path of a scene file or SSP.",
+        completer=completion.scenes,
+    ),
+]
+Set = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--set",
+        consume_multiple=False,
+        negative="",
+        help="key=value, a dotted key of the scene file; repeatable.",
+        completer=completion.keys,
+    ),
+]
+Swap = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--swap",
+        consume_multiple=False,
+        negative="",
+        help="block=file.fmu, an FMU that replaces a block of the haptic loop; repeatable.",
+    ),
+]
+Out = Annotated[Path | None, Parameter(help="Folder to write to.")]
+Quiet = Annotated[
+    bool, Parameter(negative="", help="Print warnings and errors only, on standard error.")
+]
+Json = Annotated[
+    bool,
+    Parameter(
+        name="--json", negative="", help="Print the result as one JSON document and nothing else."
+    ),
+]
+
+
+def options(set: Iterable[str] | None, swap: Iterable[str] | None) -> tuple[str, ...]:
+    """The options of a scene: an [[fmu]] with `replaces` for each --swap, then those of --set,
+    which may change it (`--set fmu.controller.start.k=2`).
+
+    Raises InputFault for a swap that is not block=file.
+    """
+    return (*map(_swap, swap or ()), *(set or ()))
+
+
+def _swap(given: str) -> str:
+    from hapticlink.orchestrator.scene import overrides  # with all of a scene, slow to load
+
+    block, equals, file = given.partition("=")
+    if not (block and equals and file):
+        raise InputFault(f"--swap {given}: write block=file.fmu, e.g. --swap controller=my.fmu")
+    return (
+        f"fmu.+={overrides.text({'replaces': block, 'path': str(Path(file).resolve())}, '--swap')}"
+    )
+
+
+def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:
+    """The default output folder for a scene's name or path: `<root>/<scene>`, and with options
+    `<root>/<scene>,key=value,...`, so that a run does not replace one of other options.
+
+    Quotes, brackets and spaces behind commas are left out; where options hold other characters that
+    are not for file names, or many, the name ends with the start of their sha256.
+    """
+    known = scene.endswith((".toml", ".ssp"))
+    name = Path(scene).stem if known else Path(scene).name
+    given = re.sub(r"['\"\[\]]|(?<=,) +", "", ",".join(options))
+    if given:
+        plain = re.sub(r"[^\w.=,+-]", "_", given)[:LONGEST]
+        mark = "" if plain == given else f"-{hashlib.sha256(given.encode()).hexdigest()[:8]}"
+        name += f",{plain}{mark}"
+    return Path(root) / name
+
+
+LONGEST = 100
+"""Characters of options in the name of a folder."""
+
+
+def tell(lines: Iterable[str], record: Mapping[str, Any], quiet: bool, as_json: bool) -> None:
+    """Print the lines of a result; or with `as_json` its record alone; or with `quiet` nothing."""
+    if as_json:
+        print(json.dumps(record, indent=2))
+    elif not quiet:
+        say(*lines, sep="\n")

@@ -1,0 +1,94 @@
+"""A progress bar on stderr, if that is a terminal."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from time import monotonic
+
+from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.base.terminal_output import printable, say
+
+DURATIONS = "durations.json"
+"""In the folder of the cache: minutes by command."""
+
+
+@contextmanager
+def counted(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """Gives a function to be called with the numbers of finished and of all runs."""
+    with _bar(title, hidden) as show:
+        yield lambda done, of: show(done, of, f"{done} of {of} runs") if show else None
+
+
+@contextmanager
+def progress(
+    title: str, duration: float, hidden: bool = False
+) -> Iterator[Callable[[float], None] | None]:
+    """Gives a function to be called with the simulated time (s); None if stderr is no terminal."""
+    with _bar(title, hidden) as show:
+        yield (
+            (lambda time: show(time, duration, f"{time:.2f} of {duration:g} s")) if show else None
+        )
+
+
+@contextmanager
+def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> Iterator[None]:
+    """Says before a long command how many minutes it took at most on this machine, or `guess`, and
+    keeps how many it takes. Raises Fault where it is interrupted."""
+    from hapticlink.fmus import cache
+    from hapticlink.fmus.atomic_file import atomic_file
+
+    folder, known = cache.folder(), dict[str, float]()
+    if folder:
+        with suppress(OSError, ValueError):
+            known = json.loads((folder / DURATIONS).read_text(encoding="utf-8"))
+    took = known.get(command)
+    told = f"duration {guess}"
+    if took is not None:
+        told = f"duration up to {took:.1f} minutes here, less what is done already"
+    if not hidden:
+        say(f"{command}: {told}", file=sys.stderr)
+    begun = monotonic()
+    try:
+        yield
+    except Interrupted:
+        raise Fault("interrupted; what was finished is kept") from None
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
+        known[command] = max((monotonic() - begun) / 60, took or 0.0)
+        with suppress(OSError), atomic_file(folder / DURATIONS) as unfinished:
+            unfinished.write_text(json.dumps(known, indent=1), encoding="utf-8")
+
+
+@contextmanager
+def waiting(what: str, hidden: bool = False) -> Iterator[None]:
+    """Says what is being done, for as long as it takes, where nothing can be counted."""
+    if hidden or not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+    from rich.markup import escape
+
+    with Console(stderr=True).status(escape(printable(what))):
+        yield
+
+
+@contextmanager
+def _bar(title: str, hidden: bool) -> Iterator[Callable[[float, float, str], None] | None]:
+    if hidden or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    said = TextColumn("{task.description}", markup=False)
+    columns = (said, BarColumn(), TextColumn("{task.fields[at]}"))
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task(printable(title), total=None, at="building")
+
+        def show(completed: float, total: float, at: str) -> None:
+            bar.update(task, completed=completed, total=total, at=at)
+
+        yield show

@@ -1,0 +1,30 @@
+"""`hapticlink recover`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from hapticlink.orchestrator.base.terminal_output import say
+
+Folder = Annotated[Path, Parameter(help="Folder of a run that was killed.")]
+
+
+def recover(folder: Folder, /) -> int:
+    """Make the CSVs of a run that was killed, and say up to where its rows are there.
+
+    For example:
+
+        hapticlink recover runs/closed-loop
+    """
+    from hapticlink.orchestrator.results.recover import recover
+
+    found = recover(folder)
+    for name, table in found.items():
+        lost = f"{table.lost or 'none'} lost"
+        say(f"{folder / name}.csv: {table.rows} rows to {table.time:.6g} s, {lost}")
+    if not found:
+        say(f"{folder}: there is nothing to recover")
+    return 0

@@ -1,0 +1,40 @@
+"""`hapticlink report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.terminal_output import say
+
+Runs = Annotated[list[Path], Parameter(help="Folders of runs.", negative="")]
+Out = Annotated[Path | None, Parameter(help="File to write; by default reports/RUNS.html.")]
+
+
+def report(runs: Runs, /, *, out: Out = None) -> int:
+    """Write a page of a run, or of several beside each other: what ran, how it ended, how well it
+    did, energies, timing, what was set differently, and how to make it again.
+
+    For example:
+
+        hapticlink report runs/closed-loop
+        hapticlink report runs/on runs/off --out report.html
+    """
+    from hapticlink.fmus.atomic_file import atomic_file
+    from hapticlink.orchestrator.results import folders
+    from hapticlink.orchestrator.results.checked_run import named
+    from hapticlink.visualization.compare import page
+
+    found = named(runs)
+    path = out or Path("reports") / f"{'+'.join(name.replace('/', '-') for name in found)}.html"
+    if path.is_dir():
+        raise InputFault(f"--out {path}: is a folder; name a file, such as {path / 'report.html'}")
+    folders.ensure(path.parent)
+    text = page.page(found)
+    with atomic_file(path) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
+    say(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
+    return 0

@@ -1,0 +1,24 @@
+"""`hapticlink reproduce`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from hapticlink.commands import checkout
+from hapticlink.commands.options import Out
+from hapticlink.commands.progress import timed
+
+
+def reproduce(*, out: Out = None) -> int:
+    """Reproduce the report's figures from runs of the FMUs, with a page of the findings, in OUT
+    (default results/report)."""
+    make = checkout.function("reproduce", "studies.report:reproduce")
+
+    def tell(what: str) -> None:
+        print(what, file=sys.stderr)
+
+    with timed("hapticlink reproduce"):
+        page = make(out or Path("results/report"), tell)
+    print(page)
+    return 0

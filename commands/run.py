@@ -1,0 +1,114 @@
+"""`hapticlink run`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from hapticlink.commands.options import (
+    Json,
+    Out,
+    Quiet,
+    Scene,
+    Set,
+    Swap,
+    default_folder,
+    options,
+    tell,
+)
+from hapticlink.commands.progress import progress
+from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base.terminal_output import say
+from hapticlink.visualization.figures.figure_process import prepared
+
+if TYPE_CHECKING:
+    from hapticlink.api.result import Run
+
+Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
+Explain = Annotated[
+    bool, Parameter(negative="", help="Print what would run when, from which samples; do not run.")
+]
+RealTime = Annotated[
+    bool,
+    Parameter(
+        negative="",
+        help="Pace the haptic loop by the wall clock, with FMUs of other rates beside it.",
+    ),
+]
+
+
+def run(
+    scene: Scene,
+    /,
+    *,
+    out: Out = None,
+    set: Set = None,
+    swap: Swap = None,
+    figures: Figures = True,
+    explain: Explain = False,
+    real_time: RealTime = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Run a scene; write CSV files, run.json, plan.txt and figures to OUT (default
+    `runs/SCENE`, with options `runs/SCENE,key=value,...`).
+
+    A run replaces the results of an earlier one in its folder. The exit status is 0 for a regular
+    end, 1 for a run that failed (results up to then are kept), 2 for bad input.
+
+    For example:
+
+        hapticlink run closed-loop
+        hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
+        hapticlink run my-scene.toml --no-figures --json > result.json
+    """
+    # Not beside the steps of a run in real time, which it would delay.
+    with prepared() if figures and not (explain or real_time) else nullcontext():
+        import hapticlink as hl
+        from hapticlink.analysis.findings import summary
+
+        given = options(set, swap)
+        if explain:
+            say(*hl.explain(scene, given), sep="\n")
+            return 0
+        folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ())))
+        try:
+            read = hl.scene(scene, given)
+            with progress(read.title, read.duration, hidden=quiet) as told:
+                made = hl.run(read, out=folder, figures=figures, progress=told, real_time=real_time)
+        except hl.RunInterrupted as ended:
+            made = ended.run
+    if made.fault:
+        say(f"hapticlink: {made.fault}", file=sys.stderr)
+    warned = made.run.get("warnings")
+    if warned is None:  # no row is in the folder, or too many to be read back
+        warned = list(summary.lines(made))
+    if quiet or json:
+        for line in warned:
+            say(f"hapticlink: {line}", file=sys.stderr)
+    name = default_folder("runs", scene).name
+    tell(_lines(made, warned, name, folder), made.run, quiet, json)
+    return Fault.exit_status if made.fault else 0
+
+
+def _lines(made: Run, warned: Sequence[str], name: str, folder: Path) -> Iterator[str]:
+    from hapticlink.analysis.findings import summary
+    from hapticlink.orchestrator.results.tables import TABLES
+
+    yield f"{name}: {summary.ending(made)}"
+    for line in (*summary.numbers(made), *warned):
+        yield f"  {line}"
+    wall_time = made.run["timings"]["run"]
+    if wall_time:  # none where a signal came before the first event
+        speed = made.run["end"]["time"] / wall_time
+        yield f"  {wall_time:.2f} s of run time, {speed:.1f} times real time"
+    if made.folder:
+        names = sorted(made.run["files"], key=lambda name: not name.endswith(TABLES))
+        yield f"  {folder}/: {', '.join(names)}"
+    else:
+        yield f"  {folder}/ is unchanged: the run has no row"

@@ -1,0 +1,139 @@
+"""`hapticlink stability`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from hapticlink.commands.options import (
+    Json,
+    Out,
+    Quiet,
+    Scene,
+    Set,
+    Swap,
+    default_folder,
+    options,
+    tell,
+)
+from hapticlink.commands.progress import counted, timed, waiting
+from hapticlink.commands.sweep import Jobs, Vary
+
+At = Annotated[float, Parameter(help="Time (s) from which on no target, drive or wrench changes.")]
+Growth = Annotated[
+    float | None,
+    Parameter(
+        help="Instead, how fast perturbations grow along the run in this time (s) from AT on."
+    ),
+]
+UserPort = Annotated[
+    bool, Parameter(negative="", help="Tell as well whether any hand could be given energy.")
+]
+Check = Annotated[
+    int, Parameter(help="Points of the map to be checked by runs, near the boundary and away.")
+]
+Seed = Annotated[int, Parameter(help="Seed of the choice of these points.")]
+
+
+def stability(
+    scene: Scene,
+    /,
+    *,
+    out: Out = None,
+    set: Set = None,
+    swap: Swap = None,
+    at: At = 0.0,
+    port: UserPort = False,
+    growth: Growth = None,
+    vary: Vary = None,
+    check: Check = 0,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Tell whether small motions of a scene around its rest decay, how fast, and who takes part.
+
+    The scene needs a hand that holds the mechanism and does not move, such as an arm. Prints the
+    result, which docs/stability.md explains line by line, and writes stability.json to OUT
+    (default `runs/SCENE`, with options `runs/SCENE,key=value,...`).
+
+    With --vary, a map over one or two numeric keys and others, refined at the boundary: map.csv
+    and map.png in OUT (default maps/SCENE); the same command continues an interrupted map.
+
+    For example:
+
+        hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
+        hapticlink stability virtual-wall --port
+        hapticlink stability virtual-wall --vary fmu.wall.start.stiffness=2000..8000:4 --check 2
+    """
+    chosen = (*(set or ()), *(swap or ()))
+    name = default_folder("runs", scene).name
+    if vary:
+        folder = out or default_folder("maps", scene, chosen)
+        lines, record = _map(scene, folder, options(set, swap), vary, check, seed, jobs, quiet)
+        tell((f"{name}: {next(lines)}", *lines), record, quiet, json)
+        return 0
+    import hapticlink as hl
+    from hapticlink.orchestrator.results import folders
+    from hapticlink.orchestrator.results.files import write_json
+
+    given = options(set, swap)
+    if growth is not None:
+        rate = hl.finite_time_growth(scene, given, at=at, seconds=growth)
+        said = (
+            f"{name}: over {growth:g} s from {at:g} s on, the worst",
+            f"  perturbation grows at {rate:.5g} 1/s: no verdict on stability",
+        )
+        tell(said, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json)
+        return 0
+    with waiting(f"{name}: equilibrium and linearisation, which can take a minute", quiet):
+        user = hl.passivity(scene, given, at=at) if port else None  # refuses many forces at once
+        found = hl.stability(scene, given, at=at)
+    folder = folders.ensure(out or default_folder("runs", scene, chosen))
+    record = found.record() | ({"port": user.record()} if user else {})
+    write_json(folder / "stability.json", record)
+    told = (*found.lines(), *(user.lines() if user else ()), f"{folder}/stability.json")
+    tell((f"{name}: {found.verdict}", *(f"  {line}" for line in told)), record, quiet, json)
+    return 0
+
+
+def _map(
+    scene: str,
+    folder: Path,
+    options: tuple[str, ...],
+    vary: list[str],
+    check: int,
+    seed: int,
+    jobs: int | None,
+    quiet: bool,
+) -> tuple[Iterator[str], dict[str, Any]]:
+    import hapticlink as hl
+
+    command = f"hapticlink stability {scene} --vary {' --vary '.join(vary)}"
+    with timed(command, hidden=quiet), counted(scene, hidden=quiet) as count:
+        made = hl.stability_map(
+            scene, vary, options, out=folder, check=check, seed=seed, jobs=jobs, progress=count
+        )
+    verdicts = [row["verdict"] for row in made.of("grid")]
+    said = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+    lines = [
+        f"{len(verdicts)} points, {said}",
+        f"  {len(made.of('boundary'))} points of the boundary",
+    ]
+    reasons = [row["message"] for row in made.of("grid") if row["verdict"] == "refused"]
+    lines += [f"  refused, the first one: {reason}" for reason in reasons[:1]]
+    if check:
+        runs = made.of("check")
+        other = [row for row in runs if not row.get("agree")]
+        lines.append(f"  {len(runs) - len(other)} of {len(runs)} runs agree with the map")
+        keys = [text.partition("=")[0] for text in vary]
+        for row in other:
+            point = ", ".join(f"{key}={row[key]}" for key in keys)
+            run = row.get("run_verdict", "not judged")
+            lines.append(f"  not at {point}: map {row['verdict']}, run {run}")
+    lines.append(f"  {folder}/: map.csv, map.png")
+    return iter(lines), {"folder": str(folder), "rows": made.rows}

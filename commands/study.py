@@ -1,0 +1,30 @@
+"""`hapticlink study`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from hapticlink.commands import checkout
+from hapticlink.commands.options import Out
+from hapticlink.commands.sweep import Jobs
+from hapticlink.orchestrator.base.terminal_output import say
+
+
+def study(*, out: Out = None, jobs: Jobs = None) -> int:
+    """Study which hold, with which gains, at which graphics rate; write tables, figures and a page
+    to OUT (default results/mismatch). Runs are kept in sweeps/mismatch, so that an interrupted
+    study can be continued."""
+    from hapticlink.commands.progress import counted, timed
+
+    make = checkout.function("study", "studies.mismatch:study")
+    expected = checkout.function("study", "studies.mismatch:expected")
+    processes = jobs or os.cpu_count() or 1
+    guess = f"about {expected(processes):.0f} minutes with {processes} processes"
+    with timed("hapticlink study", guess), counted("study") as tell:
+        page = make(
+            out or Path("results/mismatch"), Path("sweeps/mismatch"), processes,
+            lambda stage, done, of: tell(done, of),
+        )  # fmt: skip
+    say(str(page))
+    return 0

@@ -1,0 +1,86 @@
+"""`hapticlink sweep`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from hapticlink.commands.options import Json, Out, Quiet, Scene, Set, default_folder, tell
+from hapticlink.commands.progress import counted
+from hapticlink.orchestrator.base.terminal_output import say
+
+Vary = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--vary",
+        consume_multiple=False,
+        negative="",
+        help="key=values, repeatable: every combination is run. Values are separated by commas; "
+        "a..b is every whole number from a to b, a..b..step has that step, a..b:n has n evenly "
+        "spaced points. E.g. --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh",
+    ),
+]
+Runs = Annotated[
+    Path | None,
+    Parameter(
+        help="Instead of --vary, a list of runs: a CSV with a column per key, or a TOML of [[run]]."
+    ),
+]
+Jobs = Annotated[int | None, Parameter(help="Runs at a time; default one per processor.")]
+Scheduler = Annotated[
+    str | None, Parameter(help="Address of a Dask scheduler to run on, e.g. tcp://10.0.0.5:8786.")
+]
+Metric = Annotated[str | None, Parameter(help="The column of table.csv that the figure shows.")]
+
+
+def sweep(
+    scene: Scene,
+    /,
+    *,
+    vary: Vary = None,
+    runs: Runs = None,
+    out: Out = None,
+    set: Set = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    metric: Metric = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Run many variants of a scene in parallel; write table.csv and sweep.png to OUT (default
+    sweeps/SCENE).
+
+    A run that fails is a row of the table. The exit status is 2 if every run is refused, 1 if every
+    run fails. An interrupted sweep is continued by the same command; finished runs are not
+    repeated.
+
+    For example:
+
+        hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh
+        hapticlink sweep closed-loop --vary graphics.rate=10..60:11 --metric tracking_max_mm
+    """
+    import hapticlink as hl
+    from hapticlink.analysis.sweep.row import REFUSED
+    from hapticlink.orchestrator.base.faults import InputFault
+
+    folder = out or default_folder("sweeps", scene)
+    with counted(scene, hidden=quiet) as count:
+        made = hl.sweep(
+            scene, vary or (), set or (), runs=runs or (), out=folder, jobs=jobs,
+            scheduler=scheduler, metric=metric, progress=count,
+        )  # fmt: skip
+    for each in made.failed[:10]:
+        what = ", ".join(f"{k}={v}" for k, v in each.items() if k in made.keys)
+        say(f"hapticlink: {what}: {each['end']}: {each['message']}", file=sys.stderr)
+    runs_made, failed = len(made.rows), len(made.failed)
+    lines = (
+        f"{default_folder('sweeps', scene).name}: {runs_made} runs, {failed} of them failed",
+        f"  {folder}/: {', '.join(made.files)}",
+    )
+    tell(lines, {"folder": str(folder), "rows": made.rows}, quiet, json)
+    if failed < runs_made:
+        return 0
+    return InputFault.exit_status if all(r["end"] == REFUSED for r in made.rows) else 1

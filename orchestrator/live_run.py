@@ -1,0 +1,289 @@
+"""A scene that runs in real time, and is watched and changed meanwhile."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import replace
+from fractions import Fraction
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.frames import Frames
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.fmi.capabilities import varies_step
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.run.energy.meter import Energy
+from hapticlink.orchestrator.run.make_holds import make_hold
+from hapticlink.orchestrator.run.python_loop import PythonLoop
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
+from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system import held_polynomials
+from hapticlink.orchestrator.system.assign_holds import misfit
+from hapticlink.orchestrator.system.ports import names
+from hapticlink.orchestrator.system.springs import limited_fmus, limited_gains
+from hapticlink.orchestrator.system.system import Connection, System
+
+Result = TypeVar("Result")
+SLOWEST = 1e-3
+"""Rate (Hz) below which a clock would not tick within a session."""
+
+
+class LiveRun:
+    """A scene that runs in real time; a `turn` between two events of the haptic loop reads and
+    changes the running FMUs, holds and clocks themselves. run.json lists the changes with their
+    times (`changes` of `real_time`)."""
+
+    def __init__(self, scene: str | Path | Scene, options: Options = ()) -> None:
+        self.scene = open_scene.load(scene, options)
+        """The scene that runs."""
+        self._schedule: Callable[[Callable[..., object]], RealTimeRun] = RealTimeRun
+        self.paused = False
+        """Whether time stands still; turns go on."""
+
+    def _repeated(
+        self, turn: Callable[[Any], object], every: float, run: Callable[[RealTimeRun], Result]
+    ) -> Result:
+        """What `run` returns, which runs `scene` with the pace that it is given; called again after
+        each `reset`. Turns come about `every` so many seconds."""
+        self._called, self._every = turn, round(1e9 * every)
+        while True:
+            self._until: int | None = None
+            self._again = False
+            self._settings: dict[str, tuple[list[Scalar], Callable[[Any], object]]] = {}
+            self._connections: dict[str, Connection] = {}
+            self._places: dict[str, list[int]] = {}
+            self._run = self._schedule(self._turn)
+            ended = run(self._run)
+            if not self._again:
+                return ended
+
+    # --- to read ----------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """The simulated time of the newest haptic event (s)."""
+        haptics = self._simulation.system.timeline.clocks[0].name
+        return self._simulation.seconds(self._loop.previous(haptics))
+
+    @property
+    def system(self) -> System:
+        """The FMUs, connections and clocks that run, as they were at the start."""
+        return self._simulation.system
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """The newest sample of an output, `fmu.port`, that the haptic loop has: its entries in the
+        order of their indices. Raises InputFault for an unknown name."""
+        if name not in self._places:
+            fmu, place = name.partition(".")[0], self._simulation.signals.scalar
+            self._places[name] = [place(fmu, s.name) for s in self._scalars(name, "output")]
+        return self._simulation.signals.values[self._places[name]]
+
+    def energies(self) -> dict[str, Energy]:
+        """The energies (J) of each connection that carries power, until now."""
+        return self._simulation.meters.energies()
+
+    def report(self) -> dict[str, Any]:
+        """Step times, lateness, deadlines missed and late samples until now, as in run.json."""
+        return self._run.report()
+
+    # --- to change --------------------------------------------------------------------------
+
+    def set(self, name: str, value: ArrayLike) -> None:
+        """Set an input that nothing feeds, or a tunable parameter, `fmu.port`, from the FMU's next
+        step on; entries in the order of their indices, in the FMU's units. Raises InputFault for
+        other names, for gains of a spring whose energy `pspm` limits, and for values of another
+        number or that are not finite."""
+        fmu = name.partition(".")[0]
+        if name not in self._settings:
+            scalars = [*self._scalars(name, "input", "parameter")]
+            self._require_free(name, scalars)
+            instance = self._simulation.instances[fmu]
+            self._settings[name] = scalars, instance.connect(scalars, range(len(scalars)))
+        scalars, set_from = self._settings[name]
+        values = np.array(value, np.float64).ravel()
+        if len(values) != len(scalars) or not np.isfinite(values).all():
+            raise InputFault(f"{name} = {values.tolist()}: give {len(scalars)} finite numbers")
+        self._simulation.instances[fmu].before_step(lambda: set_from(values))
+
+    def hold(self, name: str, hold: str | None = None, delay: float | None = None) -> None:
+        """Give connections another hold, or another constant latency `delay` (s); they are named
+        as in [holds] of a scene. A hold begins anew with the newest sample of its source. Raises
+        InputFault where it does not fit, or cannot be changed while the scene runs."""
+        if hold is not None and hold not in HOLDS:
+            raise InputFault(unknown("hold", hold, HOLDS))
+        system = self._simulation.system
+        found = [c for c in system.connections if name in names(c) and c.hold]
+        if not found:
+            every = [key for c in system.connections if c.hold for key in names(c)]
+            raise InputFault(unknown("connection with a hold", name, every))
+        changed = [self._with(self._connections.get(c.name, c), hold, delay) for c in found]
+        for connection in changed:
+            made = make_hold(connection, system, self._simulation.signals, {})
+            self._loop.change_hold(connection.name, made)
+            self._connections[connection.name] = connection
+            sample = self._simulation.signals.values[self._simulation.signals.sources(connection)]
+            stamp = self._loop.previous(system.fmu[connection.source].clock)
+            self._simulation.holds[connection.name].push(stamp, sample, stamp)
+        self._note(f"hold of {name}: {changed[0].hold}, delay {delay or 0.0:g} s")
+
+    def holds(self) -> dict[str, list[str]]:
+        """By connection that has a hold, the holds that `hold` can give it, its present one
+        first."""
+        found: dict[str, list[str]] = {}
+        for c in self.system.connections:
+            if c.hold:
+                present = self._connections.get(c.name, c)
+                found[c.name] = [present.hold or ""]
+                for hold in HOLDS:
+                    with suppress(InputFault):
+                        self._with(present, hold, None)
+                        found[c.name] += [hold] if hold != present.hold else []
+        return found
+
+    def rate(self, clock: str, rate: float, jitter: float = 0.0, seed: int = 0) -> None:
+        """Change the rate (Hz) of a clock other than the haptic one, such as `graphics`, from the
+        end of its current step on; steps then end on haptic ticks. jitter: each ends up to half
+        this share of a period early or late, uniformly, drawn by numpy's PCG64 with the seed and
+        the step's number. Raises InputFault where an FMU cannot vary its step or has a spring whose
+        energy `pspm` limits, for a rate that is not between 0 and the haptic one, and for a jitter
+        that leaves no haptic tick between two ends."""
+        timeline = self._simulation.system.timeline
+        haptics, *others = timeline.clocks
+        if clock not in [c.name for c in others]:
+            raise InputFault(unknown("clock", clock, [c.name for c in others]))
+        fixed = [f.name for f in self._simulation.system.fmus if f.clock == clock]
+        fixed = [f for f in fixed if not varies_step(self._simulation.system.fmu[f].description)]
+        if fixed:
+            raise InputFault(f"rate of {clock}: {fixed[0]} takes steps of one size only")
+        if limited := [f for f in limited_fmus(self.system) if self.system.fmu[f].clock == clock]:
+            raise InputFault(
+                f"rate of {clock}: `pspm` limits the energy of a spring of {limited[0]} over the "
+                "steps of the start: change the scene, with `reset`"
+            )
+        period = 1 / (exact(rate) * timeline.base) if SLOWEST <= rate < math.inf else Fraction(0)
+        if period < haptics.longest:
+            limits = f"from {SLOWEST:g} Hz up to that of the haptics"
+            raise InputFault(f"rate of {clock} = {rate} Hz: give a rate {limits}")
+        first, begun, tick = self._loop.previous(clock), self._loop.current(clock), haptics.longest
+        most = float(1 - tick / period)
+        if not 0 <= jitter <= most:
+            raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")
+
+        @lru_cache(maxsize=8)  # several events ask for the same point
+        def at(i: int) -> int:
+            if i < 2:
+                return (first, begun)[i]
+            drawn = np.random.default_rng((seed, i)).uniform(-0.5, 0.5) if jitter else 0.0
+            return math.ceil((begun + (i - 1 + Fraction(jitter * drawn)) * period) / tick) * tick
+
+        count = max(math.ceil((timeline.end - begun) / period), 0) + 4
+        self._loop.change_rate(clock, Frames(at, count, 1))
+        drawn = f", jitter {jitter:g}, seed {seed}" if jitter else ""
+        self._note(f"rate of {clock}: {rate:g} Hz{drawn}")
+
+    # --- time ---------------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        """Let time stand still after this turn."""
+        self.paused = True
+
+    def resume(self) -> None:
+        """Let time go on."""
+        self.paused, self._until = False, None
+
+    def step(self, ticks: int = 1) -> None:
+        """Go on for a number of haptic ticks, then pause."""
+        self.paused, self._until = True, self._run.pace.c.ticks + ticks
+
+    def reset(self, options: Options = ()) -> None:
+        """Begin anew at t = 0, with the scene changed by `options`. Raises what `hl.scene` does."""
+        self.scene = open_scene.load(self.scene, options)
+        self._again = True
+        raise Ended("reset")
+
+    def stop(self) -> None:
+        """End the run."""
+        raise Ended("stopped")
+
+    # ------------------------------------------------------------------------------------------
+
+    def _turn(self, simulation: Simulation, loop: PythonLoop) -> None:
+        self._simulation, self._loop = simulation, loop
+        pace = self._run.pace
+        begun, stepping = pace.now(), self._until is not None
+        if stepping and pace.c.ticks < (self._until or 0):
+            return
+        self._until = None
+        self._called(self)
+        while self.paused and self._until is None:
+            pace.wait(pace.now() + self._every)
+            interrupt.check(self.time)
+            self._called(self)
+        loop.patience(self._every if self._until is None else 0)
+        if self.paused or stepping:
+            pace.c.origin += pace.now() - begun
+
+    def _scalars(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
+        fmu, _, port = name.partition(".")
+        fmus = self._simulation.system.fmu
+        if fmu not in fmus:
+            raise InputFault(unknown("FMU", fmu, fmus))
+        if found := fmus[fmu].description.port(port, *causalities):
+            return found
+        every = [s.port for s in fmus[fmu].description.scalars if s.causality in causalities]
+        raise InputFault(f"{fmu}: {unknown(' or '.join(causalities), port, dict.fromkeys(every))}")
+
+    def _require_free(self, name: str, scalars: Iterable[Scalar]) -> None:
+        fmu = name.partition(".")[0]
+        fed = {s.name: c.name for c in self._simulation.system.into(fmu) for s in c.inputs}
+        for scalar in scalars:
+            if scalar.name in fed:
+                raise InputFault(f"{name} is fed by a connection, {fed[scalar.name]}")
+            if scalar.causality == "parameter" and scalar.variability != "tunable":
+                raise InputFault(f"{name} is not tunable: change the scene, with `reset`")
+        if name in limited_gains(self._simulation.system):
+            raise InputFault(
+                f"{name} is a gain of a spring whose energy `pspm` limits, which counts with that "
+                "of the start: change the scene, with `reset`"
+            )
+
+    def _with(self, c: Connection, hold: str | None, delay: float | None) -> Connection:
+        """The connection with another hold or latency."""
+        system = self._simulation.system
+        new = held_by(c, hold, delay)
+        why = misfit(new.hold or "", new, system.fmu, system.power, False)
+        if system.coupling == "iterated" or system.step_control:
+            why = "steps are repeated"
+        spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.springs)
+        on_force = spring and any(
+            HOLDS[d.hold].needs == "spring" for d in system.connections if d.hold
+        )
+        if on_force or "spring" in (HOLDS[c.hold or ""].needs, HOLDS[new.hold or ""].needs):
+            why = "holds of a spring share its energy: take `reset`"
+        if held_polynomials.order(system, c) or held_polynomials.order(system, new):
+            why = "the FMU takes derivatives of its inputs: take `reset`"
+        if why:
+            raise InputFault(f"hold of {c.name} = {new.hold}: {why}")
+        return new
+
+    def _note(self, text: str) -> None:
+        self._run.changes.append((self.time, text))
+
+
+def held_by(c: Connection, hold: str | None, delay: float | None) -> Connection:
+    """The connection with another hold or another constant latency (s); None leaves either."""
+    latency = c.latency if delay is None else Latency(min=delay) if delay else None
+    return replace(c, hold=hold or c.hold, latency=latency)

@@ -1,0 +1,298 @@
+"""Binds the operations of a plan to the calls that execute them.
+
+A bound operation is a function of the event's tick. Slices of the signal vector and instants are
+resolved once, when an operation is bound, so that the event loop calls no more than is necessary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from hapticlink.orchestrator.plan.operations import (
+    Advance,
+    Blend,
+    Evaluate,
+    Get,
+    Operation,
+    Part,
+    Push,
+    Record,
+    Repeat,
+    Rollback,
+    Save,
+    Set,
+    Step,
+    StopWhen,
+)
+from hapticlink.orchestrator.run.concurrent_fmus import Collect, collected
+from hapticlink.orchestrator.run.fixed_point import FixedPoint
+from hapticlink.orchestrator.run.metered_operations import (
+    Feed,
+    Metering,
+    Move,
+    Read,
+    Sample,
+    metered,
+)
+from hapticlink.orchestrator.run.parallel_steps import Finish, with_barriers
+from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.run.step_control import Advancer
+from hapticlink.orchestrator.scene.conditions import COMPARISONS
+from hapticlink.orchestrator.system import held_polynomials
+
+Bound = list[tuple["Instruction", Call]]
+Instruction = Operation | Metering | Finish | Collect
+"""An operation of a run: of its plan, of its meters, or of waiting for FMUs."""
+
+
+class Stop(Exception):
+    """Raised when the scene's stop condition holds."""
+
+
+class Binder:
+    """Binds operations to the FMUs, holds and signals of a simulation.
+
+    calls: returns the bound operations of a part of the plan, for step control. `loops` and
+    `advancers` are the fixed-point iterations and the step controls that were bound, whose counts
+    the run reports. joined: makes one call of a sequence of instructions and their calls; without
+    it each is a call.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        calls: Callable[[Part], Sequence[Call]],
+        joined: Callable[[Bound], Call] | None = None,
+    ) -> None:
+        self._simulation, self._calls, self._joined = simulation, calls, joined
+        self.loops: dict[Repeat, FixedPoint] = {}
+        self.advancers: dict[str, Advancer] = {}
+
+    def instructions(self, operations: Iterable[Operation], judged: bool = True) -> Bound:
+        """The instructions of a block with their calls. Not `judged`, outputs need not be
+        finite."""
+        simulation = self._simulation
+        given = collected(operations, simulation.beside) if simulation.beside else operations
+        taken = metered(given, simulation.meters, judged)
+        waited = {fmu for fmu in simulation.isolated if fmu not in simulation.beside}
+        return [(i, self.bind(i)) for i in with_barriers(taken, waited)]
+
+    def bind_all(self, operations: Iterable[Operation], judged: bool = True) -> list[Call]:
+        bound = self.instructions(operations, judged)
+        return [self._joined(bound)] if self._joined else [call for _, call in bound]
+
+    def bind(self, operation: Instruction) -> Call:
+        """The call that executes an operation; its argument is the tick."""
+        simulation = self._simulation
+        match operation:
+            case Get(fmu):
+                get = simulation.instances[fmu].get
+                return lambda tick: get()
+            case Read(fmu):
+                read = simulation.instances[fmu].read
+                return lambda tick: read()
+            case Sample(connection, ahead):
+                sample = simulation.meters.of[connection].sample
+                return lambda tick: sample(tick + ahead)
+            case Move(connection, ahead):
+                move = simulation.meters.of[connection].move
+                return lambda tick: move(tick + ahead)
+            case Feed(connection, share):
+                hold = simulation.meters.of[connection].hold
+                return lambda tick: hold(share)
+            case Finish(fmus):
+                return self._finish(fmus)
+            case Collect(clock):
+                return lambda tick: simulation.collect(clock, tick)
+            case Set(fmu, now, derivatives):
+                return self._set(fmu, now, derivatives)
+            case Step(fmu, dticks, part, parts):
+                return self._live(fmu, self._step(fmu, dticks, part, parts))
+            case Push(connection, ahead):
+                return self._push(connection, ahead)
+            case Evaluate(connection, instant, 0):
+                return self._evaluate(connection, float(instant))
+            case Evaluate(connection, instant, order, width):
+                return self._derive(connection, float(instant), order, float(width))
+            case Blend(connection, points):
+                return self._blend(connection, points)
+            case Save(fmu):
+                save = simulation.instances[fmu].save
+                return lambda tick: save()
+            case Rollback(fmu):
+                rollback = simulation.instances[fmu].rollback
+                return lambda tick: rollback()
+            case Advance(clock, dticks):
+                advance = self._advancer(clock).advance
+                return lambda tick: advance(tick, dticks)
+            case Repeat():
+                return self._repeat(operation)
+            case Record(clock):
+                row, seconds = simulation.recorders[clock].row, simulation.seconds
+                return lambda tick: row(seconds(tick))
+            case StopWhen():
+                return self._stop_when()
+
+    def _finish(self, fmus: Iterable[str]) -> Call:
+        instances = [self._simulation.instances[fmu] for fmu in fmus]
+
+        def finish(tick: int) -> None:
+            for instance in instances:
+                instance.finish()
+
+        return finish
+
+    def _set(self, fmu: str, now: bool, derivatives: bool) -> Call:
+        simulation, values = self._simulation, self._simulation.signals.values
+        set_from = (simulation.now_setters if now else simulation.setters)[fmu]
+        if not derivatives:
+            return lambda tick: set_from(values)
+        derive = simulation.derivative_setters[fmu]
+
+        def set_both(tick: int) -> None:
+            set_from(values)
+            derive(values)
+
+        return set_both
+
+    def _step(self, fmu: str, dticks: int, part: int, parts: int) -> Call:
+        """doStep over `dticks`, or over substep `part` of `parts`; outputs are stamped at its end,
+        those of a sampled block at its start."""
+        simulation = self._simulation
+        step, seconds = simulation.instances[fmu].step, simulation.seconds
+        size, check = seconds(dticks), simulation.step_checks.get(fmu)
+        if fmu in simulation.beside:  # what a check reads is the loop's
+            check = None
+        valid = 0 if simulation.system.fmu[fmu].sampled else dticks
+        if parts > 1:
+            base = simulation.system.timeline.base / parts
+            begin, size = part * dticks, float(dticks * base)
+
+            def substep(tick: int) -> None:
+                start = tick * parts + begin
+                step(float(start * base), float((start + dticks) * base), size)
+
+            return substep
+        if check:
+
+            def checked(tick: int) -> None:
+                time, end = seconds(tick), seconds(tick + dticks)
+                check.around(lambda: step(time, end, size), time, end)
+
+            return checked
+        return lambda tick: step(seconds(tick), seconds(tick + valid), size)
+
+    def _live(self, fmu: str, step: Call) -> Call:
+        """In real time an FMU takes settings that wait for it before its step; beside the loop, the
+        step is begun only."""
+        simulation, instance = self._simulation, self._simulation.instances[fmu]
+        if not simulation.pace:
+            return step
+        side = simulation.sides[simulation.beside[fmu]] if fmu in simulation.beside else None
+
+        def live(tick: int) -> None:
+            instance.settle()
+            if side:
+                side.start(instance, lambda: step(tick))
+            else:
+                step(tick)
+
+        return live
+
+    def _push(self, connection: str, ahead: int) -> Call:
+        """Pushes the source's sample into the hold; it arrives at the tick of the event. Sources
+        that are adjacent in the signal vector are passed as a view, without a copy."""
+        simulation = self._simulation
+        hold, values = simulation.holds[connection], simulation.signals.values
+        sources = simulation.signals.sources(simulation.system.connection[connection])
+        view = simulation.signals.view(sources)
+        if view is not None:
+            return lambda tick: hold.push(tick + ahead, view, tick + simulation.late)
+        return lambda tick: hold.push(tick + ahead, values[sources], tick + simulation.late)
+
+    def _evaluate(self, connection: str, ahead: float) -> Call:
+        """Writes the hold's value `ahead` ticks after the event to the target's held input."""
+        simulation = self._simulation
+        hold, view = (
+            simulation.holds[connection],
+            simulation.signals.values[simulation.signals.hold(connection)],
+        )
+
+        def evaluate(tick: int) -> None:
+            late = simulation.late
+            view[:] = hold.value(tick + late, ahead - late)
+
+        return evaluate
+
+    def _derive(self, connection: str, ahead: float, order: int, width: float) -> Call:
+        """Writes the hold's value at the beginning of a step of `width` ticks, the derivatives
+        there up to `order`, and the mean over the step, from the polynomial through order + 1
+        equidistant values."""
+        simulation = self._simulation
+        hold, values, signals = (
+            simulation.holds[connection],
+            simulation.signals.values,
+            simulation.signals,
+        )
+        view, span = values[signals.hold(connection)], signals.derivatives(connection)
+        derived, mean = values[span], values[span.stop : span.stop + len(view)]
+        instants = [ahead + i * width / order for i in range(order + 1)]
+        seconds = simulation.seconds(width)
+
+        def derive(tick: int) -> None:
+            late = simulation.late
+            found = np.stack([hold.value(tick + late, at - late) for at in instants])
+            view[:] = found[0]
+            derivatives, mean[:] = held_polynomials.split(found, seconds)
+            derived[:] = derivatives.ravel()
+
+        return derive
+
+    def _advancer(self, clock: str) -> Advancer:
+        if clock not in self.advancers:
+            self.advancers[clock] = Advancer(clock, self._simulation, self._calls)
+        return self.advancers[clock]
+
+    def _blend(self, connection: str, points: tuple[tuple[float, Fraction], ...]) -> Call:
+        """Writes a weighted sum of the hold's values at several instants."""
+        simulation = self._simulation
+        hold, view = (
+            simulation.holds[connection],
+            simulation.signals.values[simulation.signals.hold(connection)],
+        )
+        pairs = [(weight, float(ahead)) for weight, ahead in points]
+
+        def blend(tick: int) -> None:
+            late = simulation.late
+            view[:] = sum(w * hold.value(tick + late, ahead - late) for w, ahead in pairs)
+
+        return blend
+
+    def _repeat(self, operation: Repeat) -> FixedPoint:
+        """The fixed-point iteration of a Repeat, shared by all events, with its solver's state."""
+        if operation in self.loops:
+            return self.loops[operation]
+
+        body = self.bind_all(operation.body, judged=False)  # iterations can have non-finite outputs
+        calls = (self.bind_all(operation.guess), body, self.bind_all(operation.again))
+        held = [self.bind(op) for op in operation.body if isinstance(op, Blend)]
+        loop = FixedPoint(operation, self._simulation, calls, held)
+        self.loops[operation] = loop
+        return loop
+
+    def _stop_when(self) -> Call:
+        simulation = self._simulation
+        condition = simulation.system.ends_when
+        assert condition is not None
+        place = simulation.signals.scalar(condition.fmu, condition.variable)
+        holds, values = COMPARISONS[condition.comparison], simulation.signals.values
+        limit = condition.value
+
+        def stop_when(tick: int) -> None:
+            if holds(values[place], limit):
+                raise Stop
+
+        return stop_when

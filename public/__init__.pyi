@@ -1,0 +1,32 @@
+# The public names of hapticlink and the modules that define them: the one list of them.
+
+from hapticlink.analysis.maps import Map as Map
+from hapticlink.analysis.stability.analysis import Stability as Stability
+from hapticlink.analysis.stability.analysis import stability as stability
+from hapticlink.analysis.stability.finite_time import finite_time_growth as finite_time_growth
+from hapticlink.analysis.stability.passivity import Passivity as Passivity
+from hapticlink.analysis.stability.passivity import passivity as passivity
+from hapticlink.analysis.stability.varying_rate import VaryingStability as VaryingStability
+from hapticlink.analysis.tune import Tuned as Tuned
+from hapticlink.analysis.tune import tune as tune
+from hapticlink.api.files import build as build
+from hapticlink.api.files import export as export
+from hapticlink.api.maps import stability_map as stability_map
+from hapticlink.api.real_time import RealTime as RealTime
+from hapticlink.api.result import Run as Run
+from hapticlink.api.runs import RunInterrupted as RunInterrupted
+from hapticlink.api.runs import load as load
+from hapticlink.api.runs import run as run
+from hapticlink.api.scenes import explain as explain
+from hapticlink.api.scenes import scene as scene
+from hapticlink.api.scenes import shipped as shipped
+from hapticlink.api.sweeps import Sweep as Sweep
+from hapticlink.api.sweeps import sweep as sweep
+from hapticlink.orchestrator.base.faults import Fault as Fault
+from hapticlink.orchestrator.base.faults import InputFault as InputFault
+from hapticlink.orchestrator.base.faults import SceneFault as SceneFault
+from hapticlink.orchestrator.results.tables import Table as Table
+from hapticlink.orchestrator.scene.scene import Scene as Scene
+
+__all__: list[str]
+__version__: str

@@ -1,0 +1,75 @@
+"""The study of mismatched rates: which hold, with which gains, at which graphics rate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from hapticlink.analysis.sweep import Measure, sweep, table
+from hapticlink.analysis.sweep.job import Job
+from hapticlink.analysis.sweep.row import Row
+from hapticlink.orchestrator.results import folders
+from studies.mismatch import cases, design, measure, method_choice, page
+from studies.mismatch.cases import Case
+from studies.mismatch.methods import BIAS, COLUMNS, KEPT_APART, RATES
+
+SECONDS = {"run": 0.07, "map": 0.8}
+"""Processor time of a run, and of a scene at rest."""
+
+
+def expected(processes: int) -> float:
+    """Minutes that the whole study takes about."""
+    known, apart = cases.trained(), cases.kept_apart()
+    runs = design.count(len(known)) + design.count_apart(len(apart))
+    linkages = len({case.linkage for case in known})
+    maps = linkages * len(design.all_margins())
+    return (SECONDS["run"] * runs + SECONDS["map"] * maps) / processes / 60
+
+
+def study(
+    folder: Path,
+    room: Path,
+    processes: int,
+    tell: Callable[[str, int, int], None] = lambda stage, done, of: None,
+    trained: Sequence[Case] | None = None,
+    kept_apart: Sequence[Case] | None = None,
+) -> Path:
+    """Run what has no row in `room` yet, and write tables, figures and README.md to `folder`.
+
+    trained: the draws by which methods are chosen; kept_apart: those on which the advice is tried;
+    by default all. `tell` is called with the stage, and the numbers of its finished and of all its
+    jobs. Raises as `sweep` does.
+    """
+    folders.ensure(folder)
+    known, apart = trained or cases.trained(), kept_apart or cases.kept_apart()
+
+    def all_of(stage: str, jobs: Sequence[Job], by: Measure) -> list[Row]:
+        return sweep(
+            jobs, room, processes, tell=lambda done: tell(stage, done, len(jobs)), measure=by
+        )
+
+    runs = measure.compared(all_of("runs", design.runs(known), measure.of_run))
+    linkages = dict.fromkeys(case.linkage for case in known)
+    rest = all_of("maps", design.margins(linkages, design.all_margins()), measure.at_rest)
+    at = method_choice.margins(rest)
+    by_cell = method_choice.cells(r for r in runs if r["arrangement"] != design.CONTINUOUS)
+    advice = {cell: method_choice.choice(cell, found, at) for cell, found in by_cell.items()}
+    methods = {}
+    for arrangement in (design.DIRECT, design.MOBILITY):
+        for bias in BIAS:
+            for rate in (*COLUMNS, KEPT_APART):
+                chosen = advice[arrangement, bias, "20" if rate == KEPT_APART else rate]
+                methods[arrangement, bias, rate] = chosen.taken
+    jobs = design.kept_apart_runs(apart, methods)
+    tried = measure.compared(all_of("kept apart", jobs, measure.of_run))
+    new = [x for x in dict.fromkeys(case.linkage for case in apart) if x not in linkages]
+    wanted = dict.fromkeys(
+        (a, design.of_map(a, m), r)
+        for (a, _, r), m in methods.items()
+        if r in (*RATES, KEPT_APART) and design.mapped(m)
+    )
+    rest_apart = all_of("maps kept apart", design.margins(new, wanted), measure.at_rest)
+    for name, rows in (("runs", runs), ("maps", rest), ("kept-apart", [*tried, *rest_apart])):
+        table.write(folder / f"{name}.csv", [measure.rounded(row) for row in rows])
+    found = page.Found(runs, by_cell, at, advice, methods, tried, method_choice.margins(rest_apart))
+    return page.write(folder, found)

@@ -1,0 +1,233 @@
+"""The page of the study: the answer, why, the draws kept apart, and what it leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from textwrap import fill
+
+import numpy as np
+
+from studies.mismatch import finding_figures, held_out_draws
+from studies.mismatch.cases import SEEDS
+from studies.mismatch.design import DIRECT, FLOOR, MOBILITY, REFERENCE, SUBSTEPS
+from studies.mismatch.figures import short
+from studies.mismatch.findings import COMPENSATION, Found, both, errors, named
+from studies.mismatch.measure import APART, COUPLING, floor, stable
+from studies.mismatch.method_choice import (
+    LEAST,
+    LEVEL,
+    SHARE,
+    Choice,
+    choice,
+    energy,
+    margin,
+    metric,
+    over_seeds,
+    quartiles,
+)
+from studies.mismatch.methods import BIAS, COLUMNS, VARIABLE
+
+WIDTH = 108
+
+
+def write(folder: Path, found: Found) -> Path:
+    """Writes the page, README.md of `folder`, and its figures; returns its path."""
+    parts = ["# The mismatch of rates: which hold, with which gains, at which graphics rate"]
+    parts += [*_answer(found), *finding_figures.sections(folder, found), *_other_limits(found)]
+    parts += [*held_out_draws.section(found), *_limits(found)]
+    path = folder / "README.md"
+    path.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    return path
+
+
+def paragraph(text: str) -> str:
+    return fill(text, WIDTH, break_on_hyphens=False)
+
+
+def _answer(found: Found) -> Iterator[str]:
+    yield paragraph(
+        "Limits: the coupling stays stable, and sampling and holding generate at most "
+        f"{SHARE:.0%} of the hand's work at the user's port. A method is advised where it keeps "
+        "them in every draw; elsewhere nothing keeps them, and the best is named with what it does "
+        "keep."
+    )
+    yield "\n".join(
+        paragraph(
+            f"- The mechanism at {place}, {COMPENSATION[bias]}: {_kept(found, arrangement, bias)}"
+        )
+        for arrangement, place in ((DIRECT, "the graphics rate"), (MOBILITY, "512 Hz"))
+        for bias in BIAS
+    )
+    yield paragraph(_where_to_run(found))
+    yield "## The mechanism at the graphics rate"
+    for bias in BIAS:
+        yield from _table(found, DIRECT, bias)
+    yield paragraph(
+        "Gains K_pc (N/m, N/m, N.m/rad) and B_pc (N.s/m, N.s/m, N.m.s/rad): soft (25, 25, .01) and "
+        "(5, 5, .002); medium (100, 100, .1) and (20, 20, .02), as in `closed-loop-direct`; stiff "
+        "(100, 100, .5) and (70, 70, .375), the report's. `a, b` is hold `a` from slow to fast and "
+        "`b` from fast to slow, without `b` the latest sample; `slope` is of the velocity from "
+        "slow to fast. Within the limits: draws that are stable and keep the limit of energy at "
+        "the user's port (below). Error: "
+        "the largest |x_S - x_D| of a run, median of the stable draws (quartiles; worst); over "
+        f"seeds: the largest by the smallest of a case's {SEEDS} draws, median of the cases. "
+        "Handle off: distance of the handle from that of the same blocks run "
+        "continuously, within 1 s, median. Energy: the largest peak at the user's port, as a part "
+        "of what is allowed (below). Margin: decay rate of the slowest mode of the lifted map, in "
+        "an arm of 300 N/m, the smallest of the linkages; it is bounded by the arm's own modes. "
+        "An adaptive hold has no map. As good: other methods that the best one does not beat "
+        "beyond the spread. Where one is advised, that is a smaller error in more than three "
+        "quarters of the draws, and the simplest of all these is taken; where none is, keeping the "
+        f"limits in more draws by a sign test at {LEVEL:.0%}."
+    )
+    yield "## The mechanism at 512 Hz, Lambda^-1 and P_c held (the report)"
+    for bias in BIAS:
+        yield from _table(found, MOBILITY, bias)
+
+
+def _kept(found: Found, arrangement: str, bias: str) -> str:
+    """At which rates a method is advised, and what the best one keeps at the others."""
+    chosen = {rate: found.advice[arrangement, bias, rate] for rate in COLUMNS}
+    advised = [rate for rate in COLUMNS if chosen[rate].method]
+    others = [f"{c.most} of {c.of} at {rate} Hz" for rate, c in chosen.items() if not c.method]
+    told = [f"advised at {both(advised)} Hz"] if advised else []
+    told += [f"nothing keeps the limits elsewhere, the best in {both(others)}"] if others else []
+    return "; ".join(told) + "."
+
+
+def _where_to_run(found: Found) -> str:
+    """Which arrangement keeps the limits in more draws, with the errors at 30 Hz."""
+    pairs = [
+        (found.advice[MOBILITY, b, r].most, found.advice[DIRECT, b, r].most)
+        for b, r in product(BIAS, COLUMNS)
+    ]
+    more, fewer = sum(m > d for m, d in pairs), sum(m < d for m, d in pairs)
+    text = (
+        "With the mechanism at the haptic rate only Lambda^-1 and P_c cross from the graphics "
+        f"rate. Its best method keeps the limits in more draws than the best at the graphics rate "
+        f"in {more} of {len(pairs)} rows, in fewer in {fewer}."
+    )
+    for bias in BIAS:
+        at = []
+        for arrangement, place in ((MOBILITY, "512 Hz"), (DIRECT, "30 Hz")):
+            taken = found.methods[arrangement, bias, "30"]
+            rows = found.cells[arrangement, bias, "30"][taken].values()
+            error = short(quartiles(filter(stable, rows), metric(DIRECT))[1])
+            at.append(f"{error} mm for the mechanism at {place} ({named(taken)})")
+        text += f" Median error with graphics at 30 Hz, {COMPENSATION[bias]}: {both(at)}."
+    return text
+
+
+def _table(found: Found, arrangement: str, bias: str) -> Iterator[str]:
+    lines = [
+        f"| {COMPENSATION[bias]}: graphics rate (Hz) | take | within the limits | error (mm) "
+        "| over seeds | handle off (mm) | energy | margin (1/s) | as good |",
+        "|---" * 9 + "|",
+    ]
+    for rate in COLUMNS:
+        cell = (arrangement, bias, rate)
+        chosen = found.advice[cell]
+        rows = [r for r in found.cells[cell][chosen.taken].values() if stable(r)]
+        off = short(quartiles(rows, COUPLING)[1])
+        least = margin(found.margins, arrangement, chosen.taken, rate)
+        lines.append(
+            f"| {rate} | {_taken(chosen)} | {_within(chosen)} | "
+            f"{errors(rows)} | {short(over_seeds(rows, metric(DIRECT)))} | "
+            f"{off} | {short(max(map(energy, rows), default=None))} | {short(least) or '-'} | "
+            f"{_ties(chosen)} |"
+        )
+    yield "\n".join(lines)
+
+
+def _taken(chosen: Choice) -> str:
+    """What is advised, or that nothing is, and the best."""
+    return named(chosen.method) if chosen.method else f"nothing; best: {named(chosen.best)}"
+
+
+def _within(chosen: Choice) -> str:
+    """How many draws keep the limits, and why the others do not."""
+    over = chosen.of - chosen.most - chosen.lost
+    why = [f"{chosen.lost} unstable"] * (chosen.lost > 0) + [f"{over} by energy"] * (over > 0)
+    return f"{chosen.most} of {chosen.of}" + (f" ({', '.join(why)})" if why else "")
+
+
+SHARES = (0.1, SHARE, 0.5, 1.0)
+
+
+def _other_limits(found: Found) -> Iterator[str]:
+    """What other limits of the energy at the user's port would advise."""
+    yield "## What the limit of energy decides"
+    yield paragraph(
+        f"The share of {SHARE:.0%} was set when runs had been seen, so that it is no part of the "
+        "evidence. A mechanism at the graphics rate, with other shares of the hand's work:"
+    )
+    columns = [(bias, rate) for bias in BIAS for rate in COLUMNS]
+    heads = [f"{COMPENSATION[bias].split()[-1]}, {rate}" for bias, rate in columns]
+    lines = ["| | " + " | ".join(heads) + " |", "|---" * (1 + len(columns)) + "|"]
+    for share in SHARES:
+        row = []
+        for bias, rate in columns:
+            cell = (DIRECT, bias, rate)
+            chosen = choice(cell, found.cells[cell], found.margins, share)
+            row.append(named(chosen.method) if chosen.method else f"{chosen.most} of {chosen.of}")
+        lines.append(f"| {share:.0%} | " + " | ".join(row) + " |")
+    yield "\n".join(lines)
+    yield paragraph(
+        "Columns: Coriolis compensation, graphics rate (Hz). Where nothing is advised: the most "
+        "draws within the limits."
+    )
+
+
+def _ties(chosen: Choice) -> str:
+    others = [named(m) for m in chosen.ties if m != chosen.taken]
+    if not others:
+        return "none"
+    return "; ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
+
+
+def _limits(found: Found) -> Iterator[str]:
+    yield "## What it does not cover"
+    yield paragraph(
+        "One device, with assumed dimensions (`components/specs/`), at 512 Hz, with ideal sensing "
+        "and without latency: encoders, delays and losses add to what is found here. Linkages of "
+        "about 0.5 to 2 kg and 40 to 150 mm, wrenches up to 0.5 N, paths of 2 cm in half a second "
+        "and slower. Gains in three steps, so that better ones may lie between them. Walls of 1000 "
+        f"N/m and 10 N.s/m, with {SUBSTEPS} integration steps a frame where the mechanism runs at "
+        f"the graphics rate. Three seconds. The rate {VARIABLE} draws each period between the "
+        "two, with the draw's seed; it has no margin (`hapticlink stability` judges such rates by "
+        "their own measures)."
+    )
+    yield "## How it was measured"
+    sizes, of = floor(found.runs), next(iter(found.advice.values())).of
+    yield paragraph(
+        "`hapticlink study` makes this page, [runs.csv](runs.csv) (a row for each run, with the "
+        "seed of its draw), [maps.csv](maps.csv) (lifted maps) and "
+        "[kept-apart.csv](kept-apart.csv). A case is a linkage in a hand, with or without contact; "
+        f"each has {SEEDS} draws, of the wrench or path of the hand and of the periods of a rate "
+        "that varies. Every method runs on the same draws, and methods are compared within a draw. "
+        f"Where all {of} draws keep the limits, up to {1 - LEVEL ** (1 / of):.0%} of further ones "
+        f"may not ({1 - LEVEL:.0%} confidence, if draws know nothing of each other). Graphics "
+        "rates are whole haptic ticks a frame: 51, 26, 17 and 9 of 1/512 s. A run is stable if it "
+        "reaches its end with handle and operational point less than "
+        f"{APART[0]:g} mm and {APART[1]:g} rad apart. A method is "
+        "advised if every draw is stable, the energy at the user's port peaks at most "
+        f"at {SHARE:.0%} of the hand's work (its absolute values summed; peaks below "
+        f"{1e3 * LEAST:g} mJ, which moves the handle at 8 cm/s, do not count), and the lifted map, "
+        f"where it has one, is stable on {both(['five-bar', 'four-bar', 'serial arm'])}. A "
+        "quarter: the continuous runs, which no hold disturbs, generate up to "
+        f"{_continuous(found):.0%} without Coriolis compensation, and a limit below that would "
+        "refuse the ideal. Of a mechanism at the graphics rate, the report's gains and the "
+        "integrators were tried without Coriolis compensation alone, to save runs. The continuous "
+        f"runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by "
+        f"{np.median(sizes):.1g} mm within 1 s (median; up to {max(sizes):.1g}), so that smaller "
+        "differences of the handle mean nothing."
+    )
+
+
+def _continuous(found: Found) -> float:
+    return SHARE * max(
+        energy(r) for r in found.runs
+        if r["arrangement"] == "continuous" and r["rate"] == str(REFERENCE)
+    )  # fmt: skip

@@ -1,0 +1,90 @@
+"""Slopes from the graphs of FMUs, against differences of the FMUs and against closed forms."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import hapticlink as hl
+from hapticlink.analysis.stability import tangent
+
+Vector = NDArray[np.float64]
+HELD: dict[str, Any] = {
+    "hand": {
+        "type": "spring",
+        "stiffness": [300.0, 300.0, 1.0],
+        "damping": [5.0, 5.0, 0.01],
+        "target": [[0.0, 0.0445, 0.0148, -0.7878]],
+    }
+}
+AMPLIFIED = 1000
+"""Of the rounding of results of order 1, by mobilities of 400 1/kg on the way to them."""
+CASES = {
+    "rail": ("sampled-spring", {}, {}),
+    "wall": ("virtual-wall", {}, {}),
+    "substeps": ("virtual-wall", {"mechanism.substeps": 3}, {}),
+    "pendulum": ("pendulum", {}, {}),
+    "native": ("pendulum", {"packaging": "native"}, {}),
+    "native substeps": ("virtual-wall", {"packaging": "native", "mechanism.substeps": 3}, {}),
+    "neutral modes": ("scotch-yoke", {}, {"virtual_mechanism": {"closure_error"}}),
+    "encoders": (
+        "closed-loop-direct",
+        {**HELD, "graphics.rate": 128, "sensing": "encoders"},
+        {"virtual_mechanism": {"closure_error"}},
+    ),
+    "graphics copy": (
+        "closed-loop",
+        {**HELD, "graphics.rate": 128},
+        {"virtual_mechanism": {"closure_error"}, "virtual_environment": {"q_error"}},
+    ),
+}
+"""Scene, options, and by FMU what may have no slope at rest: norms of errors that are 0."""
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Central differences by d leave d^2 |f'''|/6 and the rounding eps |f|/d; that to both sides
+    differ by d |f''| bounds the first."""
+    scene, options, without = CASES[case]
+    compared, worst = 0, 0.0
+    decide = tangent.decided
+
+    def watched(exact: Vector, slope: Vector, error: Vector) -> Any:
+        nonlocal compared, worst
+        rounding = AMPLIFIED * np.finfo(float).eps / tangent.STEP
+        allowed = np.abs(error) + rounding * max(1.0, np.abs(slope).max(initial=0.0))
+        has = np.isfinite(exact)
+        compared += int(np.count_nonzero(exact[has]))
+        worst = max(worst, (np.abs(slope - exact) / allowed)[has].max(initial=0.0))
+        return decide(exact, slope, error)
+
+    monkeypatch.setattr(tangent, "decided", watched)
+    found = hl.stability(scene, options)
+    assert compared > 10
+    assert worst < 1.0
+    for fmu, way in found.linearised.items():
+        graph, _, others = way.partition("; by differences: ")
+        assert graph == "graph"
+        assert set(filter(None, others.split(", "))) <= without.get(fmu, set())
+
+    monkeypatch.setattr(tangent, "graph_slopes", lambda *_: None)
+    differences = hl.stability(scene, options)
+    assert set(differences.linearised.values()) == {"differences"}
+    both = found.uncertainty + differences.uncertainty
+    assert abs(found.radius - differences.radius) <= both
+    assert found.verdict == differences.verdict
+
+
+def test_semi_implicit_euler_of_a_pendulum_has_the_eigenvalues_of_its_map() -> None:
+    """Of a hanging rod, phi'' = -w^2 phi - c phi': z^2 - (2 - (w h)^2 - c h) z + 1 - c h = 0."""
+    h, c = 1 / 512, 0.01 * 3
+    found = hl.stability("pendulum", {"mechanism.integrator": "semi-implicit-euler"})
+    z = np.roots([1.0, -(2 - 1.5 * 9.81 * h**2 - c * h), 1 - c * h])[0]
+    (mode,) = found.modes
+    assert mode.z.real == pytest.approx(z.real, abs=1e-14)
+    assert abs(mode.z.imag) == pytest.approx(abs(z.imag), abs=1e-13)
+    assert found.radius == pytest.approx(math.sqrt(1 - c * h), abs=1e-14)

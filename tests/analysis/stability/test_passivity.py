@@ -1,0 +1,115 @@
+"""Passivity of the user's port against the closed form of Colgate and Schenkel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.analysis.stability import wall_limits
+from hapticlink.analysis.stability.opened_ports import hand_port, mechanism_port
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.system.built import built
+
+T = 1 / 512
+WALL: dict[str, Any] = {
+    "fmu.wall.settings.unilateral": False,
+    "fmu.wall.settings.damping": 1.0,
+    "hand.wrench": [0.0, 0.0, 0.0],
+}
+
+
+@pytest.mark.parametrize(
+    ("K", "B", "late", "needed"),
+    [
+        (3000.0, 2.0, 0, 3000 * T / 2 + 2),
+        (5000.0, 0.5, 0, 5000 * T / 2 + 0.5),
+        (2000.0, -1.0, 0, 2000 * T / 2 + 1),
+        (1000.0, 0.0, 1, 1000 * (T / 2 + T)),
+        (1000.0, 3.0, 1, None),
+    ],
+)
+def test_a_wall_needs_the_damping_of_the_closed_form(
+    K: float, B: float, late: int, needed: float | None
+) -> None:
+    """b > K T/2 + |B|, with a delay and no damper K (T/2 + t_d); else the largest of the formula
+    over the frequency. The device has 5 N.s/m."""
+    gains = {"fmu.wall.start.stiffness": K, "fmu.wall.start.damping": B}
+    found = hl.passivity("virtual-wall", WALL | gains | {"delays": {"wall.F": late * T}})
+    form = wall_limits.passive_damping(T, late, np.array([K]), np.array([B]))[0]
+    assert found.needed == pytest.approx(needed or form, rel=1e-3)
+    assert found.own == pytest.approx(5.0, rel=1e-3)
+    assert found.passive == (found.needed <= 5.0)
+    assert found.turning == 0.0
+
+
+def test_a_mechanism_alone_gives_energy_to_no_hand() -> None:
+    """With the wall left out of the loop (K = B = 0) nothing is needed."""
+    gains = {"fmu.wall.start.stiffness": 0.0, "fmu.wall.start.damping": 0.0}
+    found = hl.passivity("virtual-wall", WALL | gains)
+    assert found.needed == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_scene_without_a_hand_on_a_device_has_no_port() -> None:
+    with pytest.raises(hl.InputFault, match="no port of a user"):
+        hl.passivity("pendulum")
+
+
+def test_of_two_users_it_tells_what_is_left_as_at_the_equilibrium() -> None:
+    """The cut of the first user's mechanism holds the second one's point, and what is sent of the
+    forces there: the result names these outputs."""
+    scene = open_scene.load("two-users", {"directions_from": "mechanism"})
+    with built(scene) as system:
+        port = mechanism_port(system, hand_port(system))
+    assert port is not None
+    assert {"F_env", "left.x", "left.v", "left.F_env"} <= set(port.kept)
+    assert not {"x", "v"} & set(port.kept)
+
+
+def test_too_many_forces_are_refused_before_anything_is_searched() -> None:
+    """256 ticks and 15 frames, three entries each of the handle at every tick and of the
+    mechanism; a path that never rests would be the later fault."""
+    with pytest.raises(hl.InputFault, match="forces in a hyperperiod, at most 600"):
+        hl.passivity("two-users")
+
+
+def test_a_target_that_comes_to_rest_later_is_judged_from_there() -> None:
+    """A hand's target moves until 1 s: refused at the start, judged from 1.5 s on."""
+    path = [[0.0, 0.0, 0.0, 0.0], [1.0, 0.004, 0.0, 0.0]]
+    arm = {"type": "spring", "stiffness": [300.0, 0.0, 0.0], "damping": [5.0, 0.0, 0.0]}
+    options = {k: v for k, v in WALL.items() if k != "hand.wrench"}
+    options |= {"hand": arm | {"target": path}, "fmu.wall.start.stiffness": 3000.0}
+    with pytest.raises(hl.InputFault, match=r"give `at`.* later than 0\.0"):
+        hl.passivity("virtual-wall", options)
+    with pytest.raises(hl.InputFault, match=r"give `at`.* later than 0\.5"):
+        hl.passivity("virtual-wall", options, at=0.5)
+    found = hl.passivity("virtual-wall", options, at=1.5)
+    assert found.needed == pytest.approx(3000 * T / 2 + 1, rel=1e-3)
+
+
+def test_at_half_the_rate_rounding_is_no_damping() -> None:
+    """A force that changes its sign every period does not move the device, which has no impedance
+    there: its own damping was found to be -1.5e8 N.s/m, that of rounding."""
+    hold = {"stiffness": [100.0, 100.0, 0.1], "damping": [5.0, 5.0, 0.005]}
+    hand = {"type": "spring", "target": [[0.0, 0.035, 0.025, -0.785]]} | hold
+    found = hl.passivity("closed-loop", {"graphics.rate": 512, "hand": hand})
+    assert abs(found.own) < 1.0
+    assert found.needed < 10.0
+    assert max(f for f, _ in found.curve) < 256.0
+
+
+def test_the_hand_that_is_cut_off_does_not_matter() -> None:
+    """Half the haptic rate is a harmonic of frames, next to which the device hardly moves."""
+    start = [0.0, 0.0445, 0.0148, -0.788]
+    hands: list[dict[str, Any]] = [
+        {"type": "constant", "wrench": [0.0, 0.0, 0.0]},
+        {"type": "spring", "stiffness": [300.0, 300.0, 1.0], "damping": [10.0, 10.0, 0.02]},
+    ]
+    hands[1]["target"] = [start]
+    options = {"graphics.rate": 32}
+    free, held = (hl.passivity("closed-loop-direct", options | {"hand": h}) for h in hands)
+    assert held.needed == pytest.approx(free.needed, rel=0.01)
+    assert held.at_least == pytest.approx(free.at_least, rel=0.01)
+    assert held.own == free.own == 0.0

@@ -1,0 +1,125 @@
+"""Growth under switched matrices, against closed forms and Kronecker squares."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import hapticlink as hl
+from hapticlink.analysis.stability.switching import (
+    Edge,
+    joint_spectral_radius,
+    lyapunov,
+    mean_square,
+)
+from hapticlink.analysis.stability.varying_rate import varying_stability
+from tests.analysis.stability.test_stability import HELD
+
+GOLDEN = [np.array([[1.0, 1.0], [0.0, 1.0]]), np.array([[1.0, 0.0], [1.0, 1.0]])]
+
+
+def switched(matrices: list[np.ndarray], probability: float) -> list[Edge]:
+    return [Edge(0, 0, A, probability) for A in matrices]
+
+
+def test_the_joint_spectral_radius_of_a_pair_is_the_golden_section() -> None:
+    found = joint_spectral_radius(switched(GOLDEN, 0.5))
+    golden = (1 + math.sqrt(5)) / 2
+    assert found.lower == pytest.approx(golden, abs=1e-6)
+    assert found.upper == pytest.approx(golden, abs=1e-6)
+    assert set(found.worst) == {0, 1}
+
+
+def test_bounds_hold_in_other_coordinates_and_where_order_is_constrained() -> None:
+    T = np.array([[3.0, 1.2], [-50.0, 7.0]])
+    found = joint_spectral_radius(
+        switched([T @ A @ np.linalg.inv(T) for A in GOLDEN], 0.5), 1e-3, 5000
+    )
+    golden = (1 + math.sqrt(5)) / 2
+    assert found.lower == pytest.approx(golden, rel=1e-9)
+    assert golden <= found.upper < 1.05 * golden
+    # Each may only follow itself: no product of both occurs, and each alone has radius 1.
+    apart = joint_spectral_radius([Edge(i, i, 0.9 * A) for i, A in enumerate(GOLDEN)], 1e-2)
+    assert apart.lower == pytest.approx(0.9)
+    assert apart.upper < 1.0
+
+
+def test_second_moments_grow_by_the_mean_kronecker_square() -> None:
+    generator = np.random.default_rng(1)
+    matrices = [generator.standard_normal((4, 4)) for _ in range(3)]
+    square = sum(np.kron(A, A) for A in matrices) / 3
+    expected = np.abs(np.linalg.eigvals(square)).max()
+    assert mean_square(switched(matrices, 1 / 3)) == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize("rest", [0, 30])
+def test_second_moments_of_a_pair_that_swaps_coordinates_have_two_eigenvalues_of_one_size(
+    rest: int,
+) -> None:
+    """X -> sum p A X A' of A = [[0, a], [b, 0]] swaps the diagonal of X as well: its eigenvalues
+    are +- sqrt(E a^2 E b^2), and the power method alternates. `rest` further numbers decay."""
+    pairs = ((2.0, 0.25), (1.0, 0.75))
+    matrices = [np.diag(np.full(2 + rest, 0.1)) for _ in pairs]
+    for A, (a, b) in zip(matrices, pairs, strict=True):
+        A[:2, :2] = [[0.0, a], [b, 0.0]]
+    a2, b2 = (sum(x * x for x in each) / 2 for each in zip(*pairs, strict=True))
+    assert mean_square(switched(matrices, 0.5)) == pytest.approx(math.sqrt(a2 * b2), rel=1e-9)
+
+
+@pytest.mark.parametrize("radius", [1e-3, 30.0])
+def test_bounds_of_one_matrix_hold_where_its_powers_leave_the_range_of_doubles(
+    radius: float,
+) -> None:
+    found = joint_spectral_radius([Edge(0, 0, radius * GOLDEN[0])], 1e-6, 2000)
+    assert found.lower == pytest.approx(radius, rel=1e-9)
+    assert radius <= found.upper < 1.01 * radius
+    assert found.worst == (0,)
+
+
+def test_the_exponent_of_scalars_is_their_mean_logarithm() -> None:
+    mean, width = lyapunov(switched([np.array([[0.5]]), np.array([[1.5]])], 0.5), seed=3)
+    assert abs(mean - math.log(0.75) / 2) < 2 * width < 0.05
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_a_rate_that_varies_is_judged_by_the_frames_that_it_draws(hold: str) -> None:
+    """A frame of 16 ticks, after one of 16, is what 32 Hz repeats."""
+    varying = HELD | {"hold": hold, "graphics.rate": {"min": 30, "max": 32, "seed": 0}}
+    varying["duration"] = 1 / 512  # in which frames of 17 ticks alone are drawn
+    found = hl.stability("closed-loop-direct", varying)
+    fixed = hl.stability("closed-loop-direct", HELD | {"hold": hold, "graphics.rate": 32})
+    assert isinstance(found, hl.VaryingStability)
+    assert found.frames == (16, 17)
+    assert found.bounds.lower >= fixed.radius - 1e-6
+    assert found.bounds.upper >= found.bounds.lower
+    assert math.log(found.second_moment) / 2 >= found.exponent * 16 / 512 - 0.01
+
+
+def test_frames_of_a_hold_that_keeps_lengths_are_those_of_its_equations() -> None:
+    """A wall at 64 to 128 Hz on m = 0.3 kg, b = 5 N.s/m, whose force is the mean of two samples,
+    in frames of 4 to 8 ticks: x, v, and the last sample f.
+
+        F = (f - K x)/2,   f <- -K x,   (x, v) <- exact step of N ticks under F
+    """
+    K, m, b = 700.0, 0.3, 5.0
+    options = {
+        "fmu.wall.settings.unilateral": False,
+        "hand.wrench": [0.0, 0.0, 0.0],
+        "fmu.wall.rate": {"min": 64, "max": 128, "seed": 3},
+        "holds": {"wall.F": "mean"},
+        "fmu.wall.start.stiffness": K,
+    }
+    frames = []
+    for n in range(4, 9):
+        A = expm(np.array([[0, 1, 0], [0, -b / m, 1 / m], [0, 0, 0]]) * n / 512)
+        A[2, 2] = 0.0
+        F = np.array([-K / 2, 0.0, 0.5])
+        A[:2] = np.column_stack([A[:2, :2], np.zeros(2)]) + np.outer(A[:2, 2], F)
+        A[2] = -K, 0.0, 0.0
+        frames.append(A)
+    second = np.abs(np.linalg.eigvals(sum(np.kron(A, A) for A in frames) / len(frames))).max()
+    found = varying_stability("virtual-wall", options, products=100)
+    assert found.second_moment == pytest.approx(second, rel=1e-5)

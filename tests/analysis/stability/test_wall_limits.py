@@ -1,0 +1,209 @@
+"""Limits of stability of a virtual wall: closed forms, the lifted map within 0.5 %, and runs of the
+FMUs within 2 %."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import hapticlink as hl
+from hapticlink.analysis.stability import wall_limits
+from hapticlink.analysis.stability.loaded_variants import Session
+from hapticlink.orchestrator import open_scene
+
+M, D, T = 0.3, 5.0, 1 / 512
+"""Mass (kg), damping (N.s/m) and period (s) of the scene."""
+STIFFNESS, DAMPING = "fmu.wall.start.stiffness", "fmu.wall.start.damping"
+BILATERAL = {"fmu.wall.settings.unilateral": False, "hand.wrench": [0.0, 0.0, 0.0]}
+UNDAMPED = BILATERAL | {"linkage.joint.rail.damping": 0.0, "fmu.wall.settings.damping": 5.0}
+MEASURED = UNDAMPED | {
+    "fmu.wall.settings.velocity": "measured",
+    "connection.+": {"from": "virtual_mechanism.rail.velocity", "to": "wall.v"},
+}
+LATE = BILATERAL | {"delays": {"wall.F": T}}
+LATER = BILATERAL | {"delays": {"wall.F": 2 * T}}
+Options = dict[str, Any]
+
+
+def test_closed_forms_give_the_reference_numbers() -> None:
+    stable = [wall_limits.stable(M, D, T, periods) for periods in (0, 1, 2)]
+    assert stable == pytest.approx([5147.9288, 1721.95, 1038.20], rel=1e-5)
+    largest = [wall_limits.undamped(1.0, 1.0, n / 10) for n in range(1, 10)]
+    assert largest == pytest.approx(TABLE, abs=5e-5)
+    assert wall_limits.passive(D, T) == pytest.approx(5120)
+    assert wall_limits.passive(D, T, B=-1.0) == pytest.approx(4096)
+    assert wall_limits.undamped_measured(T, 5.0) == pytest.approx(5120)
+    assert wall_limits.damper(M, T) == pytest.approx(307.2)
+    assert wall_limits.quantised(D, T, 0.1, 0.18e-3) == pytest.approx(1111, abs=0.2)
+
+
+@pytest.mark.parametrize("periods", [0, 1, 2, 5])
+@pytest.mark.parametrize("B", [0.0, 2.0])
+def test_the_limit_is_where_the_characteristic_polynomial_leaves_the_unit_circle(
+    periods: int, B: float
+) -> None:
+    def radius(K: float) -> float:
+        tau, e = M / D, np.exp(-D * T / M)
+        G = np.array([T - tau * (1 - e), tau * (1 - e) - T * e]) / D
+        open_loop = np.poly([1.0, e, *np.zeros(periods + 1)])
+        closed = np.polyadd(open_loop, np.polymul(G, [K + B / T, -B / T]))
+        return float(np.abs(np.roots(closed)).max())
+
+    limit = wall_limits.stable(M, D, T, periods, B)
+    own = wall_limits.radius(M, D, T, periods, np.array([limit, 2 * limit]), np.array([B, B]))
+    assert own == pytest.approx([radius(limit), radius(2 * limit)], rel=1e-6)
+    assert radius(limit * (1 - 1e-6)) < 1 < radius(limit * (1 + 1e-6))
+
+
+def looped(m: float, b: float, T: float, periods: int, K: float, B: float) -> float:
+    """The spectral radius of x, v, the last x and the forces on their way, sampled and held."""
+    n = 3 + periods
+    E = expm(np.array([[0.0, 1.0, 0.0], [0.0, -b / m, 1.0 / m], [0.0, 0.0, 0.0]]) * T)
+    wall = np.zeros(n)
+    wall[[0, 2]] = -K - B / T, B / T
+    A = np.zeros((n, n))
+    A[:2, :2], A[2, 0] = E[:2, :2], 1.0
+    A[:2] += np.outer(E[:2, 2], np.eye(n)[-1] if periods else wall)
+    if periods:
+        A[3] = wall
+        A[range(4, n), range(3, n - 1)] = 1.0
+    return float(np.abs(np.linalg.eigvals(A)).max())
+
+
+@pytest.mark.parametrize(
+    ("x", "periods", "beta"),
+    [(6.0, 0, 0.0), (3.7, 0, 0.0), (1e-6, 1, 0.0), (1e-7, 3, 0.0), (1e-2, 2, 0.3), (0.3, 3, -0.1)],
+)
+def test_the_limit_holds_for_much_and_little_damping(x: float, periods: int, beta: float) -> None:
+    """x = b T/m, beta = B T/m, for m = 1 kg, T = 1 s."""
+    K = wall_limits.stable(1.0, x, 1.0, periods, beta)
+    assert looped(1.0, x, 1.0, periods, 0.995 * K, beta) < 1.0
+    assert looped(1.0, x, 1.0, periods, 1.005 * K, beta) > 1.0
+
+
+def test_a_damper_that_is_unstable_alone_has_no_limit() -> None:
+    """3 samples late, beta = 0.5: a root crosses the unit circle at alpha = 3.46, behind others."""
+    assert min(looped(1.0, 0.01, 1.0, 3, K, 0.5) for K in np.geomspace(1e-4, 10.0, 40)) > 1.0
+    with pytest.raises(ValueError, match="stable for no K"):
+        wall_limits.stable(1.0, 0.01, 1.0, 3, 0.5)
+
+
+@pytest.mark.parametrize("delay", [4, 20])
+def test_the_damping_of_a_passive_wall_is_found_with_long_delays(delay: int) -> None:
+    """Without a damper it is K (T/2 + t_d), needed where the frequency is 0."""
+    found = wall_limits.passive_damping(T, delay, np.array([1000.0]), np.array([0.0]))
+    assert found[0] == pytest.approx(1000.0 * T * (0.5 + delay), rel=1e-4)
+
+
+def test_quantities_that_are_none_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"T = 0\.0: must be positive"):
+        wall_limits.passive(5.0, 0.0)
+    with pytest.raises(ValueError, match=r"delay = -1\.0: must not be negative"):
+        wall_limits.delayed(5.0, T, -1.0)
+    with pytest.raises(ValueError, match="m = nan: must be positive"):
+        wall_limits.stable(np.nan, 5.0, T)
+
+
+def test_small_gains_with_a_delay_come_to_the_rule_of_gil() -> None:
+    """Where b T/m is small the exact limit and the rule agree."""
+    exact = wall_limits.stable(M, 0.05, T, 2)
+    assert wall_limits.delayed(0.05, T, 2 * T) == pytest.approx(exact, rel=1e-3)
+
+
+def test_a_limit_needs_damping() -> None:
+    with pytest.raises(ValueError, match="b = 0"):
+        wall_limits.stable(M, 0.0, T)
+
+
+CASES = [
+    pytest.param(BILATERAL, STIFFNESS, wall_limits.stable(M, D, T), id="spring"),
+    pytest.param(LATE, STIFFNESS, wall_limits.stable(M, D, T, 1), id="a sample late"),
+    pytest.param(LATER, STIFFNESS, wall_limits.stable(M, D, T, 2), id="two samples late"),
+    pytest.param(UNDAMPED, STIFFNESS, wall_limits.undamped(M, T, 5.0), id="sampled damper"),
+    pytest.param(
+        UNDAMPED | {DAMPING: 122.88}, STIFFNESS, wall_limits.undamped(M, T, 122.88), id="beta 0.8"
+    ),
+    pytest.param(MEASURED, STIFFNESS, wall_limits.undamped_measured(T, 5.0), id="velocity read"),
+    pytest.param(MEASURED | {STIFFNESS: 0.0}, DAMPING, wall_limits.damper(M, T), id="damper alone"),
+]
+
+
+@pytest.mark.parametrize(("options", "key", "limit"), CASES)
+def test_the_lifted_map_has_the_limit(options: Options, key: str, limit: float) -> None:
+    found = [hl.stability("virtual-wall", options | {key: k * limit}) for k in (0.995, 1.005)]
+    assert [f.verdict for f in found] == ["stable", "unstable"]
+
+
+@pytest.mark.parametrize(("options", "key", "limit"), CASES)
+def test_runs_grow_beyond_the_limit(options: Options, key: str, limit: float) -> None:
+    assert growth(options, key, 0.98 * limit) < 1 < growth(options, key, 1.02 * limit)
+
+
+def growth(options: Options, key: str, gain: float) -> float:
+    """Growth between two parts of a run, of the velocity, which the damper alone acts on."""
+    given = options | {key: gain, "duration": 2.0, "stop_when": "wall.F > 1e6"}
+    if key == DAMPING:
+        given["linkage.start_velocity"] = {"rail": 0.01}
+    run = hl.run("virtual-wall", given)
+    assert run.fault is None
+    _, early, _, late = np.array_split(np.abs(run["virtual_mechanism.rail.velocity"]), 4)
+    return float(late.max() / early.max())
+
+
+TABLE = [0.1810, 0.3273, 0.4435, 0.5333, 0.6000, 0.6462, 0.6741, 0.6857, 0.6828]
+"""The largest alpha = K T^2/m for beta = B T/m = .1, .2, ... .9 without damping of the device."""
+
+
+def test_the_lifted_map_has_the_table_of_a_sampled_damper() -> None:
+    with Session(open_scene.load("virtual-wall", UNDAMPED)) as session:
+        for n, alpha in enumerate(TABLE, start=1):
+            gains = [f"{DAMPING}={n / 10 * M / T}"]
+            for share, verdict in ((0.995, "stable"), (1.005, "unstable")):
+                K = share * alpha * M / T**2
+                assert session.judge([*gains, f"{STIFFNESS}={K}"]).verdict == verdict
+
+
+@pytest.mark.parametrize(("n", "alpha"), list(enumerate(TABLE, start=1)))
+def test_runs_grow_beyond_the_table(n: int, alpha: float) -> None:
+    options = UNDAMPED | {DAMPING: n / 10 * M / T}
+    assert growth(options, STIFFNESS, 0.98 * alpha * M / T**2) < 1
+    assert growth(options, STIFFNESS, 1.02 * alpha * M / T**2) > 1
+
+
+def test_a_unilateral_wall_has_the_same_limit_in_contact() -> None:
+    """The scene as it is: the equilibrium lies within the wall, the start outside of it."""
+    limit = wall_limits.stable(M, D, T)
+    for share, verdict in ((0.995, "stable"), (1.005, "unstable")):
+        found = hl.stability("virtual-wall", {STIFFNESS: share * limit})
+        assert found.verdict == verdict
+        assert found.equilibrium["virtual_mechanism.q[1]"] == pytest.approx(2 / (share * limit))
+
+
+def test_a_quantised_wall_chatters_beyond_its_limit() -> None:
+    """The hand pushes with a force midway between those of two quanta: from rest, friction holds
+    the handle up to K quantum = 2 f_c."""
+    friction, quantum = 0.1, 0.18e-3
+    limit = wall_limits.quantised(D, T, friction, quantum)
+
+    def speed(K: float) -> float:
+        options = {
+            STIFFNESS: K,
+            "fmu.wall.settings.quantum": quantum,
+            "linkage.joint.rail.friction": friction,
+            "linkage.start": {"rail": 10.5 * quantum},
+            "hand.wrench": [K * quantum * 10.5, 0.0, 0.0],
+        }
+        return float(np.abs(hl.run("virtual-wall", options)["virtual_mechanism.v"][-100:]).max())
+
+    assert speed(0.98 * limit) < 1e-9
+    assert speed(1.02 * limit) > 1e-5
+
+
+def test_a_damper_whose_velocity_nothing_feeds_is_refused() -> None:
+    options = {"fmu.wall.settings.damping": 5.0, "fmu.wall.settings.velocity": "measured"}
+    with pytest.raises(hl.SceneFault, match=r"nothing feeds wall\.v"):
+        hl.scene("virtual-wall", options)
+    hl.scene("virtual-wall", options | {"fmu.wall.start.v": 0.0})

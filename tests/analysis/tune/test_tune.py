@@ -1,0 +1,306 @@
+"""Tuned gains: the felt stiffness against a closed form and against runs that press, the margin
+against runs that settle.
+
+The tunings are those of results/tune/, which take minutes; the gains,
+poses, margins and compliances that they record are tried in runs of the FMUs.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import hapticlink as hl
+from hapticlink.analysis.stability.linearise import linearised
+from hapticlink.analysis.tune.held_equilibria import held
+from hapticlink.analysis.tune.poses import LIGHT, Pose
+from hapticlink.analysis.tune.search import COARSE, search
+from hapticlink.analysis.tune.spring_hand import FIRM, HANDS, spring
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.scene.overrides import written
+
+RECORDED = Path(__file__).parents[2] / "results" / "tune"
+TUNED = sorted(path.parent.name for path in RECORDED.glob("*/tune.json"))
+NO_ENCODER = ("device.encoder_resolution=1e-12",)
+"""The map has no quantisation."""
+
+SLIDER = """
+title = "Slider at a wall"
+duration = 0.5
+sensing = "encoders"
+haptics.rate = 512
+graphics.rate = 32
+
+[linkage]
+operational_point = { body = "block" }
+start = { rail = 0.0201 }
+
+[[linkage.body]]
+name = "block"
+mass = 0.8
+inertia = 1e-4
+radius = 0.02
+capsule = [[0.0, 0.0]]
+
+[[linkage.joint]]
+name = "rail"
+type = "prismatic"
+child = "block"
+axis = 0.0
+
+[device]
+
+[controller]
+topology = { stiffness = 400.0, damping = 50.0 }
+contact = true
+
+[controller.teleoperation]
+stiffness = [300.0, 300.0, 1.0]
+damping = [20.0, 20.0, 0.1]
+
+[contacts]
+enclosure = [[-0.04, -0.1], [0.04, -0.1], [0.04, 0.1], [-0.04, 0.1]]
+stiffness = 2000.0
+damping = 10.0
+
+[hand]
+type = "constant"
+wrench = [1.0, 0.0, 0.0]
+"""
+
+
+def closed_form(M: NDArray[np.float64], s: complex) -> NDArray[np.complex128]:
+    """The compliance (3, 3) at the handle of the slider pressed against its wall, in continuous
+    time, with the inertia M of the device:
+
+        F_o = w^2/(s^2 + k_D s + w^2) F,   e = M^-1 F_o/w^2,   v_o = s (x - e)
+        m s^2 y = F_o_x - F_d_x - (k + b s) y,   M s^2 x = F + u
+        u = M Lambda^-1 (F_o + F_d - (k + b s) y i) - F_o + F_T
+        F_d = K (y i - x) + B (s y i - v_o),   F_T = S (P M_s^-1 P)^+ S (k_j (...) + b_j (...))
+
+    i is the unit vector along the rail, y the slider's position.
+    """
+    m, k, b, w, k_D, k_j, b_j = 0.8, 2000.0, 10.0, 50.0, 100.0, 400.0, 50.0
+    K, B = np.diag([300.0, 300.0, 1.0]), np.diag([20.0, 20.0, 0.1])
+    Lambda_inv, i = np.diag([1 / m, 0.0, 0.0]), np.array([[1.0], [0.0], [0.0]])
+    P = np.diag([0.0, 1.0, 1.0])
+    N = np.linalg.pinv(P @ np.linalg.inv(M) @ P)  # S drops out: P is along its axes
+    one, observed = np.eye(3), w**2 / (s**2 + k_D * s + w**2)
+    lag = np.linalg.inv(M) * observed / w**2
+    # F_d = D_y y - D_x x + D_F F, and the pull of the topology controller likewise
+    D_y, D_x, D_F = (K + B * s) @ i, K + B * s, B * s @ lag
+    T_y, T_x, T_F = (k_j + b_j * s) * i, (k_j + b_j * s) * one, b_j * s * lag
+    a = m * s**2 + k + b * s + (i.T @ D_y)[0, 0]
+    y_x, y_F = i.T @ D_x / a, i.T @ (observed * one - D_F) / a  # y = y_x x + y_F F
+    wall = (k + b * s) * i
+    left = M * s**2 - M @ Lambda_inv @ ((D_y - wall) @ y_x - D_x) - N @ (T_y @ y_x - T_x)
+    right = one * (1 - observed) + M @ Lambda_inv @ (observed * one + D_F + (D_y - wall) @ y_F)
+    found: NDArray[np.complex128] = np.linalg.solve(left, right + N @ (T_F + T_y @ y_F))
+    return found
+
+
+@pytest.fixture
+def slider(tmp_path: Path) -> Path:
+    path = tmp_path / "slider.toml"
+    path.write_text(SLIDER)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("hertz", "rate", "most"),
+    [(1.0, 512, 0.03), (2.0, 512, 0.03), (1.0, 2048, 0.01), (5.0, 2048, 0.015)],
+)
+def test_felt_stiffness_has_its_closed_form(
+    slider: Path, hertz: float, rate: int, most: float
+) -> None:
+    """The closed form is the limit of high rates."""
+    pose = Pose(0.0, {"rail": 0.0205}, (0.0205, 0.0, 0.0), (1.0, 0.0, 0.0))
+    options = pose.options((f"haptics.rate={rate}", f"graphics.rate={rate // 16}"))
+    with held(open_scene.load(slider, options)) as place:
+        X = place.compliance({}, FIRM, hertz)
+        assert place.signal("virtual_mechanism.F_env")[0] == pytest.approx(-1.0, abs=0.03)
+        M = place.signal("haptic_device.M").reshape(3, 3)
+    exact = closed_form(M, 2j * np.pi * hertz)
+    for n in np.eye(3)[:2]:  # into the wall, across the rail
+        assert abs(n @ X @ n) == pytest.approx(abs(n @ exact @ n), rel=most)
+
+
+def test_the_first_gains_that_are_kept_feel_alike(
+    slider: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And their scene loads, with an option that names an entry of an array."""
+    found: list[hl.Tuned] = []
+
+    def keep(tuned: hl.Tuned) -> None:
+        found.append(tuned)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hapticlink.analysis.tune.POSES", 1)
+    with pytest.raises(KeyboardInterrupt):
+        hl.tune(slider, {"linkage.body.block.radius": 0.0201, "graphics.rate": 256}, keep=keep)
+    felt = found[0].felt["tuned"]
+    assert felt["constraint"] == pytest.approx(felt["contact"], rel=0.03)
+    path = tmp_path / "tuned.toml"
+    path.write_text(found[0].scene())
+    read = open_scene.load(path)
+    assert read.linkage.body[0].radius == 0.0201
+    assert read.controller.topology.stiffness == found[0].gains["controller.topology.stiffness"]
+
+
+def test_the_search_finds_the_largest_gains_and_tells_what_limits_them() -> None:
+    limits = {"topology": 7.0, "drift": 0.3}
+
+    def require(scales: dict[str, float]) -> None:
+        for law, most in limits.items():
+            if scales[law] > most:
+                raise hl.InputFault(f"the limit of {law}")
+
+    feel = Mock(along=["constraint"])
+    found, why = search({"drift": 0.1, "topology": 1.0}, feel, require)
+    assert why == "the limit of drift"
+    for law, most in limits.items():
+        assert most * np.exp(-COARSE) <= found[law] <= most
+    limits["topology"] = 0.0
+    with pytest.raises(hl.InputFault, match="the limit of topology"):
+        search(found, feel, require)
+
+
+def pressed(name: str, pose: Pose, n: NDArray[np.float64], hertz: float, swing: float) -> Any:
+    """The parts at a frequency of the handle's pose and the hand's force (3,) in the last second of
+    a run in which the target of a firm hand swings along n."""
+    push: dict[str, Any] = dict(spring(pose.point, pose.press, FIRM))
+    push["target"] = {
+        "mean": push["target"][0][1:],
+        "amplitude": (swing * n / np.abs(n).max()).tolist(),
+        "frequency": [hertz] * 3,
+    }
+    options = [*pose.options(()), *written({"hand": push}), "duration=4.0", *NO_ENCODER]
+    run = hl.run(RECORDED / name / "tuned.toml", options, figures=False)
+    assert run.fault is None
+    window = run.haptics["time"] > 3.0 + 1e-9
+    phase = np.exp(-2j * np.pi * hertz * run.haptics["time"][window])
+    signals = ("haptic_device.x_true", "hand.F")
+    return np.array([(phase[:, None] * run[s][window]).mean(axis=0) for s in signals])
+
+
+@pytest.mark.parametrize("name", TUNED)
+def test_pressing_gives_the_felt_stiffness(name: str) -> None:
+    """n' x is n' X F, F the hand's; a run that does not swing is taken off, since the handle still
+    settles along a wall, which has a part at any frequency."""
+    found = recorded(name)
+    pose = {pose.name: pose for pose in poses(found)}[found["felt_at"]]
+    X = np.array(found["compliance"]) @ [1.0, 1j]
+    still = pressed(name, pose, np.ones(3), found["frequency"], 0.0)
+    for n in map(np.array, found["along"].values()):
+        x, F = pressed(name, pose, n, found["frequency"], 1e-4) - still
+        assert n @ x == pytest.approx(n @ X @ F, rel=0.03)
+
+
+@pytest.mark.parametrize("name", TUNED)
+def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
+    """From 0.1 mm off rest: with all gains at 0.9 of the margin the handle comes to rest in every
+    pose, in a firm grip, at 1.1 of it in one it does not."""
+    found = recorded(name)
+    late: dict[float, list[float]] = {0.9: [], 1.1: []}
+    for pose in poses(found):
+        off = (pose.point[0] + 1e-4, *pose.point[1:])
+        for share, left in late.items():
+            options = [
+                *gains(found, found["margins"]["tuned"] * share),
+                *pose.options(()),
+                *written({"hand": spring(off, pose.press, FIRM)}),
+                "duration=2.0",
+                *NO_ENCODER,
+            ]
+            run = hl.run(RECORDED / name / "tuned.toml", options, figures=False)
+            speed = np.abs(run["haptic_device.v_true"])
+            left.append(np.inf if run.fault else speed[-256:].max() / speed.max())
+    assert max(late[0.9]) < 0.2
+    assert max(late[1.1]) > 0.5
+
+
+def test_rest_is_found_with_gains_that_are_unstable_there() -> None:
+    """Own gains of `obstacles` throw the handle off; they are judged at the pose all the same."""
+    pose = {pose.name: pose for pose in poses(recorded("obstacles"))}["1.8 s"]
+    given = pose.options(("sensing=encoders", "graphics.rate=32"))
+    with held(open_scene.load("obstacles", given)) as place:
+        assert place.signal("haptic_device.x_true") == pytest.approx(pose.point, abs=1e-6)
+        assert place.stable(dict.fromkeys(place.gains.laws, 0.5), FIRM)
+        assert not place.stable({}, FIRM)
+
+
+def test_a_contact_that_is_slid_off_is_pressed_lightly() -> None:
+    """With the force of its run on a pin the handle slides along it; a light one holds it there."""
+    pose = poses(recorded("obstacles"))[-1]
+    size = np.hypot(*pose.press[:2])
+    assert size == pytest.approx(LIGHT)
+    for force, least, most in ((LIGHT, 0.0, 2e-4), (4.7, 4e-3, np.inf)):
+        press = tuple(F * force / size for F in pose.press)
+        options = [*replace(pose, press=press).options(()), "duration=4.0", *NO_ENCODER]
+        run = hl.run(RECORDED / "obstacles" / "tuned.toml", options, figures=False)
+        assert run.fault is None
+        assert run["virtual_mechanism.F_env"][-1].any()
+        assert least < np.hypot(*(run["haptic_device.x_true"][-1] - pose.point)[:2]) < most
+
+
+def test_the_columns_that_are_carried_hold_all_modes() -> None:
+    """A judgement carries the directions of the first rest alone; the map linearised along all of
+    them has the same spectral radius."""
+    pose = poses(recorded("closed-loop"))[0]
+    given = pose.options(("sensing=encoders", "graphics.rate=32"))
+    with held(open_scene.load("closed-loop", given)) as place:
+        for scale in (0.1, 1.0, 3.0):
+            place.stable(dict.fromkeys(("drift", "topology"), scale), HANDS[0])
+            whole = linearised(place._map, place._at.point)
+            radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (place._at, whole)]
+            assert radii[0] == pytest.approx(radii[1], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("scene", "options", "why"),
+    [
+        ("pendulum", {}, "no gains to tune"),
+        ("closed-loop", {}, "sensing=encoders"),
+        (
+            "enclosure",
+            {"sensing": "encoders", "controller.contact": False},
+            "controller.contact=true",
+        ),
+        ("closed-loop", {"sensing": "encoders", "graphics.rate": {"min": 20, "max": 30}}, "varies"),
+    ],
+)
+def test_what_cannot_be_tuned_is_refused(scene: str, options: dict[str, Any], why: str) -> None:
+    with pytest.raises(hl.InputFault, match=why):
+        hl.tune(scene, options)
+
+
+def test_a_margin_is_one_or_more() -> None:
+    with pytest.raises(hl.InputFault, match="give 1 or more"):
+        hl.tune("closed-loop", margin=0.5)
+
+
+def recorded(name: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((RECORDED / name / "tune.json").read_text(encoding="utf-8"))
+    return found
+
+
+def poses(found: dict[str, Any]) -> list[Pose]:
+    return [Pose(**pose) for pose in found["poses"]]
+
+
+def gains(found: dict[str, Any], factor: float) -> tuple[str, ...]:
+    """The options of all tuned gains with stiffness by a factor, damping by its root."""
+    powers = {"stiffness": factor, "damping": factor**0.5}
+    return written(
+        {
+            key: (np.array(value) * powers[key.rpartition(".")[2]]).tolist()
+            for key, value in found["gains"].items()
+        }
+    )

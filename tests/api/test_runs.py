@@ -1,0 +1,237 @@
+"""Runs from Python, in memory and in a folder, compared with those of the command."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.visualization.figures import figure_process
+from tests.shared_fixtures import sets, status
+
+SHORT = {"duration": 0.1, "graphics.rate": 40}
+FAR = {"linkage.start_velocity.slide": 1e308, "linkage.start.slide": 1.7e308}
+"""A pose that is finite, and overflows after some steps."""
+
+
+def same(one: hl.Run, two: hl.Run) -> bool:
+    tables = zip(one.tables.items(), two.tables.items(), strict=True)
+    return all(
+        a == b and s.columns == t.columns and np.array_equal(s.rows, t.rows)
+        for (a, s), (b, t) in tables
+    )
+
+
+def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
+    tmp_path: Path, own_temporary_folder: Path
+) -> None:
+    memory = hl.run("closed-loop", SHORT)
+    assert memory.folder is None
+    assert not list(own_temporary_folder.iterdir())
+    folder = hl.run("closed-loop", SHORT, out=tmp_path / "api")
+    options = sets(f"{key}={value}" for key, value in SHORT.items())
+    assert status("run", "closed-loop", *options, "--out", tmp_path / "command") == 0
+    command = hl.load(tmp_path / "command")
+    assert same(memory, folder)
+    assert same(memory, command)
+    assert same(memory, hl.load(str(tmp_path / "api")))
+    assert folder.run == hl.load(tmp_path / "api").run
+    for key in ("scene", "options", "files", "holds", "end", "stop_when"):
+        assert folder.run[key] == command.run[key]
+    assert set(folder.run["files"]) == {p.name for p in (tmp_path / "api").iterdir()}
+    assert folder.run["options"] == ["duration=0.1", "graphics.rate=40"]
+
+
+def test_tables_too_large_are_not_read_back_and_that_is_told(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("hapticlink.api.runs.MOST", 1000)
+    assert status("run", bar, "--out", tmp_path / "out") == 0
+    assert "tables of more than 1000 bytes are not read back and drawn" in caplog.text
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"haptics.csv", "run.json"}
+    assert len(hl.load(tmp_path / "out").haptics["time"]) == 129
+
+
+def test_options_of_a_scene_object_act(bar: Path) -> None:
+    scene = hl.scene(bar, {"haptics.rate": 128})
+    ended = hl.run(scene, {"duration": 0.125})
+    assert len(ended.haptics["time"]) == 17
+    assert ended.run["options"] == ["haptics.rate=128", "duration=0.125"]
+    assert ended.run["scene"]["duration"] == 0.125
+
+
+def test_signals_go_by_name_each_with_its_times() -> None:
+    found = hl.run("closed-loop", SHORT)
+    assert list(found) == ["haptics", "graphics"]
+    for name, rate, shape in (
+        ("haptic_device.M", "haptics", (3, 3)),
+        ("virtual_environment.x", "graphics", (3,)),
+        ("virtual_environment.x[2]", "graphics", ()),
+    ):
+        assert name in found
+        times = found.time(name)
+        assert np.array_equal(times, found[rate]["time"])
+        assert np.array_equal(found[name], found[rate][name])
+        assert found[name].shape == (len(times), *shape)
+        assert np.array_equal(found.time(rate), times)
+    assert "virtual_environment.y" not in found
+    with pytest.raises(KeyError, match=r"did you mean 'virtual_environment\.x'"):
+        found["virtual_environment.y"]
+    for ambiguous in (lambda: found["time"], lambda: found.time("time")):
+        with pytest.raises(KeyError, match="no rate or signal 'time'"):
+            ambiguous()
+    assert repr(found).splitlines()[0].endswith(": done at 0.0996094 s")
+    assert "4 rows of time, virtual_environment.x" in repr(found)
+
+
+def test_tracking_is_what_lies_between_the_two_poses() -> None:
+    found = hl.run("closed-loop", SHORT)
+    apart = found["virtual_mechanism.x"] - found["haptic_device.x_true"]
+    time, distance, angle = found.tracking()
+    assert np.array_equal(time, found.time("haptics"))
+    np.testing.assert_allclose(distance, 1e3 * np.linalg.norm(apart[:, :2], axis=1), rtol=1e-12)
+    np.testing.assert_allclose(angle, np.abs(apart[:, 2]), rtol=0, atol=1e-15)
+    line = found.figures()["distance"].axes[0].lines[0]
+    assert np.array_equal(line.get_ydata(), distance)
+
+
+def test_a_frame_is_the_table_over_its_times() -> None:
+    pandas = pytest.importorskip("pandas")
+    found = hl.run("closed-loop", SHORT)
+    frame = found.frame("graphics")
+    assert isinstance(frame, pandas.DataFrame)
+    assert frame.index.name == "time"
+    assert np.array_equal(frame.index, found.time("graphics"))
+    assert list(frame.columns) == [c for c in found.graphics.columns if c != "time"]
+    name = "virtual_environment.Lambda_inv[2,3]"
+    assert np.array_equal(frame[name], found[name])
+    with pytest.raises(KeyError, match="there are haptics, graphics"):
+        found.frame("hand.F")
+
+
+def test_without_pandas_a_frame_says_what_to_install(
+    bar: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(hl.InputFault, match="needs pandas: pip install pandas"):
+        hl.run(bar).frame("haptics")
+
+
+def test_a_fault_of_the_run_is_told_with_its_results(bar: Path, tmp_path: Path) -> None:
+    for out in (None, tmp_path):
+        lost = hl.run(bar, FAR, out=out)
+        assert lost.fault is not None
+        assert lost.fault.startswith("virtual_mechanism: ")
+        assert lost.fault in repr(lost)
+        assert lost.run["fault"]["kind"] == "FmuFault"
+    assert hl.load(tmp_path).fault == lost.fault
+    assert hl.run(bar).fault is None
+
+
+def test_a_fault_before_the_first_step_has_no_samples() -> None:
+    far = {"linkage.operational_point": {"body": "link2", "at": [0.9, 0.0]}}
+    lost = hl.run("closed-loop", far)
+    said = "haptic_device: the start pose (x m, y m, theta rad) = (0.66"
+    assert str(lost.fault).startswith(said)
+    assert "outside the device's workspace by 0.7" in str(lost.fault)
+    assert [len(part) for part in lost.tracking()] == [0, 0, 0]
+    assert lost.figures() == {}
+    (row,) = hl.sweep("closed-loop", {"duration": [0.1]}, far, jobs=1).rows
+    assert row["end"] == "fault"
+    assert "outside the device's workspace" in row["message"]
+
+
+def test_what_a_killed_run_has_written_can_be_looked_at(bar: Path, tmp_path: Path) -> None:
+    whole = hl.run(bar, out=tmp_path)
+    run = tmp_path / "run.json"
+    begin, _, _ = run.read_text().partition('  "end": {')
+    run.write_text(begin + '  "end": {"reason": "running"}\n}\n')
+    found = hl.load(tmp_path)
+    assert same(found, whole)
+    assert "not ended" in repr(found)
+    axes = found.figures()["trajectories"].axes[0]
+    assert "until the last row so far at 0.25 s" in axes.get_title().replace("\n", " ")
+
+
+def test_a_folder_without_a_run_is_refused(bar: Path, tmp_path: Path) -> None:
+    with pytest.raises(hl.InputFault, match="not the folder of a run"):
+        hl.load(tmp_path)
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(hl.InputFault, match="not the folder of a run"):
+        hl.load(tmp_path)
+    hl.run(bar, out=tmp_path)
+    (tmp_path / "haptics.csv").unlink()
+    with pytest.raises(hl.InputFault, match=r"haptics\.csv"):
+        hl.load(tmp_path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("out", ["folder", None])
+def test_ctrl_c_raises_with_the_results_so_far(out: str | None, tmp_path: Path) -> None:
+    told: list[float] = []
+
+    def interrupt(time: float) -> None:
+        if not told and time > 0.5:
+            told.append(time)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(hl.RunInterrupted, match=r"interrupted at t = \d") as ended:
+        hl.run("five-bar", {"duration": 60.0}, progress=interrupt, out=out and tmp_path / out)
+    found = ended.value.run
+    assert found.time("haptics")[-1] == pytest.approx(told[0], abs=2 / 512)
+    assert found.run["end"]["reason"] == "interrupted"
+    assert (found.folder is None) == (out is None)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_ctrl_c_while_figures_are_drawn_says_so(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drawn = figure_process.pngs
+
+    def interrupted(found: hl.Run) -> figure_process.Pngs:
+        os.kill(os.getpid(), signal.SIGINT)
+        return drawn(found)
+
+    monkeypatch.setattr(figure_process, "pngs", interrupted)
+    assert status("run", bar, "--out", tmp_path) == 1
+    assert "has the results of the run, not all of its figures" in capsys.readouterr().err
+    assert hl.load(tmp_path).run["end"]["reason"] == "duration"
+    with pytest.raises(hl.Fault, match="not all of its figures"):
+        hl.run(bar, out=tmp_path)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_what_a_run_warns_of_stands_in_run_json(tmp_path: Path, kept: bool) -> None:
+    """A pulled graphics copy at 10 Hz folds; one that follows exactly does not."""
+    options = {"graphics.rate": 10, "duration": 2.0}
+    out = tmp_path if kept else None
+    pulled = hl.run("closed-loop", {**options, "graphics.sync": "operational"}, out=out)
+    (warning,) = pulled.run["warnings"]
+    off = int((pulled["virtual_environment.branch_ok"] == 0).sum())
+    assert off > 0
+    assert warning.startswith(f"warning: the graphics copy was folded in {off} of ")
+    if kept:
+        assert hl.load(tmp_path).run["warnings"] == [warning]
+    assert hl.run("closed-loop", options, out=out).run["warnings"] == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")
+def test_a_disk_that_is_full_for_the_figures_keeps_the_run(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def full(*_: object) -> list[str]:
+        with open("/dev/full", "wb", buffering=0) as file:
+            file.write(b"a figure")
+        return []
+
+    monkeypatch.setattr("hapticlink.visualization.figure_axes.write", full)
+    made = hl.run(bar, out=tmp_path)
+    assert made.fault is None
+    assert "No space left on device" in caplog.text
+    assert hl.load(tmp_path).run["end"]["reason"] == "duration"

@@ -1,0 +1,98 @@
+"""Sweeps from Python, compared with those of the command."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.analysis.sweep.points import points
+from tests.shared_fixtures import status
+
+
+def test_values_and_texts_give_the_same_runs(tmp_path: Path) -> None:
+    wanted = [{"a.b": a, "hold": h} for a in ("1", "2.5") for h in ("zoh", "foh")]
+    assert points({"a.b": [1, 2.5], "hold": "zoh,foh"}, ()) == wanted
+    assert points(["a.b=1,2.5", "hold=zoh,foh"], ()) == wanted
+    assert points((), [{"a.b": 1, "hold": "zoh"}, {"a.b": 1, "hold": "foh"}]) == wanted[:2]
+    (tmp_path / "runs.csv").write_text("a.b,hold\n1,zoh\n1,foh\n")
+    assert points((), tmp_path / "runs.csv") == wanted[:2]
+    assert points({"a.b": range(10, 40, 10)}, ()) == [{"a.b": v} for v in ("10", "20", "30")]
+    for wrong, message in (
+        ({"a.b": 3}, "a.b: 3 is one value; give a list"),
+        ("a.b=1,2", "vary 'a.b=1,2': give a mapping, or a list of key=values"),
+        ({"a.b": []}, "a.b: no value"),
+        ({}, "give either --vary"),
+    ):
+        with pytest.raises(hl.InputFault, match=message):
+            points(wrong, ())
+    with pytest.raises(hl.InputFault, match="give either --vary"):
+        points(["a=1"], [{"a": 1}])
+
+
+def test_a_sweep_is_that_of_the_command(
+    bar: Path, tmp_path: Path, own_temporary_folder: Path
+) -> None:
+    told: list[tuple[int, int]] = []
+    vary = {"hold": ["zoh", "none"], "haptics.rate": np.array([100, 200])}
+    options = {"linkage.start_velocity.slide": 0.25, "duration": 0.1}
+    found = hl.sweep(hl.scene(bar), vary, options, progress=lambda *done: told.append(done), jobs=1)
+    assert told[0] == (2, 4)  # those refused
+    assert told[-1] == (4, 4)
+    assert found.folder is None
+    assert not list(own_temporary_folder.iterdir())
+    arguments = ["--set", "linkage.start_velocity.slide=0.25", "--set", "duration=0.1"]
+    arguments += ["--vary", "hold=zoh,none", "--vary", "haptics.rate=100,200"]
+    assert status("sweep", bar, *arguments, "--out", tmp_path, "--jobs", 1) == 0
+    with (tmp_path / "table.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(found.columns) == list(rows[0])
+    for name in ("end", "end_time_s", "message"):
+        assert [str(r.get(name, "")) for r in found.rows] == [r[name] for r in rows]
+    assert found["haptics.rate"].tolist() == [100, 200, 100, 200]
+    assert found["end"].tolist() == [r["end"] for r in rows]
+    assert found["end_time_s"].dtype == float
+    assert len(found.failed) == sum(r["end"] == "refused" for r in rows) == 2
+    assert "4 runs over hold, haptics.rate, 2 failed" in repr(found)
+    figure = found.figure("end_time_s")
+    assert figure is not None
+    assert figure.axes[0].get_ylabel() == "end of the run (s)"
+    with pytest.raises(KeyError, match="did you mean 'end_time_s'"):
+        found["end_time"]
+
+
+def test_a_frame_has_a_row_a_run(bar: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = hl.sweep(bar, {"duration": [0.05, 0.1]}, jobs=1).frame()
+    assert isinstance(frame, pandas.DataFrame)
+    assert frame["duration"].tolist() == [0.05, 0.1]
+    assert frame["end"].tolist() == ["duration", "duration"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_an_interrupted_sweep_in_memory_says_what_would_keep_it(bar: Path, tmp_path: Path) -> None:
+    def interrupt(done: int, of: int) -> None:
+        if done == 1:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    vary = {"duration": [0.05, 0.1, 0.15]}
+    with pytest.raises(hl.Fault, match="interrupted: 1 of 3 runs; with a folder `out`"):
+        hl.sweep(bar, vary, jobs=1, progress=interrupt)
+    with pytest.raises(hl.Fault, match="1 of 3 runs are in"):
+        hl.sweep(bar, vary, jobs=1, progress=interrupt, out=tmp_path)
+    found = hl.sweep(bar, vary, jobs=1, out=tmp_path)
+    assert found["end"].tolist() == ["duration"] * 3
+    assert found.files == ("table.csv", "sweep.png")
+
+
+def test_where_every_run_is_refused_so_is_the_sweep(bar: Path) -> None:
+    with pytest.raises(hl.InputFault, match="no hold 'a'"):
+        hl.sweep(bar, {"hold": ["a", "b"]})
+    with pytest.raises(hl.InputFault, match="jobs 0: give 1 or more"):
+        hl.sweep(bar, {"duration": [0.1]}, jobs=0)

@@ -1,0 +1,135 @@
+"""The commands from outside: files, messages and exit statuses."""
+
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+import hapticlink as hl
+from hapticlink.commands.progress import progress
+from hapticlink.orchestrator.results import tables
+from tests.shared_fixtures import status
+
+
+def test_a_mechanism_alone_runs_at_the_haptic_rate(
+    bar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status("run", str(bar), "--out", str(tmp_path / "out")) == 0
+    found = tables.load(tmp_path / "out")
+    time = np.arange(129) / 512
+    np.testing.assert_array_equal(found.haptics["time"], time)
+    x = found.haptics["virtual_mechanism.x"][:, 0]
+    np.testing.assert_allclose(x, 0.5 * time, rtol=0, atol=1e-13)  # no force: uniform motion
+    assert found.run["end"] == {"reason": "duration", "time": 0.25}
+    assert found.run["energies"] == "none"
+    assert found.run["fault"] is None
+    assert imread(tmp_path / "out" / "trajectories.png").min() < 0.5  # ink on it
+    assert "done at 0.25 s" in capsys.readouterr().out
+
+
+def test_a_process_that_has_run_an_fmu_builds_whole_ones(bar: Path, tmp_path: Path) -> None:
+    """Not with the modules that the first FMU has brought along, whose folder is gone."""
+    hl.explain(bar)  # the FMU of the run is in the cache
+    code = (
+        "import sys, hapticlink as hl\n"
+        "hl.run(sys.argv[1])\n"
+        "hl.run(hl.export(sys.argv[1], {'duration': 0.0371}, out='bar.ssp'))"
+    )
+    subprocess.run([sys.executable, "-c", code, str(bar)], cwd=tmp_path, check=True)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_nothing_acts_on_the_terminal_but_the_bar(
+    bar: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Escape codes in a title, a name, an option; and what a bar takes for its own codes."""
+    bar.write_text(bar.read_text().replace("A bar", r"A bar [/b] \u001b[2J \u009b31m"))
+    assert status("info", bar) == 0
+    assert capsys.readouterr().out.startswith(r"A bar [/b] \x1b[2J \x9b31m at 0.5 m/s")
+    assert status("run", bar, "--set", "du\x1b[31mration=1") == 2
+    assert r"du\x1b[31mration: unknown key" in capsys.readouterr().err
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    with progress("[/b] \x1b[2J", 1.0) as told:
+        assert told
+        told(0.5)
+    assert r"[/b] \x1b[2J" in terminal.getvalue()
+
+
+def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status("info", "closed-loop") == 0
+    said = capsys.readouterr().out
+    assert "ticks of 1/7680 s, gauss-seidel" in said
+    assert "virtual_environment.Lambda_inv -> controller.Lambda_inv: 0 to 33.2, zoh" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "no-such-scene"], "neither a file nor a shipped scene"),
+        (["run", "closed-loop", "--set", "controler.topology=false"], "did you mean 'controller'"),
+        (["run", "closed-loop", "--set", "holds.hand.G=zoh"], "is no connection of this"),
+        (["run", "closed-loop", "--set", "stop_when=hand.G<0"], "there is no such output"),
+        (["run", "closed-loop", "--bogus"], "Unknown option"),
+        (["fly"], "Unknown command"),
+    ],
+)
+def test_bad_input_is_status_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status(*arguments) == 2
+    assert message in " ".join("".join(capsys.readouterr()).split())
+
+
+EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.archive", "scipy")
+
+
+@pytest.mark.parametrize(
+    ("line", "left"),
+    [
+        (("--help",), (*EQUATIONS, "casadi", "numpy", "pydantic", "fmpy", "matplotlib")),
+        (("run", "{bar}", "--no-figures"), (*EQUATIONS, "matplotlib")),
+        (("run", "{bar}"), ("scipy", "matplotlib")),  # a process beside it draws
+        (("info", "{bar}"), ("scipy", "matplotlib")),
+    ],
+)
+def test_a_command_imports_what_it_uses(
+    bar: Path, tmp_path: Path, line: tuple[str, ...], left: tuple[str, ...]
+) -> None:
+    """Where every FMU is in the cache."""
+    hl.explain(bar)
+    code = (
+        "import sys\nfrom hapticlink.commands import main\n"
+        "try:\n    main(sys.argv[2:])\nexcept SystemExit as ended:\n"
+        "    assert not ended.code, ended.code\n"
+        "print([m for m in sys.argv[1].split() if m in sys.modules])"
+    )
+    given = [part.format(bar=bar) for part in line]
+    done = subprocess.run(
+        [sys.executable, "-c", code, " ".join(left), *given],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert bool([*tmp_path.rglob("*.png")]) == (line == ("run", "{bar}"))
+
+
+def test_a_signal_before_the_first_event_has_a_good_end(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The run has taken no time then."""
+    made = hl.run(bar, out=tmp_path)
+    made.run["timings"]["run"], made.run["end"] = 0.0, {"reason": "interrupted", "time": 0.0}
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise hl.RunInterrupted(made)
+
+    monkeypatch.setattr(hl, "run", interrupted)
+    status("run", bar, "--out", tmp_path)
+    assert "interrupted at 0 s" in capsys.readouterr().out

@@ -1,0 +1,40 @@
+"""`info` prints and draws the device's workspace, and warns if a scene starts outside it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.components.specs.device import Device
+from hapticlink.visualization.mechanism.workspace_drawing import draw, lines
+from tests.shared_fixtures import status
+
+FAR = ("--set", "linkage.start.float=[0.22, 0.0, 0.0]")
+OUTSIDE = "is outside the device's workspace by 0.0144 m (move linkage.operational_point"
+
+
+def test_info_tells_and_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert status("info", "single-body", "--out", tmp_path) == 0
+    told = capsys.readouterr().out
+    assert "at every theta: x -0.2 to 0.19 m, y -0.1 to 0.1 m" in told
+    assert "the handle starts at (0, 0, 0), 0.128 m" in told
+    assert (tmp_path / "workspace.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_start_outside_is_told_by_info_and_by_a_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert OUTSIDE in list(lines(Device(), (0.22, 0.0, 0.0)))[-1]
+    assert status("run", "single-body", "--out", tmp_path, *FAR) == 0
+    assert OUTSIDE in capsys.readouterr().out
+
+
+def test_the_drawing_shows_the_device_at_the_start_with_units() -> None:
+    start = (0.04, 0.01, 0.5)
+    (axes,) = draw(Device(), start, "title").axes
+    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_title()) == ("x (m)", "y (m)", "title")
+    lines = {line.get_label(): np.transpose(line.get_data()) for line in axes.get_lines()}
+    np.testing.assert_allclose(lines["handle where the scene starts"], [start[:2]])
+    half = 0.04 * np.array([np.cos(0.5), np.sin(0.5)])
+    ends = [np.subtract(start[:2], half), np.add(start[:2], half)]
+    np.testing.assert_allclose(lines["crank"], ends)

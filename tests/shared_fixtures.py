@@ -1,0 +1,136 @@
+"""Small systems for tests: real FMUs built from components whose signals carry their stamps."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import casadi as ca
+import pytest
+
+from hapticlink.commands import main
+from hapticlink.components.component import Block, Component, Variable
+from hapticlink.fmus.build import build
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
+from hapticlink.orchestrator.system.system import Fmu, System
+from tests.orchestrator.systems import connected
+
+
+@pytest.fixture(autouse=True)
+def own_temporary_folder(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> Path:
+    """Where temporary folders land, so that what a test leaves behind is its own."""
+    folder = tmp_path_factory.mktemp("temporary")
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    return folder
+
+
+def status(*arguments: object) -> int:
+    """The exit status of a command."""
+    with pytest.raises(SystemExit) as ended:
+        main([str(a) for a in arguments])
+    assert isinstance(ended.value.code, int)
+    return ended.value.code
+
+
+def sets(options: Iterable[str]) -> list[str]:
+    """Options as a command takes them."""
+    return [text for option in options for text in ("--set", option)]
+
+
+try:
+    load()
+    LOOPS = ["python", "compiled"]
+except Unavailable:
+    LOOPS = ["python"]
+
+
+@pytest.fixture(params=LOOPS)
+def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The event loop of the test's runs."""
+    monkeypatch.setenv(CHOICE, request.param)
+    return str(request.param)
+
+
+def clock(name: str, timing: str, inputs: Sequence[str]) -> Component:
+    """A block that puts out the stamp of its output, and `seen_<input>`: what its last step
+    read. Connected stamp to input, every run shows its own causality."""
+    seen = [f"seen_{i}" for i in inputs]
+    block = Block(
+        inputs=[Variable(i, (), "s") for i in inputs],
+        states=[Variable(n, (), "s") for n in ["now", *seen]],
+        outputs=[Variable(n, (), "s") for n in ["stamp", *seen]],
+    )
+    t, u, x = block.t, block.u, block.x
+    if timing == "continuous":
+        step = {"now": t + block.h, **{f"seen_{i}": u[i] for i in inputs}}
+        output = {"stamp": x["now"], **{s: x[s] for s in seen}}
+    else:
+        step = {"now": t, **{s: x[s] for s in seen}}
+        output = {"stamp": t, **{f"seen_{i}": u[i] for i in inputs}}
+    initial = dict.fromkeys(["now", *seen], ca.SX(0))
+    return block.component(name, "stamps", timing, initial=initial, step=step, output=output)  # type: ignore[arg-type]
+
+
+BLOCKS = {
+    "device": ("continuous", ["f"]),
+    "controller": ("sampled", ["d", "m", "g"]),
+    "hand": ("sampled", ["d"]),
+    "mechanism": ("continuous", ["f"]),
+    "graphics": ("continuous", ["m"]),
+}
+ROWS = [
+    ("device.stamp", "hand.d"),
+    ("device.stamp", "controller.d"),
+    ("mechanism.stamp", "controller.m"),
+    ("graphics.stamp", "controller.g"),
+    ("controller.stamp", "device.f"),
+    ("controller.stamp", "mechanism.f"),
+    ("mechanism.stamp", "graphics.m"),
+]
+
+
+@pytest.fixture(scope="session")
+def stamped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Timeline, str], System]:
+    """(timeline, coupling) -> a loop like the report's, of blocks that show their stamps."""
+    folder = tmp_path_factory.mktemp("stamped")
+    described = {n: describe(build(clock(n, t, i), folder)) for n, (t, i) in BLOCKS.items()}
+
+    def make(timeline: Timeline, coupling: str) -> System:
+        units = tuple(
+            Fmu(n, d, timeline.of.get(n, "graphics" if n == "graphics" else "haptics"))
+            for n, d in described.items()
+        )
+        return System(units, connected(units, ROWS, timeline)[0], timeline, coupling)
+
+    return make
+
+
+BAR = """title = "A bar at 0.5 m/s"
+duration = 0.25
+[linkage]
+operational_point = { body = "bar" }
+[[linkage.body]]
+name = "bar"
+mass = 1.0
+inertia = 0.01
+[[linkage.joint]]
+name = "slide"
+type = "prismatic"
+axis = 0.0
+child = "bar"
+[linkage.start_velocity]
+slide = 0.5
+"""
+
+
+@pytest.fixture
+def bar(tmp_path: Path) -> Path:
+    path = tmp_path / "bar.toml"
+    path.write_text(BAR)
+    return path

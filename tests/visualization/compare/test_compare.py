@@ -1,0 +1,272 @@
+"""Runs beside each other, and the page of a run."""
+
+from __future__ import annotations
+
+import base64
+import filecmp
+import json
+import re
+import shutil
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.commands import main
+from hapticlink.orchestrator.results.checked_run import named
+from hapticlink.orchestrator.results.scene_file import scene_file
+from hapticlink.visualization.compare import numbers, overlay, page, settings
+from hapticlink.visualization.figures.run_figures import figures as run_figures
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("runs")
+    hl.run("closed-loop", {"graphics.rate": 10, "duration": 1.0}, out=found / "slow", figures=False)
+    hl.run("closed-loop", {"duration": 0.7}, out=found / "fast", figures=False)
+    hl.run("parallelogram", {"duration": 0.3}, out=found / "other", figures=False)
+    return found
+
+
+def called(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    return int(ended.value.code or 0)
+
+
+def test_settings_that_differ_are_all_of_them(root: Path) -> None:
+    found = settings.differing([hl.load(root / name) for name in ("slow", "fast")])
+    assert found == {"duration": ("1.0", "0.7"), "graphics.rate": ("10", "30")}
+
+
+def test_errors_are_compared_until_the_first_end(root: Path) -> None:
+    runs = [hl.load(root / name) for name in ("slow", "fast")]
+    rows = {r.label: r.values for r in numbers.sections(runs)["How well, all until 0.699 s"]}
+    for run, said in zip(runs, rows["tracking error, largest (mm)"], strict=True):
+        away = run["virtual_mechanism.x"] - run["haptic_device.x_true"]
+        most = np.hypot(*away[run.time("haptic_device.x_true") < 0.7].T[:2]).max()
+        assert float(said) == pytest.approx(1e3 * most, rel=2e-3)
+    x, other = (run["virtual_mechanism.x"][:359, :2] for run in runs)
+    said = rows["operational point from that of the first run, largest (mm)"][1]
+    assert float(said) == pytest.approx(1e3 * np.hypot(*(x - other).T).max(), rel=2e-3)
+
+
+def test_other_scenes_are_told(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert called("compare", str(root / "slow"), str(root / "other")) == 0
+    said = capsys.readouterr().out
+    assert "warning: different mechanisms: Closed-loop mechanism of Table 6.1; " in said
+    assert "operational point from that of the first run" not in said
+
+
+def test_the_command_draws_and_prints_json(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders = str(root / "slow"), str(root / "fast")
+    assert called("compare", *folders, "--out", str(tmp_path), "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [*told["runs"]] == ["slow", "fast"]
+    assert told["runs"]["slow"]["Settings that differ"]["graphics.rate"] == "10"
+    assert {"distance.png", "forces.png", "paths.png"} <= {p.name for p in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("compare", "slow"), "two runs or more"),
+        (("compare", "slow", "slow"), "slow: is named twice"),
+        (("report", "nowhere"), "nowhere: not the folder of a run"),
+        (("report", "slow", "--out", "."), "--out .: is a folder; name a file"),
+    ],
+)
+def test_bad_input(
+    root: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    given: tuple[str, ...],
+    said: str,
+) -> None:
+    monkeypatch.chdir(root)
+    assert called(*given) == 2
+    assert said in capsys.readouterr().err
+
+
+class Parsed(HTMLParser):
+    """Headings, pictures and tags of a page."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.headings, self.pictures, self.tags, self._in = [""], list[bytes](), set[str](), ""
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self._in = tag
+        if tag == "h2":
+            self.headings.append("")
+        source = dict(attrs).get("src")
+        if source:
+            assert source.startswith("data:image/png;base64,")
+            self.pictures.append(base64.b64decode(source.partition(",")[2]))
+
+    def handle_endtag(self, tag: str) -> None:
+        self._in = ""
+
+    def handle_data(self, data: str) -> None:
+        if self._in == "h2":
+            self.headings[-1] += data
+
+
+def test_the_page_answers_in_the_order_in_which_one_asks(root: Path) -> None:
+    runs = named([root / "slow", root / "fast"])
+    html = page.page(runs)
+    assert html == page.page(runs)
+    found = Parsed(html)
+    assert found.headings[1:] == [
+        "What ran", "Did it end well", "How well, all until 0.699 s", "Energies, of the whole run",
+        "Stability and steps", "Timing", "Settings that differ", "How to make it again",
+    ]  # fmt: skip
+    assert len(found.pictures) == 7
+    assert all(picture.startswith(b"\x89PNG") for picture in found.pictures)
+    assert not {"script", "link", "iframe"} & found.tags
+    assert not re.search(r"(src|href)=\"(?!data:)", html)
+
+
+def test_text_of_a_scene_is_text_in_the_page(tmp_path: Path) -> None:
+    title = "<script>alert(1)</script> & more"
+    hl.run("closed-loop", {"duration": 0.05, "title": title}, out=tmp_path, figures=False)
+    html = page.page(named([tmp_path]))
+    assert "<script" not in html
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; more" in html
+
+
+def test_dollar_signs_of_a_scene_are_no_formula(tmp_path: Path) -> None:
+    """Matplotlib fails at what two of them enclose if that is no formula, as here."""
+    title = r"costs $1 \\g $& more $$ or _less"
+    hl.run("closed-loop", {"duration": 0.05, "title": title}, out=tmp_path / "$a$_{", figures=True)
+    hl.run("closed-loop", {"duration": 0.05}, out=tmp_path / "_b", figures=False)
+    runs = named([tmp_path / "$a$_{", tmp_path / "_b"])
+    page.page(runs)
+    legend = overlay.figures(runs)["distance"].axes[0].get_legend()
+    assert legend
+    assert [text.get_text() for text in legend.get_texts()] == [r"\$a\$_{", "_b"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_letters_that_no_font_has_are_replaced(tmp_path: Path) -> None:
+    hl.run("closed-loop", {"duration": 0.05, "title": "闭环 Механизм"}, out=tmp_path / "环")
+    (name, run), *_ = named([tmp_path / "环"]).items()
+    assert "闭环" in page.page({name: run})
+    title = run_figures(run)["mechanism"].axes[0].get_title()
+    assert title.startswith("\N{REPLACEMENT CHARACTER}\N{REPLACEMENT CHARACTER} Механизм at the")
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (("scene", "title"), 3),
+        (("connections", 0), None),
+        (("end", "reason"), None),
+        (("clocks", "haptics"), {}),
+        (("delays", "hand.F -> controller.F_hand"), {}),
+        (("step_errors", "haptic_device"), {"sum": "much"}),
+        (("fault",), "broken"),
+    ],
+)
+def test_a_run_json_that_was_changed_is_bad_input(
+    root: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    keys: tuple[str | int, ...],
+    value: object,
+) -> None:
+    folder = shutil.copytree(root / "fast", tmp_path / "run")
+    run = json.loads((folder / "run.json").read_text())
+    place = run
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    (folder / "run.json").write_text(json.dumps(run))
+    assert called("report", str(folder), "--out", str(tmp_path / "page.html")) == 2
+    assert "run.json: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "\n0.001953125,",
+            "\n0.001953125,7,",
+            "haptics.csv: line 3 has 67 values, not 66: run the",
+        ),
+        ("\n0.001953125,", "\nabc,", "haptics.csv: line 3: time = 'abc' is no number: run the"),
+        ("\n0.00390625,", "\n0.001,", "line 4: time = 0.001 s is before that of the line above"),
+        ("time,", "t,", "haptics.csv: line 1: its first column is 't', not 'time'"),
+    ],
+)
+def test_a_table_that_was_changed_is_bad_input(
+    root: Path, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    table = Path(shutil.copytree(root / "fast", tmp_path / "run")) / "haptics.csv"
+    table.write_text(table.read_text().replace(old, new, 1))
+    with pytest.raises(hl.InputFault, match=re.escape(said)):
+        named([tmp_path / "run"])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_run_without_a_finite_value_has_a_page(root: Path, tmp_path: Path) -> None:
+    run = shutil.copytree(root / "fast", tmp_path / "run")
+    lines = (run / "haptics.csv").read_text().splitlines()
+    lines[1:] = [f"{line.partition(',')[0]}{',nan' * line.count(',')}" for line in lines[1:]]
+    (run / "haptics.csv").write_text("\n".join(lines) + "\n")
+    assert 'alt="mechanism"' not in page.page(named([run]))
+
+
+def test_warnings_alone_are_red(root: Path) -> None:
+    found = named([root / "fast"])
+    found["fast"].run["warnings"] = ["one: 7 steps were repeated"]
+    assert 'class="bad"' not in page.page(found)
+    found["fast"].run["warnings"] += ["warning: a contact is too stiff"]
+    assert '<td class="bad">a contact is too stiff</td>' in page.page(found)
+
+
+def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -> None:
+    """As a process that is killed can leave them."""
+    folder = shutil.copytree(root / "fast", tmp_path / "run")
+    table = folder / "haptics.csv"
+    table.write_text(table.read_text().partition("\n")[0] + "\n")
+    assert "How well" in page.page(named([folder]))
+
+
+def test_a_run_without_a_linkage_and_one_that_failed_have_a_page(tmp_path: Path) -> None:
+    hl.run("virtual-wall", {"duration": 0.1}, out=tmp_path / "wall", figures=False)
+    push = {"hand.wrench": [1e6, 0.0, 0.0], "stop_when": ""}
+    failed = hl.run("closed-loop", push, out=tmp_path / "failed", figures=False)
+    html = page.page(named([tmp_path / "wall", tmp_path / "failed"]))
+    assert failed.fault
+    assert f'<td class="bad">{failed.fault.splitlines()[0]}' in html
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("closed-loop", {"sensing": "encoders"}),
+        ("virtual-wall", {}),
+        ("two-hands", {}),
+        ("two-users", {"sensing": "encoders"}),
+        ("push-disc", {}),
+    ],
+)
+def test_the_scene_of_a_page_gives_the_same_tables(
+    tmp_path: Path, name: str, options: dict[str, str]
+) -> None:
+    first = hl.run(name, {"duration": 0.2} | options, out=tmp_path / "first", figures=False)
+    text = scene_file(first)
+    assert tomllib.loads(text)["title"] == first.run["scene"]["title"]
+    (tmp_path / "scene.toml").write_text(text)
+    hl.run(tmp_path / "scene.toml", out=tmp_path / "again", figures=False)
+    tables = [n for n in first.run["files"] if n.endswith(".csv")]
+    same, *_ = filecmp.cmpfiles(tmp_path / "first", tmp_path / "again", tables, shallow=False)
+    assert sorted(same) == sorted(tables)

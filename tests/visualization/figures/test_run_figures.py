@@ -1,0 +1,119 @@
+"""Figures: their titles, and the signals that they draw."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import tables
+from hapticlink.visualization import figure_axes
+from hapticlink.visualization.figures import run_figures, sweep_labels
+from hapticlink.visualization.figures.force_figure import forces
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(160.4, "160"), (1234.6, "1230"), (0.0421, "0.0421"), (0.0, "0"), (2.0, "2"),
+     (3.21e-9, "3.21e-09")],
+)  # fmt: skip
+def test_numbers_are_three_digits_without_powers_of_ten(value: float, text: str) -> None:
+    assert figure_axes.short(value) == text
+
+
+def drawn(results: tables.Results) -> dict[str, Any]:
+    """The axes of each figure, by its name."""
+    return {name: figure.axes[0] for name, figure in run_figures.figures(results).items()}
+
+
+def run(scene: str, out: Path, *options: str) -> tables.Results:
+    return simulate(scene, out, options).results
+
+
+def test_an_early_end_stands_in_every_title(tmp_path: Path) -> None:
+    found = drawn(run("closed-loop", tmp_path, "stop_when='virtual_mechanism.x[1]<0.044'"))
+    drawings = {
+        "mechanism",
+        "trajectories",
+        "distance",
+        "forces",
+        "constraints",
+        "energies",
+        "user_port",
+    }
+    assert drawings == set(found)
+    for axes in found.values():
+        assert "until stop_when ended the run at 0." in axes.get_title().replace("\n", " ")
+    names = [text.get_text() for text in found["trajectories"].get_legend().get_texts()]
+    assert names == ["operational point x_S", "handle x_D", "start"]
+
+
+def test_obstacles_and_the_force_of_contacts_are_drawn(tmp_path: Path) -> None:
+    found = run("obstacles", tmp_path, "duration=0.7")
+    axes = drawn(found)
+    patches = axes["trajectories"].patches
+    assert [type(p).__name__ for p in patches] == ["Circle", "Circle", "Polygon"]
+    assert patches[0].center == pytest.approx((72, 12))  # mm, of the disc `pin`
+    assert patches[0].radius == pytest.approx(8)
+    force = axes["contact"].lines[0].get_ydata()
+    F = found.haptics["virtual_mechanism.F_env"]
+    assert force == pytest.approx((F[:, 0] ** 2 + F[:, 1] ** 2) ** 0.5)
+    assert force.max() > 0
+    enclosed = drawn(run("enclosure", tmp_path, "duration=0.2"))
+    walls = enclosed["trajectories"].lines[-1]
+    assert walls.get_xydata().min(axis=0) == pytest.approx((-30, -45))
+
+
+def test_every_hand_s_point_is_drawn(tmp_path: Path) -> None:
+    found = run("two-hands", tmp_path, "duration=0.5")
+    left = drawn(found)["trajectories"].lines[1]
+    assert left.get_label() == "point left"
+    expected = found.haptics["virtual_mechanism.left.x"][:, 0] * 1e3
+    assert left.get_xdata() == pytest.approx(expected)
+
+
+def test_both_users_are_drawn_and_their_works_are_told(tmp_path: Path) -> None:
+    """A held force times the displacement of the step over which it acts."""
+    found = run("two-users", tmp_path, "duration=0.5")
+    axes, r = drawn(found), found.haptics
+    apart = (r["virtual_mechanism.left.x"] - r["haptic_device_left.x_true"])[:, :2] * 1e3
+    assert axes["distance"].lines[1].get_ydata() == pytest.approx(np.hypot(*apart.T), abs=1e-12)
+    curves = {line.get_label(): line.get_ydata() for line in axes["forces"].lines}
+    F, x = r["hand_left.F"], r["haptic_device_left.x_true"]
+    assert curves["left: hand, F_hand"] == pytest.approx(np.hypot(*F[:, :2].T))
+    work = float((F[:-1] * np.diff(x, axis=0)).sum())
+    port = user_port(found)
+    assert port
+    assert port.works["left: hand"] == pytest.approx(work, rel=1e-9)
+
+
+def test_both_users_forces_are_drawn_where_a_system_describes_no_device(tmp_path: Path) -> None:
+    """As that of an SSP, which has the blocks and not their descriptions."""
+    found = run("two-users", tmp_path, "duration=0.1")
+    styles = {line.get_linestyle() for line in forces(found, {}).axes[0].get_lines()}
+    assert styles == {"-", "--"}
+
+
+def test_a_sampled_spring_shows_its_energy(tmp_path: Path) -> None:
+    """All that the mass has gained, its spring's energy counted, is what the hold made."""
+    found = run("sampled-spring", tmp_path)
+    axes = drawn(found)["energies"]
+    (bar,) = axes.patches
+    x = found.haptics["virtual_mechanism.x"][:, 0]
+    v = found.haptics["virtual_mechanism.v"][:, 0]
+    energy = 0.5 * v**2 + 50 * x**2  # 1 kg on 100 N/m
+    assert bar.get_width() == pytest.approx(energy[-1] - energy[0], rel=1e-6)
+    assert "(J;" in axes.get_xlabel()
+
+
+def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
+    best = {"graphics.rate": "60", "hold": "foh"}
+    told = sweep_labels.title(best, 0.4361, "RMS tracking error (mm)", list(best), 3, 12)
+    assert told == (
+        "RMS tracking error down to 0.436 mm at graphics.rate = 60 Hz, hold = foh; "
+        "3 of 12 runs ended early or failed"
+    )
+    assert sweep_labels.axis("graphics.rate") == "graphics.rate (Hz)"
+    assert sweep_labels.axis("hold") == "hold"

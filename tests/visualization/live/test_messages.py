@@ -1,0 +1,107 @@
+"""Messages of a page, the light, and the constrained directions, without a page."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.visualization.live.frames import light
+from hapticlink.visualization.live.messages import Gain, Hand, Time, newest, parse
+from hapticlink.visualization.live.mouse_hand import viewed
+from hapticlink.visualization.mechanism.picture import directions
+
+
+def test_a_pull_is_read() -> None:
+    assert parse('{"type": "hand", "at": [0.1, -0.2]}') == Hand("hand", (0.1, -0.2))
+    other = '{"type": "hand", "at": null, "user": "left"}'
+    assert parse(other) == Hand("hand", None, "left")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        '"hand"',
+        "{}",
+        '{"type": "exec", "at": null}',
+        '{"type": "hand"}',
+        '{"type": "hand", "at": [0.1]}',
+        '{"type": "hand", "at": [0.1, 0.2, 0.3]}',
+        '{"type": "hand", "at": [0.1, "0.2"]}',
+        '{"type": "hand", "at": [0.1, NaN]}',
+        '{"type": "hand", "at": [0.1, 1e999]}',
+        '{"type": "hand", "at": [0.1, 0.2], "more": 1}',
+        '{"type": "hand", "at": null, "user": 1}',
+        '{"type": "jitter", "value": 1.0}',
+        '{"type": "rate", "value": 0}',
+        '{"type": "rate", "value": 1e-320}',
+        '{"type": "rate", "value": -3}',
+        '{"type": "rate", "value": true}',
+        '{"type": "delay", "connection": "a", "value": 2}',
+        '{"type": "gain", "name": "controller.K_pc", "factor": -1}',
+        '{"type": "topology", "on": 1}',
+        '{"type": "time", "do": "stop"}',
+        json.dumps({"type": "hold", "connection": "x" * 201, "hold": "zoh"}),
+        json.dumps({"type": "hold", "connection": "x", "hold": "z" * 5000}),
+        b'{"type": "hand", "at": null}',
+    ],
+)
+def test_what_is_no_message_is_refused(text: str | bytes) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        parse(text)
+
+
+@pytest.mark.parametrize(
+    ("generated", "put_in", "color"),
+    [(0.0, 0.0, "green"), (-1.0, 0.5, "green"), (5e-5, 0.0, "green"), (5e-4, 0.0, "amber"),
+     (0.2, 1.0, "amber"), (1.1, 1.0, "red"), (0.1, -1.0, "red")],
+)  # fmt: skip
+def test_the_light_compares_what_was_generated_with_what_was_put_in(
+    generated: float, put_in: float, color: str
+) -> None:
+    assert light(generated, put_in) == color
+
+
+def test_constrained_directions_are_those_of_the_projector() -> None:
+    c, s = math.cos(0.3), math.sin(0.3)
+    line = np.array([c, s, 0.0])
+    (found,) = directions(np.outer(line, line).ravel().tolist())
+    assert abs(np.dot(found, [c, s])) == pytest.approx(1.0)
+    turn = np.diag([0.0, 0.0, 1.0])
+    assert directions(turn.ravel().tolist()) == []
+    both = np.array(directions(np.diag([1.0, 1.0, 0.0]).ravel().tolist()))
+    assert np.allclose(both @ both.T, np.eye(2))
+
+
+def test_a_scene_without_a_mechanism_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "device.toml"
+    path.write_text('title = "A device"\nduration = 1.0\n[device]\n')
+    with pytest.raises(InputFault, match=r"device.toml: has no \[linkage\].*closed-loop"):
+        viewed(str(path))
+
+
+def test_the_mouse_takes_the_place_of_the_hand() -> None:
+    scene = viewed("two-hands", ["graphics.rate=20"])
+    assert scene.hand
+    assert scene.hand.type == "spring"
+    assert scene.hands["left"].type == "arm"
+    assert scene.packaging == "native"
+    two = viewed("two-users")
+    assert two.hands["left"] == two.hand
+    assert viewed("closed-loop", ["packaging=python"]).packaging == "python"
+
+
+def test_of_many_messages_the_newest_of_each_control_is_kept() -> None:
+    gain = [Gain("gain", name, float(i)) for i in range(5) for name in "ab"]
+    step = [Time("time", "step")] * 2
+    pulls = [Hand("hand", at, user) for user in ("", "left") for at in ((0.0, 0.0), None)]
+    found = newest([*gain, *step, *pulls])
+    assert found == [*gain[-2:], *step, pulls[1], pulls[3]]

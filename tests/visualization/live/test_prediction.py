@@ -1,0 +1,103 @@
+"""The lifted map on the page: its verdict is that of `stability`; its process leaves nothing."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hapticlink as hl
+from hapticlink.visualization.live.controls import Settings
+from hapticlink.visualization.live.mouse_hand import viewed
+from hapticlink.visualization.live.prediction import predicted
+from tests.visualization.live.chromium import Page, chromium
+from tests.visualization.live.served import Served
+
+SCENE, OPTIONS = "closed-loop-direct", ("graphics.rate=12.8",)
+HELD = {"x": "x_S", "v": "v_S", "Lambda_inv": "Lambda_inv", "P_c": "P_c"}
+"""What the mechanism sends to the controller."""
+QUICK = 120.0
+"""Time (s) within which a map is there even beside other tests."""
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Iterator[Served]:
+    served = Served(tmp_path, *(f"--set={option}" for option in OPTIONS), scene=SCENE)
+    try:
+        yield served
+    finally:
+        served.process.kill()
+        served.process.communicate()
+
+
+def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
+    """At 12.8 Hz the map is stable with zero-order holds, and unstable with first-order ones, by
+    the growth that `stability` tells of the scene with them. Time stands still meanwhile."""
+    with chromium() as browser:
+        window = Page(browser, page.url)
+        window.page.click("#pause")
+        window.page.wait_for_function("view.map?.verdict === 'stable'", timeout=1e3 * QUICK)
+        assert "stable at rest, decays 0.6" in window.page.inner_text("#map")
+        for port, target in HELD.items():
+            name = f"virtual_mechanism.{port} -> controller.{target}"
+            window.page.select_option(f'[data-control="{name}"]', "foh")
+        window.until("view.map.said === 'computing'")
+        window.page.wait_for_function("view.map.verdict === 'unstable'", timeout=1e3 * QUICK)
+        assert window.page.get_attribute("#light", "class") == "light red"
+        assert window.get("view.energy") != "red"
+        told, handle = window.get("view.map.why"), window.get("view.frame.handle")
+        assert window.faults == []
+    held = {"hand.stiffness": [100.0, 100.0, 0.0], "hand.target": [[0.0, *handle]]}
+    found = hl.stability(viewed(SCENE, OPTIONS), held | {"hold": "foh", "duration": 3.0})
+    assert isinstance(found, hl.Stability)
+    growth = float(told.partition("growth rate ")[2].partition(" ")[0])
+    assert found.verdict == "unstable"
+    assert growth == pytest.approx(found.growth, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [(Settings(rate=30.1), "30.1 Hz repeats only after 5120 ticks, 30 Hz would be quick"),
+     (Settings(jitter=0.1), "frames of random lengths never repeat")],
+)  # fmt: skip
+def test_what_is_not_cheap_enough_is_told_beforehand(settings: Settings, said: str) -> None:
+    found = predicted(viewed(SCENE, OPTIONS), settings, {})
+    assert (found["verdict"], found["said"]) == ("", f"not computed: {said}")
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")
+@pytest.mark.parametrize("end", ["overtaken", "ctrl-c", "server", "loop"])
+def test_nothing_is_left_of_a_map_that_nobody_waits_for(page: Served, end: str) -> None:
+    with page.window() as window:
+        window.until(lambda new: "controls" in new)
+        window.send(type="rate", value=31)  # takes long
+        server = _children(page.process.pid, "view.server")[0]
+        computing = _until(lambda: _children(server, "view.map_beside"))
+        match end:
+            case "overtaken":
+                window.send(type="rate", value=30)
+            case "ctrl-c":
+                assert page.end()[0] == 0
+            case "server":
+                os.kill(server, signal.SIGKILL)
+            case "loop":
+                page.process.kill()
+        _until(lambda: not any(Path(f"/proc/{process}").exists() for process in computing))
+
+
+def _children(process: int, module: str) -> list[int]:
+    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    return [int(c) for c in children if module in Path(f"/proc/{c}/cmdline").read_text()]
+
+
+def _until(holds: Callable[[], Any]) -> Any:
+    end = time.monotonic() + QUICK
+    while not (found := holds()):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    return found

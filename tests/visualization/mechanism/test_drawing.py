@@ -1,0 +1,86 @@
+"""The drawing of a mechanism shows it where the run has it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.patches import Polygon
+
+import hapticlink as hl
+from hapticlink.orchestrator import open_scene
+from hapticlink.visualization.mechanism import drawing
+from tests.shared_fixtures import status
+
+
+def test_the_operational_point_is_drawn_where_it_is() -> None:
+    run = hl.run("six-bar", {"duration": 0.3})
+    axes = run.figures()["mechanism"].axes[0]
+    marks = {line.get_label(): line for line in axes.lines}
+    x = run.haptics["virtual_mechanism.x"] * 1e3
+    found = marks["operational point"].get_xydata()
+    np.testing.assert_allclose(found, x[:1, :2], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(marks["path of operational point x_S"].get_xydata(), x[:, :2])
+
+
+def test_a_body_of_three_joints_is_a_triangle_of_them() -> None:
+    """Corners apart by the distances of the scene's coupler."""
+    run = hl.run("six-bar", {"duration": 0.05})
+    axes = run.figures()["mechanism"].axes[0]
+    (coupler,) = (p for p in axes.patches if isinstance(p, Polygon))
+    corners = coupler.get_xy()[:-1]
+    scene = hl.scene("six-bar")
+    places = [j.at_parent for j in scene.linkage.joint if j.parent == "coupler"]
+    places += [at for loop in scene.linkage.loop
+               for b, at in zip(loop.bodies, loop.at, strict=True) if b == "coupler"]  # fmt: skip
+    places += [j.at_child or (0.0, 0.0) for j in scene.linkage.joint if j.child == "coupler"]
+
+    def sides(points: object) -> np.ndarray:
+        p = np.asarray(points, float)
+        return np.sort(np.linalg.norm(p - np.roll(p, 1, axis=0), axis=1))
+
+    assert len(corners) == len(places) == 3
+    np.testing.assert_allclose(sides(corners), sides(places) * 1e3, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("scene", "files"),
+    [
+        ("closed-loop", {"blocks.png", "start.png", "workspace.png"}),
+        ("trammel", {"blocks.png", "start.png"}),
+    ],
+)
+def test_info_draws_and_names_what_it_drew(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: str, files: set[str]
+) -> None:
+    assert status("info", scene, "--draw", "--out", tmp_path) == 0
+    assert {p.name for p in tmp_path.iterdir()} == files
+    assert all(str(tmp_path / name) in capsys.readouterr().out for name in sorted(files)[:1])
+
+
+def test_the_terminal_ends_with_the_numbers_of_the_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status("run", "closed-loop", "--set", "duration=0.2", "--out", tmp_path) == 0
+    told = capsys.readouterr().out
+    run = hl.load(tmp_path)
+    apart = run.haptics["virtual_mechanism.x"] - run.haptics["haptic_device.x_true"]
+    largest = np.hypot(apart[:, 0], apart[:, 1]).max() * 1e3
+    assert f"handle at most {largest:.3g} mm from the operational point" in told
+    drift = np.hypot(*run.haptics["controller.F_drift"].T[:2]).max()
+    assert f"F_drift {drift:.3g} N" in told
+    closure = run.haptics["virtual_mechanism.closure_error"].max()
+    assert f"loops close within {closure:.2g} m" in told
+
+
+@pytest.mark.parametrize(("scene", "reaches"), [("closed-loop", True), ("remote-centre", False)])
+def test_what_the_device_cannot_reach_is_shaded(scene: str, reaches: bool) -> None:
+    """The whole picture of the one is within 0.1 m of the device's middle; the posts of the other
+    stand beyond the reach of an arm, 0.95 (proximal + distal) + crank/2."""
+    found = open_scene.load(scene)
+    assert found.linkage is not None
+    start = [found.linkage.start.get(j.name, 0.0) for j in found.linkage.joint]
+    (axes,) = drawing.figure(found, start).axes  # type: ignore[arg-type]
+    labels = axes.get_legend_handles_labels()[1]
+    assert ("outside the device's workspace" not in labels) == reaches

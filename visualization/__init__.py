@@ -1,0 +1,1 @@
+"""What is drawn: figures, the mechanism, the live page, replays, comparisons."""

@@ -1,0 +1,130 @@
+"""Figures with titled axes, of a size that README pages and slides can show.
+
+Margins are fixed and figures are drawn once: Matplotlib's layout engines measure every text twice,
+and `savefig` draws twice, which together takes longer than the rest of a short run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.results.numbers import last_time, short
+from hapticlink.orchestrator.results.tables import Results
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_ENDS = {
+    "stop_when": "stop_when ended the run",
+    "terminated": "an FMU ended the run",
+    "diverged": "the run diverged",
+    "interrupted": "the run was interrupted",
+    "running": "the last row so far",
+    "stopped": "it was stopped",
+    "reset": "it was reset",
+}
+
+MARGINS = {"left": 0.95, "right": 0.15, "bottom": 0.55, "top": 0.62}
+"""Inches around the axes, with room for two lines of title above the exponent of an axis."""
+ROW, COLUMNS = 0.15, 3
+"""Height (in) of a row of a legend below the axes, and the number of its columns."""
+
+
+def plain(text: str) -> str:
+    """A text that Matplotlib draws letter by letter; it takes what two dollar signs enclose for a
+    formula, and fails where it is none. A letter that its fonts lack is a replacement character:
+    `font.family` of a matplotlibrc names others."""
+    there = _letters()
+    known = (c if ord(c) in there or c.isspace() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return "".join(known).replace("$", r"\$")
+
+
+@cache
+def _letters() -> frozenset[int]:
+    """The code points of Matplotlib's fonts."""
+    from matplotlib import font_manager, rcParams
+
+    families = (font_manager.FontProperties(family=[f]) for f in rcParams["font.family"])
+    files = [font_manager.findfont(family) for family in families]
+    return frozenset(code for file in files for code in font_manager.get_font(file).get_charmap())
+
+
+def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
+    """A figure whose title tells where a run ended early, and its axes: one, or one below the other
+    for several labels y."""
+    from matplotlib.figure import Figure
+
+    end = results.run["end"]
+    if end["reason"] != "duration":
+        why = _ENDS.get(end["reason"], "a fault ended the run")
+        title += f", until {why} at {short(last_time(results))} s"
+    figure = Figure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
+    framed(figure)
+    every = figure.subplots(len(y), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, label in zip(every, y, strict=True):
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
+    # At a fixed height.
+    every[0].set_title(plain(fill(title, 70)), fontsize="medium", y=1.0, pad=12)
+    every[-1].set_xlabel(x)
+    return figure, every if len(y) > 1 else every[0]
+
+
+def framed(figure: Figure, **margins: float) -> None:
+    """Sets the margins of a figure's axes (in), by default those of MARGINS."""
+    (width, height), m = figure.get_size_inches(), MARGINS | margins
+    figure.subplots_adjust(
+        m["left"] / width, m["bottom"] / height, 1 - m["right"] / width, 1 - m["top"] / height,
+        hspace=0.12,
+    )  # fmt: skip
+
+
+def legend_below(figure: Figure) -> None:
+    """A legend of all that is labelled, below the axes."""
+    legend = figure.legend(fontsize="x-small", ncols=COLUMNS, loc="lower center")
+    lines = [text.get_text().count("\n") + 1 for text in legend.get_texts()]
+    tallest = max((sum(column) for column in np.array_split(lines, COLUMNS)), default=0)
+    framed(figure, bottom=MARGINS["bottom"] + 0.15 + ROW * tallest)
+
+
+def legend_above_curves(axes: Axes, columns: int) -> None:
+    """A legend at the top of the axes, which are extended so that it covers no curve."""
+    legend = axes.legend(fontsize="x-small", ncols=columns, loc="upper left")
+    rows = -(-len(legend.get_texts()) // columns)
+    height = axes.get_window_extent().height / axes.figure.dpi
+    covered = min((ROW * rows + 0.2) / height, 0.5)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, low + (high - low) / (1 - covered))
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as a PNG, at 150 dots per inch."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_dpi(150)
+    file = BytesIO()
+    FigureCanvasAgg(figure).print_png(
+        file, metadata={"Software": None}, pil_kwargs={"compress_level": 1}
+    )
+    return file.getvalue()
+
+
+def write(pngs: Iterable[tuple[str, bytes]], folder: Path) -> list[str]:
+    """Writes PNGs by name; returns the file names. Raises Interrupted."""
+    names = []
+    for name, content in pngs:
+        interrupt.check()
+        path = folder / f"{name}.png"
+        path.unlink(missing_ok=True)  # a link is replaced, not followed
+        path.write_bytes(content)
+        names.append(path.name)
+    return names

@@ -1,0 +1,267 @@
+"""Figures of a haptic run, which `run` saves beside its tables.
+
+Names: operational point x_S (of the mechanism), handle x_D (of the device).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from itertools import cycle
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.analysis.findings.episodes import episodes
+from hapticlink.analysis.findings.forces import ENVIRONMENT, WRENCHES, touching, wrenches
+from hapticlink.analysis.findings.tracking import (
+    DEVICE,
+    MECHANISM,
+    constrained,
+    further_users,
+    of_block,
+    pose_error,
+    tracking,
+)
+from hapticlink.analysis.findings.user_port import UserPort, user_port
+from hapticlink.components.linkage.parameters import coordinate_units
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.results.numbers import last_time, short
+from hapticlink.orchestrator.results.scene_part import all_devices, scene_part
+from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.visualization import figure_axes
+from hapticlink.visualization.figure_axes import framed, plain, png, titled
+from hapticlink.visualization.figures.force_figure import STYLES, forces
+from hapticlink.visualization.figures.real_time_figure import real_time
+from hapticlink.visualization.mechanism import drawing, marks
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DRAWN = 0.02
+"""Of the largest energy at the user's port, above which a block's is drawn."""
+SOURCES = {
+    "shaping": "shaping of the device's inertia",
+    "drift": "virtual coupling, F_drift",
+    "topology": "topology controller, F_T",
+    "environment": WRENCHES[ENVIRONMENT],
+}
+"""The blocks of `port_blocks.py` as a reader knows them."""
+COORDINATES = "virtual_mechanism.q"
+
+
+def figures(results: Results) -> dict[str, Figure]:
+    """Figures of a run by name, as far as it has the signals; none before its first step."""
+    return {name: draw() for name, draw in drawings(results).items()}
+
+
+def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
+    """By name, what draws each figure of a run."""
+    found: dict[str, Callable[[], Figure]] = {}
+    with_rows = {name: table for name, table in results.tables.items() if len(table["time"])}
+    results = replace(results, tables=with_rows)
+    if not last_time(results):
+        return found
+    linkage = scene_part(
+        results, "linkage", Linkage
+    )  # an SSP has the block, but not its description
+    size = len(coordinate_units(linkage)) if linkage else 0
+    if linkage and (coordinates := of_block(results, COORDINATES, size)):
+        q = coordinates[COORDINATES]
+        if len(q := q[np.isfinite(q).all(axis=1)]):
+            found["mechanism"] = partial(_mechanism, results, linkage, q)
+    if of_block(results, MECHANISM, 3):
+        found["trajectories"] = partial(_trajectories, results)
+        if of_block(results, DEVICE, 3):
+            found["distance"] = partial(_distance, results)
+    if wrenches(results):
+        found["forces"] = partial(forces, results, all_devices(results))
+    if contact := touching(results):
+        found["contact"] = partial(_contact, results, *contact)
+    if counted := constrained(results):
+        found["constraints"] = partial(_constraints, results, *counted)
+    if port := user_port(results):
+        found["user_port"] = partial(_port, results, port)
+    if generated := _generated(results):
+        found["energies"] = partial(_energies, results, generated)
+    if (paced := results.run.get("real_time")) and paced["ticks"]:
+        found["real_time"] = partial(real_time, results)
+    return found
+
+
+def warm_up() -> None:
+    """Draws a figure that nobody sees: the first one takes longest, as it loads fonts."""
+    ended = Results(None, {"end": {"reason": "duration"}}, {})
+    figure, axes = titled(ended, "0", "0", "0")
+    axes.plot([0, 1], label="0")
+    figure_axes.legend_below(figure)
+    png(figure)
+
+
+def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
+    """Write each figure as a PNG; returns the file names. Raises Interrupted."""
+    return figure_axes.write(((name, png(figure)) for name, figure in figures.items()), folder)
+
+
+def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
+    title = f"{results.run['scene']['title']} at the start and at {short(last_time(results))} s"
+    figure, axes = titled(results, title, "x (mm)", "y (mm)")
+    contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
+    for label, style, path in _paths(results):
+        axes.plot(*path.T, style, color=marks.RED, lw=0.8, label=plain(f"path of {label}"))
+    _mark(results, axes)
+    drawing.draw(axes, linkage, q[0], q[-1], devices, contacts)
+    figure.set_size_inches(7.4, 6.4)
+    figure_axes.legend_below(figure)
+    return figure
+
+
+def _mark(results: Results, axes: Axes) -> None:
+    """The episodes of a run, along the path of the operational point."""
+    if (table := of_block(results, MECHANISM, 3)) is None:
+        return
+    time, path = table["time"], table[MECHANISM][:, :2] * 1e3
+    marked = [*episodes(results)]
+    for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
+        color, label = marks.KINDS[kind]
+        spans = [(e.begin - 1e-12, e.end + 1e-12) for e in marked if e.kind == kind]
+        parts = [path[slice(*np.searchsorted(time, span))] for span in spans]
+        broken = np.vstack([rows for part in parts for rows in (part, [[np.nan, np.nan]])])
+        axes.plot(
+            *broken.T, color=color, label=label, lw=2 * width, alpha=0.5,
+            solid_capstyle="butt", zorder=2.5 - 0.01 * width,
+        )  # fmt: skip
+
+
+def _paths(results: Results) -> list[tuple[str, str, Vector]]:
+    """Label, line style and path (mm) of operational point, handle and further points."""
+    linkage = results.run["scene"]["linkage"] or {}
+    further = [
+        (f"virtual_mechanism.{point['name']}.x", f"point {point['name']}", "-.")
+        for point in linkage.get("point", ())
+    ]
+    return [
+        (label, style, table[signal][:, :2] * 1e3)
+        for signal, label, style in (
+            (MECHANISM, "operational point x_S", "-"),
+            (DEVICE, "handle x_D", "--"),
+            *further,
+        )
+        if (table := of_block(results, signal, 3))
+    ]
+
+
+def _trajectories(results: Results) -> Figure:
+    paths = _paths(results)
+    if of_block(results, DEVICE, 3):
+        apart = short(tracking(results)[1].max())
+        title = f"Handle and operational point at most {apart} mm apart"
+    else:
+        reach = np.linalg.norm(paths[0][2] - paths[0][2][0], axis=1).max()
+        title = f"The operational point moves up to {short(reach)} mm from its start"
+    figure, axes = titled(results, title, "x (mm)", "y (mm)")
+    for label, style, path in paths:
+        axes.plot(*path.T, style, label=plain(label))
+    axes.plot(*np.array([path[0] for _, _, path in paths]).T, "k.", label="start")
+    if contacts := scene_part(results, "contacts", Contacts):
+        drawing.paint(axes, marks.obstacles(contacts), marks.STILL)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.legend(fontsize="small")
+    return figure
+
+
+def _distance(results: Results) -> Figure:
+    users = {user: pose_error(results, user) for user in ("", *further_users(results))}
+    largest, (time, gap, _) = max(
+        users.items(), key=lambda each: each[1].distance_mm.max(initial=0)
+    )
+    at = int(gap.argmax())
+    title = (
+        f"Distance of handle to {_point(largest)}: at most {short(gap[at])} mm, "
+        f"at {short(time[at])} s"
+    )
+    figure, axes = titled(results, title, "time (s)", "distance |x_S - x_D| (mm)")
+    for (user, error), style in zip(users.items(), cycle(STYLES)):
+        axes.plot(error.time_s, error.distance_mm, style, label=plain(_point(user)))
+    if len(users) > 1:
+        axes.legend(fontsize="small")
+    return figure
+
+
+def _point(user: str) -> str:
+    return f"point {user}" if user else "operational point"
+
+
+def _contact(results: Results, time: Vector, pushing: NDArray[np.bool_]) -> Figure:
+    table = of_block(results, ENVIRONMENT, 3)
+    assert table is not None  # it tells when contacts push
+    force = np.linalg.norm(table[ENVIRONMENT][:, :2], axis=1)
+    share = 100 * float(pushing.mean())
+    most = short(force[pushing].max(initial=0.0))
+    title = f"Contacts push in {short(share)} % of the samples, with |F_env| of at most {most} N"
+    figure, axes = titled(
+        results, title if share else "Nothing is touched", "time (s)", "|F_env| (N)"
+    )
+    axes.plot(time, force)
+    return figure
+
+
+def _constraints(results: Results, table: Table, name: str) -> Figure:
+    count, time = table[name], table["time"]
+    most = int(count.max())
+    share = 100 * float((count == most).mean())
+    title = f"{most} constrained directions in {share:.3g} % of the samples"
+    figure, axes = titled(results, title, "time (s)", "constrained directions")
+    axes.step(time, count, where="post")
+    if most < 10:
+        axes.set_yticks(range(most + 2))
+    return figure
+
+
+def _port(results: Results, port: UserPort) -> Figure:
+    peak = 1e3 * port.told["peak"]
+    title = f"The rendering generates at most {short(peak)} mJ"
+    if peak > 0 and port.blocks_J:
+        largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
+        title += f"; its largest source is the {SOURCES.get(largest, largest)}"
+    label = "energy generated at the user's port (mJ)"
+    figure, axes = titled(results, title, "time (s)", label)
+    axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="in all")
+    for name, energy in port.blocks_J.items():
+        if np.abs(energy).max() > DRAWN * np.abs(port.generated_J).max():
+            source = plain(fill(SOURCES.get(name, name), 28))
+            axes.plot(port.time_s, 1e3 * energy, lw=1.0, label=source)
+    axes.axhline(0, color="0.4", lw=0.8)
+    figure_axes.legend_below(figure)
+    return figure
+
+
+def _generated(results: Results) -> dict[str, float]:
+    """Energy (J) that the hold of each connection generated, connections across rates first."""
+    across = results.run.get("energies", "none")  # a crash leaves none
+    within = results.run.get("energies_within_a_rate", {})
+    booked = ({} if across == "none" else across) | within
+    return {name: energy["generated"] for name, energy in booked.items()}
+
+
+def _energies(results: Results, generated: dict[str, float]) -> Figure:
+    total = sum(generated.values())
+    unit, per = ("mJ", 1e3) if max(map(abs, generated.values())) < 0.1 else ("J", 1.0)
+    verb = "generate" if total >= 0 else "dissipate"
+    title = f"The holds {verb} {short(abs(total) * per)} {unit} in all"
+    label = f"energy generated by the hold ({unit}; negative: dissipated)"
+    figure, axes = titled(results, title, label, "")
+    framed(figure, left=2.3)
+    values = [value * per for value in generated.values()]
+    bars = axes.barh([plain(fill(name, 28)) for name in generated], values, height=0.5)
+    axes.bar_label(bars, [short(value) for value in values], padding=3)
+    axes.margins(x=0.35, y=0.2)
+    axes.axvline(0, color="0.4", lw=0.8)
+    axes.invert_yaxis()
+    return figure

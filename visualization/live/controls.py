@@ -1,0 +1,213 @@
+"""What a page can change of a running scene, and how it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.springs import limited_gains
+from hapticlink.visualization.live import messages
+from hapticlink.visualization.live.mouse_hand import STIFFNESS
+
+GAINS = ("hand", "controller")
+"""Blocks of a user whose tunable parameters are gains; those of the mechanism are, too."""
+OTHERS = ("length_scale", "target", "rank_tolerance")
+"""Tunable parameters of theirs that are none."""
+TOPOLOGY = ("k_j", "b_j")
+"""The gains of the topology controller."""
+CLOCK = "graphics"
+
+
+@dataclass
+class Settings:
+    """What was changed on the page, which a run that begins anew gets again."""
+
+    rate: float | None = None
+    jitter: float = 0.0
+    holds: dict[str, str] = field(default_factory=dict)
+    delays: dict[str, float] = field(default_factory=dict)
+    gains: dict[str, float] = field(default_factory=dict)
+    topology: bool = True
+
+
+class Controls:
+    """The controls of a run, with the `settings` of the page."""
+
+    def __init__(self, live: LiveRun, settings: Settings) -> None:
+        self._live, self._settings = live, settings
+        self._gains = _gains(live)
+        self._holds = _holds(live)
+        fmus = [f for f in live.system.fmus if f.clock == CLOCK]
+        self._rate = live.scene.graphics.rate if live.scene.graphics and fmus else None
+        self._pulling = {user: False for user in users(live.scene)}
+
+    def restore(self) -> None:
+        """Apply the settings of the page to a run that has just begun."""
+        s = self._settings
+        if s.rate is not None or s.jitter:
+            self._change_rate(s.rate, s.jitter)
+        for name in {*s.holds, *s.delays}:
+            self._live.hold(name, s.holds.get(name), s.delays.get(name))
+        for name in s.gains.keys() & self._gains.keys():
+            self._set(name)
+        if not s.topology:
+            self.apply(messages.Topology("topology", False))
+
+    def described(self) -> dict[str, Any]:
+        """The controls with their ranges and values, as JSON has it."""
+        s, fixed = self._settings, isinstance(self._rate, int | float)
+        haptics = self._live.system.timeline
+        most = float(1 / (haptics.clocks[0].longest * haptics.base))
+        return {
+            "rate": None
+            if self._rate is None
+            else {"value": s.rate or (float(self._rate) if fixed else None), "max": most}  # type: ignore[arg-type]
+            | {"jitter": s.jitter},
+            "holds": [
+                {"connection": name, "hold": s.holds.get(name, choices[0]), "choices": choices}
+                | {"delay": s.delays.get(name, 0.0)}
+                for name, choices in self._holds.items()
+            ],
+            "gains": [
+                {"name": name, "value": value.tolist(), "units": units}
+                | {"factor": s.gains.get(name, 1.0)}
+                for name, (value, units) in self._gains.items()
+            ],
+            "topology": s.topology if self._topology else None,
+        }
+
+    def apply(self, message: messages.Message) -> None:
+        """Change the run. Raises InputFault where the message does not fit this scene; nothing is
+        changed then."""
+        match message:
+            case messages.Hand(at=at, user=user):
+                self._pull(user, at)
+            case messages.Rate(value=value):
+                self._change_rate(value, self._settings.jitter)
+            case messages.Jitter(value=value):
+                self._change_rate(self._settings.rate, value)
+            case messages.Hold(connection=name, hold=hold):
+                self._require(name, self._holds)
+                self._live.hold(name, hold)
+                self._settings.holds[name] = hold
+            case messages.Delay(connection=name, value=value):
+                self._require(name, self._holds)
+                self._live.hold(name, None, value)
+                self._settings.delays[name] = value
+            case messages.Gain(name=name, factor=factor):
+                self._require(name, self._gains)
+                self._settings.gains[name] = factor
+                self._set(name)
+            case messages.Topology(on=on):
+                if not self._topology:
+                    raise InputFault("this scene has no topology controller")
+                self._settings.topology = on
+                for name in self._topology:
+                    self._set(name)
+
+    def fits(self, message: messages.Hold) -> bool:
+        """Whether the connection can have the hold, in a run that begins with it at least."""
+        return message.hold in self._holds.get(message.connection, ())
+
+    def _require(self, name: str, known: dict[str, Any]) -> None:
+        if name not in known:
+            raise InputFault(unknown("control", name, known))
+
+    def parameters(self) -> dict[str, list[float]]:
+        """The gains as they are set, with all hands pulling."""
+        return {name: self._value(name).tolist() for name in self._gains}
+
+    def _value(self, name: str) -> NDArray[np.float64]:
+        """The multiple of a parameter that is set."""
+        off = name in self._topology and not self._settings.topology
+        return self._gains[name][0] * (0.0 if off else self._settings.gains.get(name, 1.0))
+
+    def _set(self, name: str) -> None:
+        """Set a parameter to its multiple; the hand's stiffness acts while it pulls."""
+        springs = {stiffness(user): pulling for user, pulling in self._pulling.items()}
+        if springs.get(name, True):
+            self._live.set(name, self._value(name))
+
+    def _change_rate(self, rate: float | None, jitter: float) -> None:
+        """Change the rate, that of the scene where it is None, with the jitter."""
+        if rate is None and not isinstance(self._rate, int | float):
+            raise InputFault("the rate varies in this scene: set the rate first")
+        self._live.rate(CLOCK, self._rate if rate is None else rate, jitter)  # type: ignore[arg-type]
+        self._settings.rate, self._settings.jitter = rate, jitter
+
+    def _pull(self, user: str, at: tuple[float, float] | None) -> None:
+        self._require(user, self._pulling)
+        if at is not None:
+            self._live.set(target(user), (*at, 0.0))
+        pulling = at is not None
+        if pulling != self._pulling[user]:
+            self._pulling[user] = pulling
+            if pulling:
+                self._set(stiffness(user))
+            else:
+                self._live.set(stiffness(user), (0.0, 0.0, 0.0))
+
+    @property
+    def _topology(self) -> list[str]:
+        """The gains of the topology controllers of all users."""
+        found = [name for name in self._gains if name.rpartition(".")[2] in TOPOLOGY]
+        return found if len(found) >= len(TOPOLOGY) else []
+
+
+def users(scene: Scene) -> tuple[str, ...]:
+    """The users of a scene by their points; the first one's name is empty."""
+    return ("", *scene.devices)
+
+
+def block(name: str, user: str) -> str:
+    """The FMU of a user, by its block."""
+    return f"{name}_{user}" if user else name
+
+
+def stiffness(user: str) -> str:
+    """The stiffness with which a user's mouse pulls."""
+    return f"{block('hand', user)}.stiffness"
+
+
+def target(user: str) -> str:
+    """The pose that a user's mouse pulls to."""
+    return f"{block('hand', user)}.target"
+
+
+def _gains(live: LiveRun) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
+    """Values and units of the parameters that a page can scale, by their name."""
+    found: dict[str, tuple[NDArray[np.float64], list[str]]] = {}
+    fixed = limited_gains(live.system)
+    names = ["virtual_mechanism", *(block(b, user) for user in users(live.scene) for b in GAINS)]
+    for fmu in (live.system.fmu[name] for name in names if name in live.system.fmu):
+        tunable = [
+            s
+            for s in fmu.description.scalars
+            if s.causality == "parameter" and s.variability == "tunable" and s.port not in OTHERS
+        ]
+        for port in dict.fromkeys(s.port for s in tunable):
+            if f"{fmu.name}.{port}" in fixed:
+                continue
+            entries = fmu.description.port(port, "parameter")
+            start = np.array([s.start for s in entries])
+            found[f"{fmu.name}.{port}"] = start, [s.unit or "" for s in entries]
+    for name in (stiffness(user) for user in users(live.scene)):
+        if name in found:
+            found[name] = np.array(STIFFNESS), found[name][1]
+    return found
+
+
+def _holds(live: LiveRun) -> dict[str, list[str]]:
+    """The connections from a slower clock to the haptic one, with the holds that they can have."""
+    fast = live.system.timeline.clocks[0].name
+    return {
+        name: choices
+        for name, choices in live.holds().items()
+        if live.system.fmu[live.system.connection[name].source].clock != fast
+    }

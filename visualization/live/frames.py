@@ -1,0 +1,130 @@
+"""What a page is sent of a running scene: outputs of its FMUs, energies and deadlines."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+from hapticlink.analysis.findings.limits import FELT
+from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
+from hapticlink.orchestrator.run.energy.meter import Energy
+from hapticlink.visualization.mechanism.picture import PORT
+
+SHOWN = {
+    "q": ("virtual_mechanism.q",),
+    "ghost": ("virtual_environment.q",),
+    "lambda": ("virtual_mechanism.lambda",),
+    "closure_error": ("virtual_mechanism.closure_error",),
+    "gap": ("virtual_mechanism.contact_gap",),
+    "branch_ok": ("virtual_environment.branch_ok",),
+}
+"""By name in a frame, the output that it is, the first that the scene has."""
+OF_USER = {
+    "x": ("virtual_mechanism.{at}x",),
+    "handle": ("haptic_device{of}.x_true", "virtual_mechanism.{at}x"),
+    "F_hand": ("hand{of}.F",),
+    "F_drift": ("controller{of}.F_drift",),
+    "F_constraint": ("controller{of}.F_constraint",),
+    "F_env": ("virtual_mechanism.{at}F_env",),
+    "n": ("virtual_environment.{at}n_constraints", "virtual_mechanism.{at}n_constraints"),
+    "P_c": ("virtual_environment.{at}P_c", "virtual_mechanism.{at}P_c"),
+    "margin": ("haptic_device{of}.workspace_margin",),
+    "F_motor": ("controller{of}.F_motor",),
+    "measured": ("haptic_device{of}.x",),
+}
+"""The same of each user; what further ones have is in `others` of a frame, by their points."""
+SELDOM = 5
+"""Turns between two readings of energies and deadlines, which take longer."""
+WINDOW = 1.0
+"""Time (s) over which the light judges the energy."""
+
+
+class Frames:
+    """The frames of one run, a few numbers each."""
+
+    def __init__(self, live: LiveRun) -> None:
+        fmus = live.system.fmu
+        self._outputs = _there(fmus, shown())
+        self._others = {user: _there(fmus, of_user(user)) for user in live.scene.devices}
+        self._turns, self._start = 0, float(live["virtual_mechanism.energy"][0])
+        self._past: deque[tuple[float, float, float]] = deque()
+        self._energy: dict[str, float] = {}
+
+    def handles(self, live: LiveRun) -> dict[str, list[float]]:
+        """The poses (3,) of the handles by user, "" for the first one."""
+        every = {"": self._outputs, **self._others}
+        return {user: live[outputs["handle"]].tolist() for user, outputs in every.items()}
+
+    def frame(self, live: LiveRun) -> dict[str, Any]:
+        """The newest samples, `energy` (generated, J, at the user's port and by connection), and
+        now and then `light` and the deadlines `missed`."""
+        found: dict[str, Any] = {k: live[name].tolist() for k, name in self._outputs.items()}
+        if self._turns % SELDOM == 0:
+            self._energy, found["light"] = self._energies(live)
+        elif self._turns % SELDOM == 2:
+            found["missed"] = live.report()["deadlines_missed"]
+        self._turns += 1
+        if self._others:
+            found["others"] = {
+                user: {k: live[name].tolist() for k, name in outputs.items()}
+                for user, outputs in self._others.items()
+            }
+        return {"t": live.time, "energy": self._energy} | found
+
+    def _energies(self, live: LiveRun) -> tuple[dict[str, float], str]:
+        booked = live.energies()
+        generated, put_in = generated_and_put_in(live.system, booked)
+        self._past.append((live.time, generated, put_in))
+        while live.time - self._past[0][0] > WINDOW:
+            self._past.popleft()
+        _, before, put_before = self._past[0]
+        energy = {name: e.generated for name, e in booked.items()}
+        said = light(generated - before, put_in - put_before)
+        return {PORT: self._port(live, booked)} | energy, said
+
+    def _port(self, live: LiveRun, booked: Mapping[str, Energy]) -> float:
+        """The energy generated at the user's port, as results/user_port has it: what the mechanism
+        has stored beyond the work of the hands on their handles and on further points."""
+        block = live.system.block
+        on = [live.system.connection[n] for n in booked]
+        handles = {c.source for c in on if block(c.target) == "haptic_device"}
+        hands = [
+            c.name
+            for c in on
+            if block(c.source) == "hand"
+            and (block(c.target) == "haptic_device" or c.source not in handles)
+        ]
+        stored = float(live["virtual_mechanism.energy"][0]) - self._start
+        return stored - sum(booked[name].held for name in hands)
+
+
+def light(generated: float, put_in: float) -> str:
+    """What the energies (J) of the last second say: red where sampling and holding generated more
+    than hands and mechanism put in, as in the judgement of a whole run, by more than is `FELT`;
+    amber from a tenth of that on; green otherwise."""
+    most = max(put_in, 0.0) + FELT
+    return "red" if generated > most else "amber" if generated > 0.1 * most else "green"
+
+
+def shown() -> dict[str, tuple[str, ...]]:
+    """What a frame shows of a scene and of its first user, without `others`."""
+    return SHOWN | of_user("")
+
+
+def of_user(user: str) -> dict[str, tuple[str, ...]]:
+    """What a frame shows of a user, whose name is that of the point, "" for the first one's."""
+    of, at = (f"_{user}", f"{user}.") if user else ("", "")
+    return {k: tuple(n.format(of=of, at=at) for n in names) for k, names in OF_USER.items()}
+
+
+def _there(fmus: Any, asked: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
+    """The first of the outputs that the scene has, by name in a frame."""
+    found = {k: [name for name in names if _has(fmus, name)] for k, names in asked.items()}
+    return {k: names[0] for k, names in found.items() if names}
+
+
+def _has(fmus: Any, name: str) -> bool:
+    fmu, _, port = name.partition(".")
+    return fmu in fmus and bool(fmus[fmu].description.port(port, "output"))

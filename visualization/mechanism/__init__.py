@@ -1,0 +1,1 @@
+"""The drawing of a mechanism, for figures, live page and replays alike."""

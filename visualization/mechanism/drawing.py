@@ -1,0 +1,274 @@
+"""A drawing of a scene's mechanism: paints the marks of `marks.py` with Matplotlib, in mm, and
+writes the names of bodies and joints beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.results.scene_part import by_user
+from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.mechanism import workspace_drawing
+from hapticlink.visualization.mechanism.marks import (
+    BODIES,
+    ORIGIN,
+    SHAPES,
+    Mark,
+    Place,
+    Point,
+    attached,
+    outline,
+    outlined,
+    reach,
+)
+from hapticlink.visualization.mechanism.picture import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from hapticlink.orchestrator.scene.scene import Scene
+
+Points = NDArray[np.float64]
+Frame = Mapping[str, Any]
+Look = dict[str, Any]
+NAMED = 10
+"""Number of bodies up to which names are written beside them."""
+MM = 1e3
+SHORTEST, LONGEST = 3.0, 120.0
+"""Of arrows (pt); shorter ones are not drawn."""
+UNDER = ("obstacle", "device", "directions", "ground", "rail", "spring")
+"""Roles that are behind paths."""
+
+
+def draw(
+    axes: Axes,
+    linkage: Linkage,
+    q: Sequence[float],
+    end: Sequence[float] | None,
+    devices: Mapping[str, Device],
+    contacts: Contacts | None = None,
+) -> None:
+    """The linkage at joint coordinates q, in mm; its pose at `end` as thin lines; what the links
+    can touch; the arms of the devices, each with its handle at its user's point, and the border of
+    the first one's workspace, as far as they reach into the picture."""
+    picture = Picture(linkage, devices, contacts)
+    frame = picture.at_rest(q)
+    if end is not None:
+        at_end = {"end": picture.drawn({"q": end})["poses"]}
+        paint(axes, outlined(linkage, "end", "#8c8c8c", "at the end"), at_end, zorder=2)
+    paint(axes, (mark for mark in picture.marks if mark.role != "device"), frame)
+    _names(axes, linkage, frame)
+    limits = _limits(axes)
+    if devices:
+        paint(axes, (mark for mark in picture.marks if mark.role == "device"), frame)
+        workspace_drawing.beneath(axes, devices[""], limits)
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", xlim=limits[0], ylim=limits[1])
+    axes.set_aspect("equal", adjustable="box")
+
+
+def figure(scene: Scene, q: Sequence[float]) -> Figure:
+    """A figure of the scene's mechanism at joint coordinates q."""
+    from matplotlib.figure import Figure
+
+    drawn = Figure(figsize=(6.4, 5.6), layout="constrained")
+    axes = drawn.add_subplot()
+    assert scene.linkage is not None
+    draw(axes, scene.linkage, q, None, by_user(scene.device, scene.devices), scene.contacts)
+    axes.set_title(plain(fill(f"{scene.title} at the start", 70)), fontsize="medium")
+    axes.grid(alpha=0.3)
+    drawn.legend(fontsize="x-small", ncols=3, loc="outside lower center")
+    return drawn
+
+
+def paint(axes: Axes, marks: Iterable[Mark], frame: Frame, zorder: float | None = None) -> None:
+    """The marks that a frame has the places of."""
+    told: set[str] = {""}
+    for mark in marks:
+        at = [found for each in mark.at if (found := place(frame, each)) is not None]
+        if not at or (mark.when and mark.when not in frame.get("states", ())):
+            continue
+        layer = (1.0 if mark.role in UNDER else 3.0) if zorder is None else zorder
+        look = {"zorder": layer, "label": None if mark.label in told else mark.label}
+        if PAINTERS.get(mark.kind, _shape)(axes, mark, np.array(at), frame, look):
+            told.add(mark.label)
+
+
+def place(frame: Frame, of: Place) -> Points | None:
+    """The place (mm) of a point in the frame, (2,)."""
+    found = reach(frame, of.path)
+    return None if found is None else (np.array(found[:2]) + _turned(found, of.point)) * MM
+
+
+def _turned(pose: Sequence[float], at: Any, by: float = 0.0) -> Points:
+    """Points, (2,) or (k, 2), of the frame of a pose, turned into the world's directions."""
+    angle = by + (pose[2] if len(pose) > 2 else 0.0)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(at) @ [[c, s], [-s, c]]
+
+
+def _area(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    from matplotlib.patches import Polygon
+
+    if mark.fill is None:
+        return _line(axes, mark, np.vstack([at, at[:1]]), frame, look)
+    axes.add_patch(Polygon(at, fc=mark.fill, ec=mark.stroke, lw=mark.width, **look))
+    return True
+
+
+def _line(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    # A line's dashes are multiples of its width.
+    dash: Any = (0, [each / mark.width for each in mark.dash]) if mark.dash else "-"
+    look = look | {"color": mark.stroke, "lw": mark.width, "ls": dash}
+    axes.plot(*at.T, solid_capstyle="round", **look)
+    return True
+
+
+def _rail(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    pose = reach(frame, mark.at[-1].path)
+    along = _turned(pose, (mark.size * MM, 0.0), mark.angle or 0.0)
+    along = -along if np.dot(at[1] - at[0], along) < 0 else along
+    return _line(axes, mark, at + np.array([-along, along]), frame, look)
+
+
+def _spring(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    a, b = at
+    along = b - a
+    length = float(np.linalg.norm(along)) or 1.0
+    across = np.array([-along[1], along[0]]) / length * min(0.04 * length, 6.0)
+    waves = np.where(np.arange(13) % 2, 1.0, -1.0)[:, None] * across
+    line = np.vstack([a, a + np.linspace(0.2, 0.8, 13)[:, None] * along + waves, b])
+    return _line(axes, mark, line, frame, look)
+
+
+def _disc(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    from matplotlib.patches import Circle
+
+    x, y = at[0]
+    look = look | {"fc": mark.fill, "ec": mark.stroke, "lw": mark.width}
+    axes.add_patch(Circle((x, y), mark.size * MM, **look))
+    return True
+
+
+def _shape(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    corners = np.array(SHAPES[mark.kind])
+    if mark.angle is not None:
+        corners = _turned(reach(frame, mark.at[-1].path), corners, mark.angle)
+    axes.plot(
+        *at[0], marker=np.vstack([corners, corners[:1]]), ms=2 * np.abs(corners).max(), ls="",
+        mfc=mark.fill or "none", mec=mark.stroke or "none", mew=mark.width, **look,
+    )  # fmt: skip
+    return True
+
+
+def _arrow(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    force = np.array(reach(frame, mark.vector) or (0.0, 0.0))[:2]
+    length = mark.size * float(np.hypot(*force))
+    if length < SHORTEST:
+        return False
+    tip = (*(force * mark.size * min(1.0, LONGEST / length)),)
+    line: Any = {"color": mark.stroke, "lw": mark.width}
+    axes.annotate(
+        "", at[0], tip, textcoords="offset points", annotation_clip=False, zorder=look["zorder"],
+        arrowprops={"arrowstyle": "<|-", "shrinkA": 0, "shrinkB": 0} | line,
+    )  # fmt: skip
+    axes.plot([], [], **line, label=look["label"])
+    return True
+
+
+def _directions(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+    size = float(np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1).sum())
+    for way in reach(frame, mark.vector) or ():
+        _line(axes, mark, at[0] + size * np.outer([-1, 1], way), frame, look)
+        look = look | {"label": None}
+    return True
+
+
+PAINTERS = {
+    "area": _area,
+    "line": _line,
+    "rail": _rail,
+    "spring": _spring,
+    "disc": _disc,
+    "arrow": _arrow,
+    "directions": _directions,
+}
+"""By kind of mark; all other kinds are SHAPES."""
+
+
+def _limits(axes: Axes) -> Points:
+    """Limits of x and y (mm) that contain what is drawn with a margin for names, (2, 2), in a ratio
+    between 3/4 and 4/3; 100 mm about a single point."""
+    found = np.array([axes.dataLim.intervalx, axes.dataLim.intervaly])
+    size = 1.3 * np.ptp(found, axis=1)
+    half = np.maximum(size, 0.75 * size.max() if size.max() > 1e-6 else 100.0) / 2
+    return found.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
+
+
+def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
+    """The names of bodies, and of joints away from the middle of the mechanism; those of joints at
+    one place are below each other."""
+    if len(linkage.body) > NAMED:
+        return
+    corners = {
+        body.name: outline([*_world(frame, body.name, [*attached(linkage, body.name)] or [ORIGIN])])
+        for body in linkage.body
+    }
+    every = np.vstack([*corners.values()])
+    middle = (every.min(axis=0) + every.max(axis=0)) / 2
+    for i, (name, found) in enumerate(corners.items()):
+        _name(axes, i, name, found, middle)
+    names: dict[tuple[float, ...], list[str]] = {}
+    for joint in linkage.joint:
+        if joint.type != "free":
+            slides = joint.type == "prismatic"
+            body, at = (joint.child, joint.at_child) if slides else (joint.parent, joint.at_parent)
+            (found,) = _world(frame, body, [at or ORIGIN])
+            names.setdefault(tuple(np.round(found, 6)), []).append(joint.name)
+    for where, several in names.items():
+        right, up = np.array(where) > middle
+        offset = (7 if right else -7, 6 if up else -6)
+        side = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
+        _text(axes, where, "\n".join(several), offset, "0.3", **side)
+
+
+def _world(frame: Frame, body: str, points: Iterable[Point]) -> Iterator[Points]:
+    found = (place(frame, Place(("poses", body), at)) for at in points)
+    return (each for each in found if each is not None)
+
+
+def _name(axes: Axes, i: int, name: str, corners: Points, about: Points) -> None:
+    """The name of the i-th body: on the inner side of a line, beside a single point."""
+    from matplotlib.colors import to_rgb
+
+    middle, inward = corners.mean(axis=0), np.array([0.0, 0.7])
+    if len(corners) == 2:
+        low, high = sorted(corners.tolist(), key=lambda corner: corner[1])
+        x, y = np.subtract(high, low)
+        if abs(y) > abs(x):  # neighbours have their names at different heights
+            middle = np.array(low) + (0.6, 0.4)[i % 2] * np.array([x, y])
+        inward = np.array([-y, x]) / np.hypot(x, y)
+        inward = inward if inward @ (about - middle) > 0 else -inward
+    elif len(corners) == 1:
+        right, up = middle > about
+        inward = np.array([0.8 if right else -0.8, -0.6 if up else 0.6])
+    side = "left" if inward[0] > 0.3 else "right" if inward[0] < -0.3 else "center"
+    dark = tuple(0.65 * part for part in to_rgb(BODIES[i % len(BODIES)]))
+    _text(axes, middle, name, (12 * inward[0], 12 * inward[1]), dark, ha=side, va="center")
+
+
+def _text(
+    axes: Axes, at: Any, text: str, offset: tuple[float, float], color: Any, **how: Any
+) -> None:
+    halo: dict[str, Any] = {"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7}
+    axes.annotate(
+        plain(text), tuple(at), xytext=offset, textcoords="offset points", fontsize="small",
+        color=color, zorder=8, bbox=halo, **how,
+    )  # fmt: skip

@@ -1,0 +1,359 @@
+"""A drawing of a mechanism as a list of marks: what is drawn where, in which order and how.
+
+It is the one description of figures, live page, replays and animations. Their painters,
+`mechanism_drawing.py` and `painter.js`, know lines and colours, but no linkage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.analysis.findings.limits import EPISODES
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.linkage import Body, Linkage
+
+Point = Sequence[float]
+Points = NDArray[np.float64]
+"""x, y of points, (k, 2)."""
+Path = tuple[str | int, ...]
+"""Keys, one within the other, of a pose (x m, y m, theta rad), point or vector in a frame."""
+Corners = list[list[float]]
+ORIGIN = (0.0, 0.0)
+STILL = {"poses": {"ground": (0.0, 0.0, 0.0)}}
+"""A frame of what does not move."""
+BODIES = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")
+"""The bright scheme of P. Tol, which colour-blind readers can tell apart."""
+COLOURS = {
+    "folded": "#cc3311",
+    "saturated": "#ee7733",
+    "energy": "#ddaa00",
+    "constraints": "#aa3377",
+    "contacts": "#4477aa",
+    "outside": "#777777",
+}
+KINDS = {kind: (COLOURS[kind], meaning) for kind, meaning in EPISODES.items()}
+"""Colour and meaning of what can happen in a run."""
+INK, GREY, RED = "#000000", "#666666", "#cc3311"
+FORCES = {
+    "F_hand": ("hand", "#b85c00", "handle"),
+    "F_constraint": ("topology controller", "#aa3377", "handle"),
+    "F_env": ("contacts and others", RED, "x"),
+}
+"""By name in a frame: meaning and colour of a user's force, and where it acts."""
+PER_NEWTON = 16.5
+"""Length (pt) of an arrow to a newton."""
+BEYOND = 0.15
+"""Of the longest body, by which the line along which something slides goes on at its ends."""
+ROUND = np.exp(2j * np.pi * np.arange(48) / 48)
+"""Corners of a circle of radius 1."""
+
+
+def _polygon(corners: Any) -> Corners:
+    return np.column_stack([corners.real, corners.imag]).tolist()
+
+
+def _plus(size: float, wide: float) -> NDArray[np.complex128]:
+    quarter = np.array([size + wide * 1j, wide + wide * 1j, wide + size * 1j]) / 2
+    return np.concatenate([quarter * turn for turn in (1, 1j, -1, -1j)])
+
+
+_EIGHTH = np.exp(0.25j * np.pi)
+SHAPES = {
+    "pin": _polygon(3.0 * ROUND),
+    "ring": _polygon(6.75 * ROUND),
+    "ground": _polygon(8.5 * np.exp(2j * np.pi * np.array([0.25, 0.583, 0.917]))),
+    "square": _polygon(14 / np.sqrt(2) * _EIGHTH * np.array([1, 1j, -1, -1j])),
+    "slider": _polygon(6.0 * _EIGHTH * np.array([1, 1j, -1, -1j])),
+    "centre": _polygon(_plus(6.0, 0.0)),
+    "point": _polygon(_plus(9.0, 3.0)),
+    "operational point": _polygon(1.2 * _EIGHTH * _plus(9.0, 3.0)),
+}
+"""Corners (pt) of marks that have one size on the screen."""
+
+
+class Place(NamedTuple):
+    """A point (m) in the frame of what is at `path` in a frame of the drawing; nothing is drawn
+    there while it is not in the frame."""
+
+    path: Path
+    point: Point = ORIGIN
+
+
+class Mark(NamedTuple):
+    """`kind`: line, area, spring, disc of radius `size` (m), rail to `size` (m) beyond both places,
+    shape of SHAPES, arrow of `size` (pt) to a newton or directions of the `vector`; `angle` (rad)
+    of a rail or shape in the frame of the last place, None where it does not turn. `when`: in
+    which state alone it is drawn. Widths and dashes are in points."""
+
+    role: str
+    kind: str
+    at: tuple[Place, ...]
+    stroke: str | None = INK
+    fill: str | None = None
+    width: float = 1.2
+    dash: tuple[float, ...] = ()
+    label: str = ""
+    when: str = ""
+    size: float = 0.0
+    angle: float | None = None
+    vector: Path = ()
+
+
+def marks(
+    linkage: Linkage, contacts: Contacts | None = None, devices: Iterable[str] = ()
+) -> list[Mark]:
+    """All that frames of a linkage can show, from back to front; devices: the users who have one,
+    by their points, the first one's name is empty."""
+    users = ["", *(point.name for point in linkage.point)]
+    users = [user for user in users if not user or user in [*devices]]
+    return [
+        *obstacles(contacts),
+        *(mark for user in devices for mark in _arms(user)),
+        *(_directions(user) for user in users),
+        *_slides(linkage),
+        *_springs(linkage),
+        *(m for i, b in enumerate(linkage.body) for m in _body(linkage, b, BODIES[i % 6])),
+        *outlined(linkage, "ghost", "#333333aa", "as the graphics block has it"),
+        *outlined(linkage, "ghost", KINDS["folded"][0], when="folded"),
+        *_joints(linkage),
+        *_points(linkage),
+        *(mark for user in users for mark in _handle(user)),
+        *_forces(linkage, users),
+    ]
+
+
+def outlined(
+    linkage: Linkage, key: str, stroke: str, label: str = "", when: str = ""
+) -> Iterator[Mark]:
+    """The bodies as thin lines, at the poses at `key` of a frame."""
+    for i, body in enumerate(linkage.body):
+        at = _corners(linkage, body, key)
+        if len(at) == 1 and body.shape:
+            at = (*(Place((key, body.name), p) for p in contact_shape(body).tolist()),)
+        said, kind = "" if i else label, "area" if len(at) > 2 else "line"
+        yield Mark("ghost", kind, at, stroke, width=1.0, dash=(3.7, 1.6), label=said, when=when)
+
+
+def attached(linkage: Linkage, body: str) -> Iterator[Point]:
+    """The points at which a body has its joints, closures and operational points."""
+    for joint in linkage.joint:
+        if joint.child == body:
+            yield joint.at_child or ORIGIN
+        if joint.parent == body and joint.type != "free":
+            yield joint.at_parent or ORIGIN
+    for loop in linkage.loop:
+        yield from (
+            at or ORIGIN for name, at in zip(loop.bodies, loop.at, strict=True) if name == body
+        )
+    for point in (linkage.operational_point, *linkage.point):
+        if point.body == body:
+            yield point.at or ORIGIN
+
+
+def outline(points: Sequence[Point | Points] | Points) -> Points:
+    """The corners of the convex hull of points, (k, 2): two for points on a line, one for a single
+    point."""
+    found = np.unique(np.round(np.array(points, float), 9), axis=0)
+    if len(found) <= 2:
+        return found
+    _, sizes, (direction, _) = np.linalg.svd(found - found.mean(axis=0), full_matrices=False)
+    if sizes[1] > 1e-6 * sizes[0]:
+        return _hull(found)
+    along = found @ direction
+    return found[[along.argmin(), along.argmax()]]
+
+
+def contact_shape(body: Body) -> Points:
+    """The outline of what a body touches with, (k, 2): the hull of discs at its corners."""
+    disc = np.column_stack([ROUND.real, ROUND.imag]) * (body.radius or 0.0)
+    return outline(np.vstack([at + disc for at in np.array(body.shape)]))
+
+
+def point_of(linkage: Linkage, user: str) -> Place:
+    """The point that a user holds."""
+    held = [p for p in linkage.point if p.name == user] if user else [linkage.operational_point]
+    return _on(held[0].body, held[0].at)
+
+
+def _on(body: str, at: Point | None) -> Place:
+    return Place(("poses", body), at or ORIGIN)
+
+
+def _of(user: str) -> Path:
+    return ("others", user) if user else ()
+
+
+def state(kind: str, user: str) -> str:
+    """What a kind of KINDS is called of a user."""
+    return f"{kind} {user}".strip()
+
+
+def _outline(linkage: Linkage, body: Body) -> Points:
+    return outline([*attached(linkage, body.name)] or [body.center or ORIGIN])
+
+
+def _corners(linkage: Linkage, body: Body, key: str = "poses") -> tuple[Place, ...]:
+    """The outline of a body; one with a single joint reaches to the pins that slide in it."""
+    at = [Place((key, body.name), p) for p in _outline(linkage, body).tolist()]
+    if len(at) == 1:
+        loops = (x for x in linkage.loop if x.type != "revolute" and x.bodies[1] == body.name)
+        at += [Place((key, loop.bodies[0]), loop.at[0]) for loop in loops]
+    return (*at,)
+
+
+def _body(linkage: Linkage, body: Body, color: str) -> Iterator[Mark]:
+    at = _corners(linkage, body)
+    if len({place.path for place in at}) > 1 or len(at) == 2:
+        yield Mark("body", "line", at, color, width=5)
+    elif len(at) > 2:
+        yield Mark("body", "area", at, color, f"{color}40", 2.5)
+    elif not body.shape:
+        yield Mark("body", "square", at, None, f"{color}80")
+    if body.shape:
+        shape = (*(_on(body.name, p) for p in contact_shape(body).tolist()),)
+        yield Mark("body", "area", shape, color, f"{color}40", 0.8)
+
+
+def _slides(linkage: Linkage) -> Iterator[Mark]:
+    """What is on the ground, and the lines along which joints slide."""
+    corners = [_outline(linkage, body) for body in linkage.body]
+    beyond = BEYOND * (max(float(np.ptp(each, axis=0).max()) for each in corners) or 0.1)
+    for joint in linkage.joint:
+        ends = (_on(joint.child, joint.at_child), _on(joint.parent, joint.at_parent))
+        if joint.parent == "ground" and joint.type != "free":
+            yield Mark("ground", "ground", ends[1:], None, "#8c8c8c")
+        if joint.type == "prismatic":
+            yield _rail(ends, joint.axis, beyond)
+    for loop in linkage.loop:
+        pin, guide = (_on(b, at) for b, at in zip(loop.bodies, loop.at, strict=True))
+        if "ground" in loop.bodies:
+            yield Mark("ground", "ground", (pin,), None, "#8c8c8c")
+        if loop.type != "revolute":
+            yield _rail((pin, guide), loop.axis, beyond)
+
+
+def _rail(ends: tuple[Place, ...], axis: float | None, beyond: float) -> Mark:
+    dash = (6.4, 1.6, 1.0, 1.6)
+    return Mark("rail", "rail", ends, GREY, None, 1.0, dash, size=beyond, angle=axis or 0.0)
+
+
+def _springs(linkage: Linkage) -> Iterator[Mark]:
+    for i, spring in enumerate(linkage.spring):
+        at = (*(_on(b, at) for b, at in zip(spring.bodies, spring.at, strict=True)),)
+        label = "" if i else "spring or damper"
+        yield Mark("spring", "spring", at, "#4d4d4d", width=1.0, label=label)
+
+
+def _joints(linkage: Linkage) -> Iterator[Mark]:
+    for joint in linkage.joint:
+        if joint.type == "prismatic":
+            # It is turned like the line along which it slides.
+            ends = _on(joint.child, joint.at_child), _on(joint.parent, joint.at_parent)
+            yield Mark("joint", "slider", ends, fill="#ffffff", angle=joint.axis or 0.0)
+        elif joint.type != "free":
+            yield Mark("joint", "pin", (_on(joint.parent, joint.at_parent),), fill="#ffffff")
+    for i, loop in enumerate(linkage.loop):
+        label = "" if i else "joint that closes a loop"
+        yield Mark("joint", "pin", (_on(loop.bodies[0], loop.at[0]),), fill=INK, label=label)
+
+
+def _points(linkage: Linkage) -> Iterator[Mark]:
+    for i, body in enumerate(linkage.body):
+        label = "" if i else "centre of mass"
+        yield Mark("centre", "centre", (_on(body.name, body.center),), label=label)
+    kind = "operational point"
+    yield Mark("point", kind, (point_of(linkage, ""),), None, RED, label=kind)
+    for point in linkage.point:
+        yield Mark("point", "point", (_on(point.body, point.at),), None, RED,
+                   label=f"point {point.name}")  # fmt: skip
+
+
+def _arms(user: str) -> Iterator[Mark]:
+    """Of each arm base joint, elbow and crank end."""
+    saturated = state("saturated", user)
+    for stroke, when in (("#bfbfbf", ""), (KINDS["saturated"][0], saturated)):
+        for i in range(0, 12, 3):
+            at = (*(Place((*_of(user), "arms", i + k)) for k in range(3)),)
+            label = "" if i or user or when else "arms of the device"
+            yield Mark("device", "line", at, stroke, width=1.8, label=label, when=when)
+
+
+def _directions(user: str) -> Mark:
+    at, vector = (Place((*_of(user), "x")),), (*_of(user), "directions")
+    label = "" if user else "constrained directions"
+    return Mark("directions", "directions", at, "#aa3377aa", width=1.1, dash=(1.5, 3.7),
+                label=label, vector=vector)  # fmt: skip
+
+
+def _handle(user: str) -> Iterator[Mark]:
+    """With its way to the point that it should be at."""
+    at = (Place((*_of(user), "handle")),)
+    yield Mark("handle", "line", (*at, Place((*_of(user), "x"))), RED, width=1.0, dash=(1.0, 1.6))
+    if not user:
+        yield Mark("handle", "ring", at, None, f"{KINDS['energy'][0]}99", when="energy")
+    yield Mark("handle", "ring", at, RED, width=1.5, label="" if user else "handle")
+
+
+def _forces(linkage: Linkage, users: Sequence[str]) -> Iterator[Mark]:
+    for name, (meaning, color, where) in FORCES.items():
+        for user in users:
+            at, vector = (Place((*_of(user), where)),), (*_of(user), name)
+            yield _arrow("force", at, color, f"force, {meaning}", vector)
+    for i, loop in enumerate(linkage.loop):
+        at = (_on(loop.bodies[0], loop.at[0]),)
+        yield _arrow("cut", at, "#228833", "force, in the cut joints", ("cut", i))
+
+
+def _arrow(role: str, at: tuple[Place, ...], color: str, said: str, vector: Path) -> Mark:
+    return Mark(role, "arrow", at, color, color, 2.2, (), said, size=PER_NEWTON, vector=vector)
+
+
+def obstacles(contacts: Contacts | None) -> Iterator[Mark]:
+    """Obstacles and enclosure."""
+    if contacts is None:
+        return
+    label = iter(["obstacles"])
+    for disc in contacts.disc:
+        yield Mark("obstacle", "disc", (_on("ground", disc.center),), GREY, "#d9d9d9",
+                   label=next(label, ""), size=disc.radius)  # fmt: skip
+    for polygon in contacts.polygon:
+        at = (*(_on("ground", p) for p in polygon.corners),)
+        yield Mark("obstacle", "area", at, GREY, "#d9d9d9", label=next(label, ""))
+    if contacts.enclosure:
+        at = (*(_on("ground", p) for p in contacts.enclosure),)
+        yield Mark("obstacle", "area", at, GREY, width=1.5, label="enclosure")
+
+
+def reach(frame: Any, path: Path) -> Any:
+    """What is at a path in a frame, None where it is not there."""
+    for key in path:
+        try:
+            frame = frame[key]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return frame
+
+
+def _hull(points: Points) -> Points:
+    """The corners of the convex hull of points that are sorted by x and then y, anticlockwise, by
+    Andrew's monotone chain (Information Processing Letters 9, 1979, 216). scipy.spatial, which has
+    one, takes as long to load as a figure to draw."""
+
+    def chain(ordered: Points) -> list[Points]:
+        kept: list[Points] = []
+        for point in ordered:
+            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
+                kept.pop()
+            kept.append(point)
+        return kept[:-1]
+
+    return np.array(chain(points) + chain(points[::-1]))
+
+
+def _turn(a: Points, b: Points, c: Points) -> float:
+    """Twice the area of the triangle a, b, c, positive where it turns anticlockwise."""
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

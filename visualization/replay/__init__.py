@@ -1,0 +1,1 @@
+"""Recorded runs over time: a page with a slider, or an animation."""

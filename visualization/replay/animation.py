@@ -1,0 +1,145 @@
+"""An animation of one or two recorded runs: the mechanism as in their figures, over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.analysis.findings import summary
+from hapticlink.analysis.findings.episodes import episodes
+from hapticlink.orchestrator.results.numbers import short
+from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.mechanism.drawing import MM, paint, place
+from hapticlink.visualization.mechanism.marks import KINDS, RED
+from hapticlink.visualization.replay.recorded_frames import Recorded
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from PIL.Image import Image
+
+MOST, PERIOD = 60, 1 / 20
+"""Largest number of frames, and the least time (s) of one."""
+SHORTEST, REST = 2.0, 1.0
+"""Times (s) that an animation takes at least, and for which its last frame stays."""
+COLORS = 64
+SIZE, DPI = (4.6, 5.0), 80
+"""Of the picture of one run (in)."""
+ARROW = 60.0
+"""Length (pt) of the largest force of the hand."""
+LEFT_OUT = ("centre", "directions", "cut")
+"""Roles of marks that are too small for an animation."""
+FITTED = ("obstacle", "body", "handle")
+"""Roles of marks that the picture contains."""
+
+Array = NDArray[np.float64]
+
+
+def write(runs: Sequence[Recorded], names: Sequence[str], path: Path) -> None:
+    """Writes a GIF, WebP or animated PNG, by the ending of the path's name, which begins anew after
+    its end. The same runs give the same bytes."""
+    end = max(float(run.times[-1]) for run in runs)
+    times = np.linspace(0.0, end, int(np.clip(np.ceil(end / PERIOD) + 1, 2, MOST)))
+    panels = [_Panel(run, name, times) for run, name in zip(runs, names, strict=True)]
+    first, *others = _with_palette(list(_pictures(panels, times)))
+    each = round(1e3 * max(end, SHORTEST) / len(times))
+    first.save(
+        path, save_all=True, append_images=others, loop=0, optimize=True, lossless=True,
+        duration=[each] * (len(times) - 1) + [round(1e3 * REST)],
+    )  # fmt: skip
+
+
+class _Panel:
+    """One run at the times of the frames."""
+
+    def __init__(self, run: Recorded, name: str, times: Array) -> None:
+        self.run, self.name, self.times = run, name, times
+        self._rows = np.maximum(np.searchsorted(run.times, times + 1e-9, "right") - 1, 0)
+        values = run.values()
+        self._x, self._handle = values["x"][:, :2] * MM, values.get("handle")
+        self._frames = run.frames()
+        most = max((float(np.hypot(*f[:2])) for f in values.get("F_hand", ())), default=0.0)
+        self._marks = [
+            m._replace(size=ARROW / most) if m.kind == "arrow" and most else m
+            for m in run.picture.marks
+            if m.role not in LEFT_OUT
+        ]
+        self._episodes = episodes(run.results)
+
+    def limits(self) -> Array:
+        """Least and largest x and y (mm) of all that moves, (2, 2)."""
+        fixed = [mark for mark in self._marks if mark.role in FITTED]
+        found = [self._x]
+        for row in self._rows:
+            at = (place(self._frames[row], each) for mark in fixed for each in mark.at)
+            found.append(np.array([each for each in at if each is not None]))
+        every = np.vstack(found)
+        return np.array([every.min(axis=0), every.max(axis=0)]).T
+
+    def draw(self, axes: Axes, k: int, limits: Array) -> None:
+        """The k-th frame, within limits of x and y (mm)."""
+        axes.clear()
+        row = self._rows[k]
+        axes.set(xlim=limits[0], ylim=limits[1], xticks=[], yticks=[], aspect="equal")
+        axes.plot(*self._x[: row + 1].T, color=RED, lw=0.8, alpha=0.5)
+        paint(axes, self._marks, self._frames[row])
+        axes.set_title(plain(self.name), fontsize="medium", fontweight="bold", y=1.0, pad=22)
+        for text, y, color in zip(self._said(k, row), (1.02, 0.02), ("0.3", None), strict=True):
+            color = color or self._now(k)[1]
+            axes.text(
+                0.5, y, plain(text), color=color, ha="center", transform=axes.transAxes, zorder=9
+            )
+
+    def _said(self, k: int, row: int) -> tuple[str, str]:
+        """Time and tracking error, and what happens."""
+        told = f"{self.run.times[row]:.2f} s"
+        if self._handle is not None:
+            apart = np.hypot(*(self._handle[row, :2] * MM - self._x[row]))
+            told += f", handle {short(round(float(apart), 1))} mm away"
+        return told, fill(self._now(k)[0], 46)
+
+    def _now(self, k: int) -> tuple[str, str]:
+        """The first episode at the k-th frame, or how the run has ended; and its colour."""
+        time, end = self.times[k], self.run.times[-1]
+        if time > end:
+            return summary.ending(self.run.results), "k"
+        found = [e for e in self._episodes if e.begin <= time <= e.end]
+        return (found[0].said, KINDS[found[0].kind][0]) if found else ("", "k")
+
+
+def _pictures(panels: Sequence[_Panel], times: Array) -> Iterator[Image]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from PIL import Image
+
+    figure = Figure(figsize=(SIZE[0] * len(panels), SIZE[1]), dpi=DPI)
+    canvas = FigureCanvasAgg(figure)
+    every = figure.subplots(1, len(panels), squeeze=False)[0]
+    figure.subplots_adjust(0.01, 0.01, 0.99, 0.89, wspace=0.03)
+    both = np.array([panel.limits() for panel in panels])
+    low, high = both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)
+    half = 0.56 * max(float((high - low).max()), 20.0)
+    limits = ((low + high) / 2)[:, None] + half * np.array([[-1.0, 1.0]])
+    for k in range(len(times)):
+        for axes, panel in zip(every, panels, strict=True):
+            panel.draw(axes, k, limits)
+        canvas.draw()
+        yield Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
+
+
+def _with_palette(pictures: Sequence[Image]) -> list[Image]:
+    """The pictures in the colours of the first, middle and last, without dithering, which would
+    flicker."""
+    from PIL import Image
+
+    chosen = [pictures[i] for i in (0, len(pictures) // 2, -1)]
+    width, height = chosen[0].size
+    montage = Image.new("RGB", (width, height * len(chosen)))
+    for i, picture in enumerate(chosen):
+        montage.paste(picture, (0, i * height))
+    palette = montage.quantize(COLORS, method=Image.Quantize.FASTOCTREE)
+    return [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]

@@ -1,0 +1,77 @@
+"""A page as one HTML file, which opens without a network: styles, scripts and data within it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+PAGE = Path(__file__).parents[1] / "page"
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+"""Content security policy of the file: what is in it, and nothing from elsewhere."""
+IMPORT = re.compile(r'^import \{ (.+?) \} from "\./(\w+\.js)";$', re.MULTILINE)
+EXPORT = re.compile(r"^export (?=(?:class|function|const) (\w+))", re.MULTILINE)
+
+
+def page(name: str, data: Any) -> str:
+    """The page `name` of the folder `page`, with `data` as JSON in its element `data`."""
+    html = (PAGE / name).read_text(encoding="utf-8")
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{escape(POLICY)}">'
+    html = html.replace('<meta charset="utf-8">', f'<meta charset="utf-8">\n{policy}', 1)
+    html = re.sub(r'<link rel="icon" href="(.+?)">', _icon, html)
+    html = re.sub(r'<link rel="stylesheet" href="(.+?)">', _style, html)
+    # "<" could end the element, or begin a comment in it.
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    kept = f'<script type="application/json" id="data">{text}</script>\n'
+    return re.sub(
+        r'<script type="module" src="(.+?)"></script>',
+        lambda found: f'{kept}<script type="module">\n{bundle(found[1])}</script>',
+        html,
+    )
+
+
+def bundle(name: str) -> str:
+    """A module of the page with those that it imports, each a function that returns what it
+    exports, in the order in which they need each other."""
+    *needed, last = _ordered(name, [])
+    wrapped = (f"const {_variable(n)} = (() => {{\n{_module(n)}}})();\n" for n in needed)
+    return "".join([*wrapped, _module(last)])
+
+
+def _ordered(name: str, before: list[str]) -> list[str]:
+    """The modules `before`, then those that a module needs and they lack, then the module."""
+    for needed in _needs(name):
+        before = before if needed in before else _ordered(needed, before)
+    return [*before, name]
+
+
+def _needs(name: str) -> Iterator[str]:
+    yield from (found[2] for found in IMPORT.finditer(_text(name)))
+
+
+def _module(name: str) -> str:
+    text = _text(name)
+    exported = ", ".join(EXPORT.findall(text))
+    text = IMPORT.sub(lambda found: f"const {{ {found[1]} }} = {_variable(found[2])};", text)
+    end = f"return {{ {exported} }};\n" if exported else ""
+    return EXPORT.sub("", text) + end
+
+
+def _variable(name: str) -> str:
+    return f"${name.removesuffix('.js')}"
+
+
+def _text(name: str) -> str:
+    return (PAGE / name).read_text(encoding="utf-8")
+
+
+def _style(found: re.Match[str]) -> str:
+    return f"<style>\n{_text(found[1])}</style>"
+
+
+def _icon(found: re.Match[str]) -> str:
+    return f'<link rel="icon" href="data:image/svg+xml,{quote(_text(found[1]))}">'

@@ -1,0 +1,45 @@
+"""A page that replays one or two recorded runs, as one HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.results.checked_run import names
+from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
+from hapticlink.visualization.replay import one_file
+from hapticlink.visualization.replay.recorded_frames import Recorded
+
+WRITTEN = (".html", ".gif", ".webp", ".png")
+"""Endings of the files that a replay can be written to."""
+
+
+def html(runs: Sequence[Recorded]) -> str:
+    """The page. The same runs give the same bytes."""
+    told = [
+        run.told() | {"short": name}
+        for run, name in zip(runs, names([run.folder for run in runs]), strict=True)
+    ]
+    return one_file.page("replay.html", {"runs": told, "kinds": KINDS, "shapes": SHAPES})
+
+
+def require_written(path: Path) -> None:
+    """Raises InputFault for a file of a kind that no replay can be written to."""
+    if path.suffix.lower() not in WRITTEN:
+        raise InputFault(f"--export {path}: name a file that ends in {', '.join(WRITTEN)}")
+    folders.ensure(path.parent, "--export")
+
+
+def write(runs: Sequence[Recorded], path: Path) -> None:
+    """Writes the replay of the runs as a page or, by the file's name, as an animation."""
+    if path.suffix.lower() == ".html":
+        with atomic_file(path) as unfinished:
+            unfinished.write_text(html(runs), encoding="utf-8")
+        return
+    from hapticlink.visualization.replay import animation  # with Matplotlib, slow to load
+
+    with atomic_file(path) as unfinished:
+        animation.write(runs, names([run.folder for run in runs]), unfinished)

@@ -1,0 +1,60 @@
+"""Serves one page on localhost, below a path that only who is told it knows."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socket import AF_INET, AF_INET6
+
+from hapticlink.visualization.replay.one_file import POLICY
+
+HEADERS = {
+    "Content-Type": "text/html; charset=utf-8",
+    "Content-Security-Policy": f"{POLICY}; frame-ancestors 'none'",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+
+
+@contextmanager
+def served(html: str, host: str, port: int, token: str) -> Iterator[int]:
+    """Serves `html` at /<token>/ within the context, which gets the port; 0 is a free one. Raises
+    OSError where it cannot be had."""
+    body, path = html.encode(), f"/{token}/"
+
+    class Handler(BaseHTTPRequestHandler):
+        timeout = 10
+
+        def do_GET(self) -> None:
+            if self.path != path:
+                self.send_error(HTTPStatus.NOT_FOUND)
+                return
+            self.send_response(HTTPStatus.OK)
+            for name, value in {**HEADERS, "Content-Length": str(len(body))}.items():
+                self.send_header(name, value)
+            self.end_headers()
+            self.wfile.write(body)
+
+        def version_string(self) -> str:
+            return "hapticlink"
+
+        def log_message(self, *said: object) -> None:
+            pass  # the terminal shows what the command says
+
+    class Server(ThreadingHTTPServer):
+        address_family = AF_INET6 if ":" in host else AF_INET
+        daemon_threads = True
+
+        def handle_error(self, *of: object) -> None:
+            pass  # a window that was closed while it loaded
+
+    with Server((host, port), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            yield server.server_address[1]
+        finally:
+            server.shutdown()
