@@ -15,8 +15,7 @@ import hapticlink as hl
 from hapticlink.commands.info import at_start, coordinates
 from hapticlink.orchestrator.system.built import built
 from hapticlink.visualization.figures import block_diagram
-    from hapticlink.visualization.mechanism import workspace_drawing
-from hapticlink.visualization.mechanism import drawing
+from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
 PAGE = Path(__file__).with_name("own-linkage.md")
 PICTURES, FIGURES = (Path(__file__).with_name(name) for name in ("pictures", "figures"))
