@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from benchmarks.mechanism import LOST, MACHINE, NATIVE, SLOW, advantage
+from benchmarks.mechanism.errors import LOST, MACHINE, NATIVE, SLOW, advantage
 from benchmarks.state import versions
 
 COLOURS = {

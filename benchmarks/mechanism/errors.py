@@ -18,7 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import mechanisms, reference
+from benchmarks import mechanisms
+from benchmarks.mechanism import reference
 from benchmarks.ours import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.integrators import METHODS
