@@ -127,9 +127,9 @@ class Ours:
 def in_place(
     step: ca.Function, arguments: Sequence[Vector], after: Vector
 ) -> tuple[Any, Callable[[], None]]:
-    """A call that carries out a `step` on what the `arguments` (x, u, p, t, h) hold then, and writes
-    the state `after` it, without allocating memory. The arrays and the buffer, which is returned
-    first, have to be kept as long as it is called."""
+    """A call that carries out a `step` on what the `arguments` (x, u, p, t, h) hold then, and
+    writes the state `after` it, without allocating memory. The arrays and the buffer, which is
+    returned first, have to be kept as long as it is called."""
     buffer: Any
     buffer, trigger = step.buffer()
     for i, values in enumerate(arguments):

@@ -17,7 +17,8 @@ import numpy as np
 from benchmarks.maximal import Bodies
 from hapticlink.components.specs.linkage import Linkage
 
-sys.exudynFast = True  # type: ignore[attr-defined] # the build without range checks, as its documentation advises
+# The build without range checks, as its documentation advises.
+sys.exudynFast = True  # type: ignore[attr-defined]
 import exudyn as exu  # noqa: E402
 import exudyn.itemInterface as item  # noqa: E402
 
