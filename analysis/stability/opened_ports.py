@@ -20,12 +20,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linearise import Linear
 from hapticlink.analysis.stability.state_vector import SIGNALS
 from hapticlink.analysis.stability.tangent import Columns, Instruction
+from hapticlink.orchestrator.base.arrays import Complex, Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.loop_names import HAND, MECHANISM
 from hapticlink.orchestrator.plan.operations import Get, Set, Step
@@ -33,8 +33,6 @@ from hapticlink.orchestrator.run.energy.bonds import bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import System
 
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 LARGEST = 600
 """Entries of the stacked force, of which each frequency takes an eigenvalue problem."""
 
@@ -127,8 +125,7 @@ class Response:
         y: Complex = self.C.astype(complex) @ free + self.D.astype(complex)
         x = y[:k]
         after = np.concatenate([x[self.m :], turn * x[: self.m]])
-        found: Complex = np.concatenate([after - x, y[k:]])
-        return found
+        return np.concatenate([after - x, y[k:]])
 
     @property
     def radius(self) -> float:

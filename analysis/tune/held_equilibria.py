@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.closure_directions import Closures
@@ -27,6 +26,7 @@ from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.opened_ports import hand_port, response
 from hapticlink.analysis.tune.gains import Gains, Scales
 from hapticlink.analysis.tune.spring_hand import FIRM, LEVER
+from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.loop_names import (
     ENVIRONMENT_WRENCH,
@@ -39,9 +39,6 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.built import built
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 SOFT = 0.25
 """Scale of the scene's gains with which rest is looked for where they throw the handle off."""
 STEPS = 12
@@ -95,7 +92,7 @@ class Held:
         counted = [mode for mode in found if not (mode.neutral and mode.uncertainty < SURE)]
         return bool(counted) and counted[0].growth <= 0.0
 
-    def signal(self, port: str) -> NDArray[np.float64]:
+    def signal(self, port: str) -> Matrix:
         """The values of an output `fmu.port` at `rest`; none where there is no such output."""
         return self._home.image[self._places(port)]
 

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.analysis.tune.held_equilibria import Held, Vector, held
+from hapticlink.analysis.tune.held_equilibria import Held, held
 from hapticlink.analysis.tune.spring_hand import FIRM, spring
 from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.loop_names import (
     ENVIRONMENT_WRENCH,
