@@ -8,8 +8,8 @@ from typing import Any
 
 from hapticlink.analysis.findings.limits import FELT
 from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.results.record import Energy
 from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
-from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.visualization.mechanism.picture import PORT
 
 SHOWN = {
