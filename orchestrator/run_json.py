@@ -7,13 +7,13 @@ from collections.abc import Iterable
 
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.base import plugins
+from hapticlink.orchestrator.base.loop_names import MECHANISM
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.record import ClockSteps, RecordedFmu, RefusedHold, RunSetup
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import held_polynomials
-from hapticlink.orchestrator.system.haptic_loop import MECHANISM
 from hapticlink.orchestrator.system.ports import power_across_rates
 from hapticlink.orchestrator.system.system import System
 

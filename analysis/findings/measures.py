@@ -18,11 +18,10 @@ from hapticlink.analysis.findings.tracking import (
     poses,
 )
 from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.orchestrator.base.loop_names import CLOSURE_ERROR
 from hapticlink.orchestrator.results.record import Energy, PortEnergy
 from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results, Vector
-
-CLOSURE = "virtual_mechanism.closure_error"
 
 
 class TrackingError(NamedTuple):
@@ -102,10 +101,10 @@ class Measures:
     @cached_property
     def closure_m(self) -> float | None:
         """The largest closure error of the mechanism's loops (m)."""
-        table = of_block(self._results, CLOSURE)
+        table = of_block(self._results, CLOSURE_ERROR)
         if table is None or not len(table["time"]):
             return None
-        return float(np.abs(table[CLOSURE][table["time"] <= self._until]).max(initial=0.0))
+        return float(np.abs(table[CLOSURE_ERROR][table["time"] <= self._until]).max(initial=0.0))
 
     @cached_property
     def constrained(self) -> Constrained | None:

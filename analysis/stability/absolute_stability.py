@@ -25,11 +25,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize, minimize_scalar
 
-Complex = NDArray[np.complex128]
-Vector = NDArray[np.float64]
+from hapticlink.orchestrator.base.arrays import Complex, Vector
+
 SPAN = 8.0
 """Of ln d to both sides of the scale that makes two blocks act equally on each other."""
 ITERATIONS = 30

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
+from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linearise import Linear, linearised
 from hapticlink.analysis.stability.modes import counted, modes
 from hapticlink.analysis.stability.tangent import SAME
@@ -23,6 +23,7 @@ from hapticlink.analysis.stability.trajectory import (
     require_constant,
     still,
 )
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 
 ITERATIONS = 20
@@ -104,8 +105,7 @@ def newton_step(at: Linear) -> Vector:
     """d along each direction, of least norm in balanced coordinates."""
     d = at.scales
     left = np.eye(len(d)) - at.A * d / d[:, None]
-    found: Vector = d * np.linalg.lstsq(left, at.change / d, rcond=NEUTRAL)[0]
-    return found
+    return d * np.linalg.lstsq(left, at.change / d, rcond=NEUTRAL)[0]
 
 
 def _newton(map_: LiftedMap, state: Vector) -> Linear:

@@ -18,9 +18,10 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.lifted_map import behind_start, long_enough, opened
-from hapticlink.analysis.stability.linearise import Matrix, linearised
+from hapticlink.analysis.stability.linearise import linearised
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene

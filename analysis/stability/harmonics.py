@@ -10,13 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigvals
 from scipy.optimize import minimize_scalar
 
-from hapticlink.analysis.stability.opened_ports import Complex, Response
+from hapticlink.analysis.stability.opened_ports import Response
+from hapticlink.orchestrator.base.arrays import Complex, Matrix
 
-Matrix = NDArray[np.float64]
 STILL = 1e-9
 """Mobility, relative to the largest, of a coordinate in which the device does not move."""
 RIGID = 1e-6
@@ -45,10 +44,9 @@ class Hybrid:
     def impedance(self) -> Complex:
         """F = Z v of both ports."""
         Z = np.linalg.inv(self.Y)
-        found: Complex = np.block(
+        return np.block(
             [[Z, -Z @ self.there], [self.back @ Z, self.own - self.back @ Z @ self.there]]
         )
-        return found
 
     def harmonic(self, h: int) -> Hybrid:
         """That of one harmonic of the hand, and the one of the mechanism that it is seen as: with
@@ -157,14 +155,11 @@ def hertz(angle: float, h: int, N: int, period: float) -> float:
 def _waves(angle: float, count: int) -> Complex:
     """The harmonics of a signal of `count` samples in a period, as orthonormal columns."""
     k = np.arange(count)
-    found: Complex = np.exp(1j * np.outer(k, (angle + 2 * np.pi * k) / max(count, 1)))
-    return found / np.sqrt(max(count, 1))
+    waves = np.exp(1j * np.outer(k, (angle + 2 * np.pi * k) / max(count, 1)))
+    return waves / np.sqrt(max(count, 1))
 
 
 def _a_period(found: Response) -> Complex:
     """The displacement of the handle over a period by the force of that period, summed over all."""
     G, m = found.at(np.pi / 2), found.m
-    summed: Complex = np.add.reduce(
-        [G[i : i + m, i : i + m] for i in range(0, found.forces, m)], axis=0
-    )
-    return summed
+    return np.add.reduce([G[i : i + m, i : i + m] for i in range(0, found.forces, m)], axis=0)

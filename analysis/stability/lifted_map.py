@@ -14,9 +14,10 @@ import numpy as np
 
 from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
-from hapticlink.analysis.stability.state_vector import Coordinate, StateVector, Vector
-from hapticlink.analysis.stability.tangent import SAME, Columns, Instruction, Matrix, Tangent
+from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
+from hapticlink.analysis.stability.tangent import SAME, Columns, Instruction, Tangent
 from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
+from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.tangent import SAME, SMALL
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 
-Matrix = NDArray[np.float64]
 ONE = 1e-7
 """Largest deviation from 1 of the diagonal entry of a parameter."""
 
@@ -44,13 +44,11 @@ class Linear:
     @property
     def change(self) -> Vector:
         """Along each direction, F(point) - point."""
-        found: Vector = self.V.T @ (self.image - self.point)
-        return found
+        return self.V.T @ (self.image - self.point)
 
     def moved(self, by: Vector) -> Vector:
         """The point moved along the directions, with all that is overwritten as in the image."""
-        found: Vector = self.image + self.V @ (by - self.change)
-        return found
+        return self.image + self.V @ (by - self.change)
 
     @property
     def kink(self) -> Vector:
@@ -61,8 +59,7 @@ class Linear:
     @property
     def scales(self) -> Vector:
         """Scales d of the coordinates that balance A: rows of D^-1 A D as large as its columns."""
-        found: Vector = matrix_balance(self.A, permute=False, separate=True)[1][0]
-        return found
+        return matrix_balance(self.A, permute=False, separate=True)[1][0]
 
 
 def linearised(map_: LiftedMap, point: Vector, same: float = SAME) -> Linear:
@@ -84,5 +81,4 @@ def _constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
     n = len(A)
     own = np.abs(np.diag(A) - 1.0) < ONE
     alone = np.count_nonzero(A - np.diag(np.diag(A)), axis=1) == 0
-    found: NDArray[np.bool_] = own & alone & same if n else np.zeros(0, bool)
-    return found
+    return own & alone & same if n else np.zeros(0, bool)

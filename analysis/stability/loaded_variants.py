@@ -15,12 +15,13 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import equilibrium, nearby
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector, long_enough, opened
+from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.analysis.stability.linearise import Linear
 from hapticlink.analysis.stability.modes import counted, modes, verdict
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.overrides import Options

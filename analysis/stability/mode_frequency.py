@@ -13,10 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
+from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linearise import Linear
 from hapticlink.analysis.stability.modes import Mode
 from hapticlink.analysis.stability.tangent import STEP
+from hapticlink.orchestrator.base.arrays import Vector
 
 
 def traced(map_: LiftedMap, at: Linear, mode: Mode) -> Mode:

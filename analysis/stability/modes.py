@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eig
 
-from hapticlink.analysis.stability.lifted_map import Vector
 from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.orchestrator.base.arrays import Vector
 
 FLOOR = 1e-9
 """Relative error of the entries of A by rounding."""

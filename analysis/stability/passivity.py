@@ -31,13 +31,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.analysis.stability import frozen_nonlinearities, two_port
 from hapticlink.analysis.stability.absolute_stability import lacking, least
 from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.harmonics import Complex, Hybrid, Scale, hertz, with_worst
+from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_worst
 from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, opened
 from hapticlink.analysis.stability.linearise import Linear
 from hapticlink.analysis.stability.opened_ports import (
@@ -52,6 +51,7 @@ from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Complex, Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -217,10 +217,10 @@ def of(
     )
 
 
-def _angles(N: int) -> NDArray[np.float64]:
+def _angles(N: int) -> Matrix:
     """Frequencies w P up to pi, as many as N harmonics of each leave to be taken."""
     count = max(6, FREQUENCIES // N)
-    found: NDArray[np.float64] = np.unique(
+    found: Matrix = np.unique(
         np.concatenate([np.geomspace(1e-2, np.pi, count), np.linspace(0.0, np.pi, count)[1:]])
     )
     return found

@@ -18,7 +18,6 @@ from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.lifted_map import behind_start, opened
-from hapticlink.analysis.stability.linearise import Matrix
 from hapticlink.analysis.stability.switching import (
     Bounds,
     Edge,
@@ -29,6 +28,7 @@ from hapticlink.analysis.stability.switching import (
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline, bounds, exact
@@ -196,8 +196,7 @@ def edges_of(
         def frame(before: int, length: int, further: int | None = None) -> Matrix:
             other = alternating(system, place, before, length, further)
             view = map_.over(other, window(other, place))
-            found: Matrix = V.T @ view.slopes(at.point, V)[1]
-            return found
+            return V.T @ view.slopes(at.point, V)[1]
 
         low, high = lengths[0], lengths[-1]
         remembers = not _close(frame(low, middle), frame(high, middle))

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.tune.felt_stiffness import HERTZ
-from hapticlink.analysis.tune.held_equilibria import Complex, Vector
 from hapticlink.analysis.tune.poses import Pose
 from hapticlink.analysis.tune.spring_hand import HANDS
+from hapticlink.orchestrator.base.arrays import Complex, Vector
 from hapticlink.orchestrator.results.scene_file import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides

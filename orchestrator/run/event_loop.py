@@ -11,6 +11,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
+from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal, delays
 from hapticlink.orchestrator.results.record import End, RecordedFault, RunEnding, Timings
@@ -23,7 +24,6 @@ from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, kinds
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.system.haptic_loop import WORKSPACE
 from hapticlink.orchestrator.system.ports import power_across_rates
 
 Progress = Callable[[float], None]
@@ -171,7 +171,7 @@ def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
     if (
         outcome.reason == "stop_when"
         and condition
-        and (system.block(condition.fmu), condition.variable) == WORKSPACE
+        and f"{system.block(condition.fmu)}.{condition.variable}" == WORKSPACE_MARGIN
         and (why := outcome.details.unstable)
     ):
         what = f"left its workspace, and {why}: the loop is unstable"

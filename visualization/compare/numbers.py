@@ -10,7 +10,8 @@ import numpy as np
 
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
-from hapticlink.analysis.findings.tracking import MECHANISM, of_block
+from hapticlink.analysis.findings.tracking import of_block
+from hapticlink.orchestrator.base.loop_names import POINT_POSE
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare.settings import one_mechanism
@@ -136,7 +137,7 @@ def _timing(run: Results) -> Numbers:
 def _point_distances(runs: Sequence[Results]) -> list[Row]:
     """The largest distance (mm) of the operational point from that of the first run at the same
     times, until the first end; none where a run has no such point, or another mechanism."""
-    tables = [table for run in runs if (table := of_block(run, MECHANISM, 3))]
+    tables = [table for run in runs if (table := of_block(run, POINT_POSE, 3))]
     comparable = len(tables) == len(runs) > 1 and one_mechanism(runs)
     if not comparable or not all(len(table["time"]) for table in tables):
         return []
@@ -145,8 +146,8 @@ def _point_distances(runs: Sequence[Results]) -> list[Row]:
     time = time[time <= min(table["time"][-1] for table in tables)]
     distances = [NONE]
     for table in others:
-        point = [np.interp(time, table["time"], table[MECHANISM][:, i]) for i in (0, 1)]
-        offset = np.array(point) - first[MECHANISM][: len(time), :2].T
+        point = [np.interp(time, table["time"], table[POINT_POSE][:, i]) for i in (0, 1)]
+        offset = np.array(point) - first[POINT_POSE][: len(time), :2].T
         distances.append(short(1e3 * float(np.hypot(*offset).max())))
     label = "operational point from that of the first run, largest (mm)"
     return [Row(label, tuple(distances))]
