@@ -22,7 +22,7 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.run.energy.meter import Energy
+from hapticlink.orchestrator.results.record import Energy
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun

@@ -11,7 +11,7 @@ from hapticlink.orchestrator.scene.overrides import toml
 
 def scene_file(run: Results) -> str:
     """The text of a scene file that stands alone: what run.json has of the scene."""
-    scene = _without_none(run.run["scene"])
+    scene = _without_none(run.record.scene)
     for device in (scene.get("device"), *scene.get("devices", {}).values()):
         if device:
             del device["sensing"]  # the scene's own

@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Sequence
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import Event, Part
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.record import Iterations, Steps
 from hapticlink.orchestrator.run.bind_operations import Binder, Bound
-from hapticlink.orchestrator.run.fixed_point import Iterations, total
+from hapticlink.orchestrator.run.fixed_point import total
 from hapticlink.orchestrator.run.paced_events import PacedEvents, Points
 from hapticlink.orchestrator.run.simulation import Call, Simulation
-from hapticlink.orchestrator.run.step_control import Steps
 
 
 class PythonLoop:
