@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.equilibrium_location import Whereabouts, whereabouts
-from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, opened
+from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linearise import Linear
 from hapticlink.analysis.stability.mode_frequency import traced
 from hapticlink.analysis.stability.modes import NEAR, Mode, counted, leading, modes, verdict
@@ -146,13 +145,12 @@ def at_rest(scene: Scene, whole: System, at: float, seconds: float) -> Stability
     """The stability of a scene's system around the equilibrium that is found within `seconds` of
     simulated time, as in `stability`."""
     system, removed = frozen_nonlinearities.without(whole)
-    with opened(long_enough(scene, system, at), at, Closures(scene)) as map_:
+    with lifted_map(long_enough(scene, system, at), at, scene) as map_:
         run = trajectory(map_, seconds)
-        found = equilibrium(map_, run)
-        where = whereabouts(scene, map_, found, run)
-        return _result(
-            scene.title, map_, found, [*removed, *frozen_nonlinearities.kept(system)], where
-        )
+        linear = equilibrium(map_, run)
+        where = whereabouts(scene, map_, linear, run)
+        frozen = [*removed, *frozen_nonlinearities.kept(system)]
+        return _result(scene.title, map_, linear, frozen, where)
 
 
 def _result(

@@ -39,10 +39,11 @@ CONVERGED = 1e-12
 def hyperperiod(time: Timeline) -> int:
     """The ticks after which the events of all clocks repeat. Raises InputFault for a clock whose
     period varies at random or follows a trace."""
-    return math.lcm(*(_round(clock) for clock in time.clocks))
+    return math.lcm(*(_repetition(clock) for clock in time.clocks))
 
 
-def _round(clock: Clock) -> int:
+def _repetition(clock: Clock) -> int:
+    """The ticks after which the events of a clock repeat."""
     starts = clock.starts
     if isinstance(starts, Frames):
         return starts.repeats
@@ -236,11 +237,9 @@ def long_enough(scene: Scene, system: System, at: float = 0.0) -> System:
 
 
 @contextmanager
-def opened(
-    system: System, at: float = 0.0, closures: Closures | None = None
-) -> Iterator[LiftedMap]:
-    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; `closures` are
-    those of its mechanism.
+def lifted_map(system: System, at: float = 0.0, scene: Scene | None = None) -> Iterator[LiftedMap]:
+    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; the state is
+    perturbed within the loop closures of `scene`.
 
     Raises InputFault where there is none: adaptive step sizes, rates and latencies that vary, an
     FMU whose state cannot be read.
@@ -266,4 +265,5 @@ def opened(
         simulation.step_checks.clear()
         simulation.start()
         without_friction(simulation.holds.values())
+        closures = Closures(scene) if scene else None
         yield LiftedMap(Plan(system), simulation, at, Tangent(simulation, closures))

@@ -32,12 +32,12 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.analysis.stability import frozen_nonlinearities, two_port
+from hapticlink.analysis.stability import two_port
 from hapticlink.analysis.stability.absolute_stability import lacking, least
-from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_worst
-from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, opened
+from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
+from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.linearise import Linear
 from hapticlink.analysis.stability.opened_ports import (
     HandPort,
@@ -49,13 +49,10 @@ from hapticlink.analysis.stability.opened_ports import (
 )
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
-from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Complex, Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
 
 FREQUENCIES = 32
 
@@ -118,17 +115,14 @@ def passivity(scene: str | Path | Scene, options: Options = (), *, at: float = 0
     Raises InputFault as `stability` does, and for a scene whose hand pushes no device, or with a
     hyperperiod of more than 600 forces.
     """
-    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
-        read = open_scene.load(scene, options)
-        with built(read) as whole:
-            system, _ = frozen_nonlinearities.without(whole)
-            hand = hand_port(system)
-            with opened(long_enough(read, system, at), at, Closures(read)) as map_:
-                mechanism = mechanism_port(system, hand)
-                require_size(map_, hand, mechanism)
-                rest = equilibrium(map_, trajectory(map_, read.duration))
-                T = 1 / float(read.haptics.rate)
-                return of(read.title, map_, rest, hand, mechanism, T)
+    with linearisable(scene, options) as (read, system, _):
+        hand = hand_port(system)
+        with lifted_map(long_enough(read, system, at), at, read) as map_:
+            mechanism = mechanism_port(system, hand)
+            require_size(map_, hand, mechanism)
+            linear = equilibrium(map_, trajectory(map_, read.duration))
+            T = 1 / float(read.haptics.rate)
+            return of(read.title, map_, linear, hand, mechanism, T)
 
 
 def of(

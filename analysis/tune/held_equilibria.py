@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import newton_step, rests
-from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, opened
+from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
+from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.linearise import Linear, linearised
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.opened_ports import hand_port, response
@@ -30,8 +30,8 @@ from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
 
 DEVICE, HAND = "haptic_device", "hand"
 CONTACT = "virtual_mechanism.F_env"
@@ -157,16 +157,18 @@ class Held:
 
 
 @contextmanager
-def held(read: Scene, start: Vector | None = None) -> Iterator[Held]:
-    """A scene whose hand is a `spring`, at rest. Raises InputFault or FmuFault where it comes to
-    none."""
-    with built(read) as whole, ExitStack() as stack:
-        system = long_enough(read, frozen_nonlinearities.without(whole)[0])
+def held(
+    scene: str | Path | Scene, options: Options = (), start: Vector | None = None
+) -> Iterator[Held]:
+    """A scene with `options`, whose hand is a `spring`, at its equilibrium. Raises InputFault or
+    FmuFault where it has none."""
+    with linearisable(scene, options) as (read, system, _), ExitStack() as stack:
+        system = long_enough(read, system)
         gains, T = Gains(system), float(1 / exact(read.haptics.rate))
 
         def rested(scale: float) -> Held:
             softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
-            map_ = stack.enter_context(opened(softer, 0.0, Closures(read)))
+            map_ = stack.enter_context(lifted_map(softer, 0.0, read))
             return Held(map_, gains, T, start)
 
         try:

@@ -15,7 +15,6 @@ from hapticlink.analysis.tune.held_equilibria import CONTACT, Held, held
 from hapticlink.analysis.tune.spring_hand import FIRM, spring
 from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.results.tables import Results
@@ -97,8 +96,8 @@ def at_rest(
         for pose in found:
             for pressed in (pose, pose.lighter) if any(pose.press) else (pose,):
                 try:
-                    read = open_scene.load(scene, pressed.options(given))
-                    place = stack.enter_context(held(read, starts.get(pose.name)))
+                    start = starts.get(pose.name)
+                    place = stack.enter_context(held(scene, pressed.options(given), start))
                     if any(pose.press) and not place.touches:
                         raise InputFault("it comes off what it touches")
                 except (InputFault, FmuFault) as fault:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.stability import passivity
 from hapticlink.analysis.stability.absolute_stability import lacking, lacking_of_two, least
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.lifted_map import opened
+from hapticlink.analysis.stability.lifted_map import lifted_map
 from hapticlink.analysis.stability.opened_ports import HandPort, MechanismPort
 from hapticlink.analysis.stability.passivity import Passivity
 from hapticlink.analysis.stability.trajectory import trajectory
@@ -97,7 +97,7 @@ def judged(folder: Path, rate: int) -> Passivity:
     port = MechanismPort(
         "mechanism", ((("F", -1.0),),), (place("mechanism", "x"),), (place("mechanism", "v"),)
     )
-    with opened(made) as map_:
+    with lifted_map(made) as map_:
         return passivity.of(
             "two masses", map_, equilibrium(map_, trajectory(map_, 1.0)), hand, port, T
         )
