@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigvals
 from scipy.optimize import minimize_scalar
 
-from hapticlink.analysis.stability.opened_ports import Response
+from hapticlink.analysis.stability.port_response import Response
 from hapticlink.orchestrator.base.arrays import Complex, Matrix
 
 STILL = 1e-9

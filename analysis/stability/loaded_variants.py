@@ -15,7 +15,7 @@ import numpy as np
 from hapticlink.analysis.stability.equilibrium import equilibrium, nearby
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linearisable_scene import linearisable
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.modes import counted, modes, verdict
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.orchestrator.base.arrays import Vector
@@ -44,7 +44,7 @@ class Verdict:
         return float(np.log(max(self.radius, 1e-300))) / self.period
 
 
-class Session:
+class LoadedVariants:
     """Judges variants of `scene`, one after the other; as a context manager it unloads the FMUs."""
 
     def __init__(self, scene: Scene) -> None:
@@ -57,7 +57,7 @@ class Session:
         self._starts: dict[tuple[str, str], tuple[Scalar, float]] = {}
         self.loads = 0
 
-    def __enter__(self) -> Session:
+    def __enter__(self) -> LoadedVariants:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -110,11 +110,11 @@ class Session:
         return True
 
 
-def _verdict(at: Linear, period: float) -> Verdict:
-    found = counted(modes(at, period))
-    if not found:
+def _verdict(linear: Linearisation, period: float) -> Verdict:
+    judged = counted(modes(linear, period))
+    if not judged:
         return Verdict(0.0, 0.0, period)
-    return Verdict(abs(found[0].z), found[0].uncertainty, period)
+    return Verdict(abs(judged[0].z), judged[0].uncertainty, period)
 
 
 def _kind(system: System) -> Hashable:

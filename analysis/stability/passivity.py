@@ -39,8 +39,8 @@ from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_worst
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linearisable_scene import linearisable
-from hapticlink.analysis.stability.linearise import Linear
-from hapticlink.analysis.stability.opened_ports import (
+from hapticlink.analysis.stability.linearisation import Linearisation
+from hapticlink.analysis.stability.port_response import (
     HandPort,
     MechanismPort,
     Response,
@@ -132,7 +132,7 @@ def passivity(scene: str | Path | Scene, options: Options = (), *, at: float = 0
 def of(
     title: str,
     map_: LiftedMap,
-    linear: Linear,
+    linear: Linearisation,
     hand: HandPort,
     mechanism: MechanismPort | None,
     T: float,
@@ -223,7 +223,7 @@ class _UserPort:
 
 def _between(
     map_: LiftedMap,
-    linear: Linear,
+    linear: Linearisation,
     hand: HandPort,
     mechanism: MechanismPort,
     port: _UserPort,

@@ -236,7 +236,8 @@ def alternating(
 
 def _settled(system: System) -> int:
     """Ticks after which frames are taken: so many that lengths, which holds keep beside stamps, are
-    far smaller than those, and slopes of one length are not taken for another (tangent.py)."""
+    far smaller than those, and slopes of one length are not taken for another
+    (forward_sensitivity.py)."""
     return 4 * behind_start(system)
 
 

@@ -21,9 +21,9 @@ import numpy as np
 from hapticlink.analysis.stability.equilibrium import newton_step, rests
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linearisable_scene import linearisable
-from hapticlink.analysis.stability.linearise import Linear, linearised
+from hapticlink.analysis.stability.linearisation import Linearisation, linearised
 from hapticlink.analysis.stability.modes import modes
-from hapticlink.analysis.stability.opened_ports import hand_port, response
+from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.tune.gains import Gains, Scales
 from hapticlink.analysis.tune.spring_hand import FIRM, LEVER
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
@@ -113,7 +113,7 @@ class Held:
         X: Complex = W.conj().T @ (found.C @ np.linalg.solve(left, found.B @ W) + found.D @ W)
         return X
 
-    def _settled(self, scales: Scales, hand: float) -> Linear:
+    def _settled(self, scales: Scales, hand: float) -> Linearisation:
         """The map at rest with these gains, found from `rest`, so that the result does not depend
         on what was asked before."""
         if (scales, hand) != self._set:
@@ -135,12 +135,12 @@ class Held:
         if not rests(self._at):
             raise InputFault("it comes to no rest in a hand that holds it")
 
-    def _linear(self, point: Vector, same: float) -> Linear:
+    def _linear(self, point: Vector, same: float) -> Linearisation:
         """The map along the directions of the first linearisation, whatever the gains. Raises
         InputFault where it is too unstable."""
         V = self._at.V
         image, M, D = self._map.slopes(point, V, same)
-        found = Linear(point, image, V, V.T @ M, V.T @ D)
+        found = Linearisation(point, image, V, V.T @ M, V.T @ D)
         d = found.scales
         if not np.abs(found.A * d / d[:, None]).max() < GROWN:
             raise InputFault("unstable: small motions grow at once")

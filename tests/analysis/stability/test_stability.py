@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.modes import counted, modes, verdict
 from hapticlink.commands import main
 
@@ -54,7 +54,9 @@ def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
 )
 def test_a_mode_that_may_grow_is_counted(A: list[list[float]], error: float, said: str) -> None:
     E = np.diag([error, 0.0])
-    first = counted(modes(Linear(np.zeros(2), np.zeros(2), np.eye(2), np.array(A), E), 1.0))[0]
+    first = counted(modes(Linearisation(np.zeros(2), np.zeros(2), np.eye(2), np.array(A), E), 1.0))[
+        0
+    ]
     assert verdict(abs(first.z), first.uncertainty) == said
 
 

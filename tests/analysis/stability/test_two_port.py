@@ -21,8 +21,8 @@ from hapticlink.analysis.stability.absolute_stability import (
 )
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.lifted_map import lifted_map
-from hapticlink.analysis.stability.opened_ports import HandPort, MechanismPort
 from hapticlink.analysis.stability.passivity import Passivity
+from hapticlink.analysis.stability.port_response import HandPort, MechanismPort
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build

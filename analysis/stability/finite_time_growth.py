@@ -2,10 +2,10 @@
 
     g = ln sigma_max(D^-1 A D)/t,   A = d z(t_0 + t)/d z(t_0)
 
-by the perturbations that a run carries with it (tangent.py); D are the scales that balance A, rows
-as large as columns, so that g does not depend on units. It says by how much the worst perturbation
-grows in that time, and nothing of what comes after: a stable system may grow at first, and an
-unstable one shrink.
+by the perturbations that a run carries with it (forward_sensitivity.py); D are the scales that
+balance A, rows as large as columns, so that g does not depend on units. It says by how much the
+worst perturbation grows in that time, and nothing of what comes after: a stable system may grow at
+first, and an unstable one shrink.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from hapticlink.analysis.stability.lifted_map import behind_start, lifted_map, long_enough
 from hapticlink.analysis.stability.linearisable_scene import linearisable
-from hapticlink.analysis.stability.linearise import linearised
+from hapticlink.analysis.stability.linearisation import linearised
 from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import Options

@@ -11,12 +11,12 @@ import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.equilibrium_location import Whereabouts, whereabouts
+from hapticlink.analysis.stability.equilibrium_location import EquilibriumLocation, location
+from hapticlink.analysis.stability.forward_sensitivity import KINK
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.mode_frequency import traced
 from hapticlink.analysis.stability.modes import NEAR, Mode, counted, leading, modes, verdict
-from hapticlink.analysis.stability.tangent import KINK
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.orchestrator import open_scene
@@ -52,7 +52,7 @@ class Stability:
     frozen: tuple[str, ...]
     kinks: tuple[str, ...]
     linearised: dict[str, str]
-    where: Whereabouts
+    where: EquilibriumLocation
 
     @property
     def growth(self) -> float:
@@ -148,30 +148,30 @@ def at_rest(scene: Scene, whole: System, at: float, seconds: float) -> Stability
     with lifted_map(long_enough(scene, system, at), at, scene) as map_:
         run = trajectory(map_, seconds)
         linear = equilibrium(map_, run)
-        where = whereabouts(scene, map_, linear, run)
+        where = location(scene, map_, linear, run)
         frozen = [*removed, *frozen_nonlinearities.kept(system)]
         return _result(scene.title, map_, linear, frozen, where)
 
 
 def _result(
-    title: str, map_: LiftedMap, at: Linear, lines: list[str], where: Whereabouts
+    title: str, map_: LiftedMap, linear: Linearisation, lines: list[str], where: EquilibriumLocation
 ) -> Stability:
-    found = [mode for mode in modes(at, map_.period) if abs(mode.z) > LOST]
-    neutral = [mode for mode in found if mode.neutral]
-    others = [mode for mode in found if not mode.neutral]
-    names = tuple(str(map_.coordinates[i]) for i in at.taken)
-    kinked = np.abs(at.V[:, at.kink > KINK]).max(axis=1, initial=0.0)
+    all_modes = [mode for mode in modes(linear, map_.period) if abs(mode.z) > LOST]
+    neutral = [mode for mode in all_modes if mode.neutral]
+    others = [mode for mode in all_modes if not mode.neutral]
+    names = tuple(str(map_.coordinates[i]) for i in linear.taken)
+    kinked = np.abs(linear.V[:, linear.kink > KINK]).max(axis=1, initial=0.0)
     kinks = tuple(str(c) for c, share in zip(map_.coordinates, kinked, strict=True) if share)
-    first = next(iter(counted(found)), None)
+    first = next(iter(counted(all_modes)), None)
     return Stability(
         title=title,
         period=map_.period,
         radius=abs(first.z) if first else 0.0,
         uncertainty=first.uncertainty if first else 0.0,
-        modes=tuple(traced(map_, at, mode) for mode in others[:SHOWN]),
+        modes=tuple(traced(map_, linear, mode) for mode in others[:SHOWN]),
         neutral=tuple(neutral),
         names=names,
-        equilibrium={n: float(at.point[i]) for n, i in zip(names, at.taken, strict=True)},
+        equilibrium={n: float(linear.point[i]) for n, i in zip(names, linear.taken, strict=True)},
         frozen=tuple(lines),
         kinks=kinks,
         linearised=map_.ways(),
