@@ -305,7 +305,10 @@ static inline double tick_time(const Loop *l, int64_t tick) { /* s */
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-enum { WARNING = 1 }; /* of FMI: a status up to it is a success */
+/* Of FMI: ok (0) and warning (1) are a success, and no other number is; status.py. */
+static inline int fmu_succeeded(int status) {
+    return status == 0 || status == 1;
+}
 
 int loop_carry_out(Loop *l, int64_t tick, At *at);
 int fmu_get(const Fmu *f, int64_t judged, At *at);
