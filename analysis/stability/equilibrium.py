@@ -146,7 +146,7 @@ def _nearer(map_: LiftedMap, linear: Linearisation, step: Vector) -> Vector:
 
 def _why_none(map_: LiftedMap, nearest: Linearisation | None, run: Trajectory, swings: bool) -> str:
     remedy = (
-        "the map is linearised around a state of rest: take a hand that holds the mechanism, "
+        "the lifted map is linearised around an equilibrium: take a hand that holds the mechanism, "
         "such as an arm or a spring, gains with which it comes to rest, and no wrench, drive or "
         "target that changes with time"
     )

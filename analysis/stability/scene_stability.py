@@ -104,7 +104,7 @@ class Stability:
         neutral = "neutral modes"
         if self.neutral:
             most = max(min(mode.uncertainty, NEAR) for mode in self.neutral) / self.period
-            neutral += f", of which growth up to {most:.2g} 1/s cannot be told from none"
+            neutral += f", of which growth up to {most:.2g} 1/s cannot be distinguished from none"
         for title, found in (("modes", self.modes), (neutral, self.neutral)):
             if found:
                 yield f"{title}: growth rate (1/s), frequency (Hz), damping ratio, participation"
@@ -116,8 +116,8 @@ class Stability:
             yield "frozen:"
             yield from (f"  {line}" for line in self.frozen)
         if self.kinks:
-            yield "the map has two slopes at the equilibrium, so that the verdict is only of their"
-            yield f"mean, in: {', '.join(self.kinks)}"
+            yield "the lifted map has two slopes at the equilibrium, so that the verdict is only of"
+            yield f"their mean, in: {', '.join(self.kinks)}"
 
 
 def stability(

@@ -1,9 +1,9 @@
 """A scene at its equilibrium in a pose, in a hand: its lifted map under changed gains, and its
 compliance.
 
-With the hand cut off (stability/port_response.py), the poses x of the handle at the N haptic periods
-T of a hyperperiod answer to its stacked wrenches u by z' = A z + B u, x = C z + D u. The wrench
-n exp(i w kT), held over each period, moves it at w by
+With the hand cut off (stability/port_response.py), the poses x of the handle at the N haptic
+periods T of a hyperperiod answer to its stacked wrenches u by z' = A z + B u, x = C z + D u. The
+wrench n exp(i w kT), held over each period, moves it at w by
 
     z = (exp(i w NT) - A)^-1 B W n,   X n = W' (C z + D W n),   W_k = exp(i w kT)/sqrt(N)
 
