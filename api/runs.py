@@ -23,7 +23,6 @@ from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_axes
-from hapticlink.visualization.figures import figure_process
 
 MOST = 2**30
 """Bytes of tables that a run in a folder reads back; as numbers they take half of that."""
@@ -137,7 +136,9 @@ def _explained(ended: Experiment) -> list[str]:
 
 def _drawn(ended: Experiment, found: Results) -> list[str]:
     """Writes the figures; returns their names. Raises Interrupted and OSError."""
-    return figure_axes.write(figure_process.pngs(found), ended.folder)
+    from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
+
+    return figure_axes.write(run_figures.pngs(found), ended.folder)
 
 
 def load(folder: str | Path) -> Run:
