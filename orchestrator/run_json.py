@@ -136,7 +136,7 @@ def _friction_speeds(scene: Scene, system: System) -> dict[str, float]:
 
 
 def _compilers(scene: Scene) -> tuple[str, ...]:
-    return ("ziglang",) if scene.packaging == "native" and blocks(scene) else ()
+    return ("ziglang",) if scene.packaging == "native" and blocks(scene).built else ()
 
 
 def _seeds(scene: Scene, system: System) -> dict[str, int]:

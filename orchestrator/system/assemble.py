@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.base.loop_names import HAND
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import described
-from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
+from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
@@ -24,7 +24,9 @@ from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
-def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> System:
+def from_scene(
+    scene: Scene, blocks: Blocks, timeline: Timeline, files: Mapping[str, Path]
+) -> System:
     """The system of `scene`; `files` are the FMU files of its blocks, by name.
 
     Raises SceneFault with every finding: FMUs that cannot be read or used, connections and holds
@@ -32,13 +34,13 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     """
     problems: list[Problem] = []
     of = timeline.of
-    blocks = replacements.replaced(scene)
-    ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in loop_blocks(scene))
+    replaced = replacements.replaced(blocks.replaced)
+    ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in blocks.own)
     foreign = (
         Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
-        for fmu, description, starts in fmu_tables.fmus(scene, files, blocks, problems)
+        for fmu, description, starts in fmu_tables.fmus(scene, files, replaced, problems)
     )
-    order = {name: i for i, name in enumerate(loop_names(scene))}
+    order = {b.name: i for i, b in enumerate(blocks.loop)}
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
     fmus = tuple(
         with_sizes(replace(u, isolate=u.isolate or scene.isolate), timeline) for u in every
@@ -48,7 +50,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     rules = rules_of(scene, fmus, connections)
     assigned, refused = assign(fmus, connections, timeline, rules)
     problems += checks.unfit(scene, fmus, assigned, refused, rules.springs)
-    problems += checks.step_sizes(scene, fmus, timeline)
+    problems += checks.step_sizes(fmus, timeline)
     problems += checks.iterated(scene, fmus, assigned)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(fmus, condition):
@@ -71,7 +73,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         refused,
         rules.springs,
         haptic_loop.energy_in_play(scene),
-        replacements.replacements(blocks, haptic_loop.rows(scene), fmus, assigned),
+        replacements.replacements(replaced, haptic_loop.rows(scene), fmus, assigned),
         written,
         scene.record.every,
     )

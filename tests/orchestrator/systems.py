@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.connections import connect
-from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
+from hapticlink.orchestrator.system.system import Connection, Fmu, Refused, System
+
+
+def system_of(scene: object, *options: str) -> System:
+    """The system of a scene, by its name or path. Its FMU files need not exist any more."""
+    with built(open_scene.load(str(scene), options)) as system:
+        return system
 
 
 def connected(
