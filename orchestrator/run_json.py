@@ -48,9 +48,11 @@ def holds(system: System) -> dict[str, Any]:
         },
         "held_as": {c.name: c.kind for c in held if c.kind},
         "latencies": {c.name: asdict(c.latency) for c in held if c.latency},
-        "substeps": {u.name: system.substeps.get(u.name, 1) for u in system.fmus if not u.sampled},
+        "substeps": {
+            u.name: system.coupling.substeps.get(u.name, 1) for u in system.fmus if not u.sampled
+        },
         "within_a_step": within_a_step(system),
-        "get_after_set": list(system.get_after_set),
+        "get_after_set": list(system.coupling.get_after_set),
         "power_across_rates": power_across_rates(system),
     }
 
@@ -58,7 +60,7 @@ def holds(system: System) -> dict[str, Any]:
 def within_a_step(system: System) -> dict[str, str]:
     """For each hold that varies within a step, how its plant takes it."""
     return {
-        c.name: _taken(held_polynomials.order(system, c), system.substeps.get(c.target, 1))
+        c.name: _taken(held_polynomials.order(system, c), system.coupling.substeps.get(c.target, 1))
         for c in system.connections
         if held_polynomials.degree(system, c)
     }
@@ -78,7 +80,7 @@ def power_across_rates(system: System) -> list[str]:
     return [
         c.name
         for c in system.connections
-        if carries_power(c, system.power)
+        if carries_power(c, system.energy.power)
         and system.fmu[c.source].clock != system.fmu[c.target].clock
     ]
 
@@ -117,7 +119,7 @@ def _story(scene: Scene, plan: Plan, tables: Iterable[str]) -> dict[str, Any]:
             for u in system.fmus
         },
         "friction_speeds": _friction_speeds(scene, system),
-        "coupling": system.coupling,
+        "coupling": system.coupling.scheme,
         "loops": [asdict(loop) for loop in plan.loops()],
         "connections": [c.name for c in system.connections],
         "replaced": {name: asdict(r) for name, r in system.replacements.items()},

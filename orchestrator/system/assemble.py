@@ -21,7 +21,14 @@ from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import connect, whole
 from hapticlink.orchestrator.system.recorded import recorded
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
-from hapticlink.orchestrator.system.system import Connection, Fmu, System
+from hapticlink.orchestrator.system.system import (
+    Connection,
+    Coupling,
+    EnergyPorts,
+    Fmu,
+    Recording,
+    System,
+)
 
 
 def from_scene(
@@ -62,20 +69,19 @@ def from_scene(
         fmus,
         assigned,
         timeline,
-        scene.coupling,
+        Coupling(
+            scene.coupling,
+            scene.iteration,
+            scene.step_control,
+            scene.substeps,
+            (*scene.get_after_set, *_read_again(scene, ours)),
+        ),
         condition,
         scene.faults,
-        rules.power,
-        scene.substeps,
-        (*scene.get_after_set, *_read_again(scene, ours)),
-        scene.iteration,
-        scene.step_control,
+        EnergyPorts(rules.power, rules.springs, haptic_loop.energy_in_play(scene)),
+        Recording(written, scene.record.every),
         refused,
-        rules.springs,
-        haptic_loop.energy_in_play(scene),
         replacements.replacements(replaced, haptic_loop.rows(scene), fmus, assigned),
-        written,
-        scene.record.every,
     )
 
 

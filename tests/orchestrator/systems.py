@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.ticks import Timeline
@@ -18,6 +19,11 @@ def system_of(scene: object, *options: str) -> System:
     """The system of a scene, by its name or path. Its FMU files need not exist any more."""
     with built(open_scene.load(str(scene), options)) as system:
         return system
+
+
+def with_coupling(system: System, **settings: object) -> System:
+    """The system with other settings of its coupling."""
+    return replace(system, coupling=replace(system.coupling, **settings))  # type: ignore[arg-type]
 
 
 def connected(

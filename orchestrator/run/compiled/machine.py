@@ -50,7 +50,7 @@ def too_long(simulation: Simulation) -> str:
     """Why the times of a run are not exact in the compiled loop, "" where they are."""
     timeline, parts = (
         simulation.system.timeline,
-        max(simulation.system.substeps.values(), default=1),
+        max(simulation.system.coupling.substeps.values(), default=1),
     )
     base, last = timeline.base, timeline.end + max(c.longest for c in timeline.clocks)
     if max(last * parts * base.numerator, base.denominator * parts) < EXACT:
@@ -90,7 +90,9 @@ class Machine:
 
     def _make_holds(self) -> None:
         simulation, system = self._simulation, self._simulation.system
-        rolls_back = system.coupling == "iterated" or system.step_control is not None
+        rolls_back = (
+            system.coupling.scheme == "iterated" or system.coupling.step_control is not None
+        )
         shared = tanks(simulation.holds.values(), rolls_back)
         for name, hold in simulation.holds.items():
             own = parts(hold).own

@@ -235,10 +235,10 @@ def test_two_of_each_block_keep_what_their_ports_mean(tmp_path: Path) -> None:
         assert {kinds.pop(m) for m in ("Lambda_inv", "M")} == {"semidefinite"}
         assert kinds.pop("P_c") == "projector"
         assert set(kinds.values()) == {None}
-    power = {p.effort: (p.displacement, p.sign) for p in made.power}
+    power = {p.effort: (p.displacement, p.sign) for p in made.energy.power}
     assert power["left_mechanism.F_drift"] == ("left_mechanism.x", -1.0)
     assert power["right_device.F_motor"] == ("right_device.x_true", 1.0)
-    gains = {s.set_position: (s.position, s.stiffness, s.damping) for s in made.springs}
+    gains = {s.set_position: (s.position, s.stiffness, s.damping) for s in made.energy.springs}
     damping = (20.0, 20.0, 0.02)
     assert gains == {
         "left_control.x_S": ("left_control.x_D", (100.0, 100.0, 0.1), damping),
