@@ -69,10 +69,12 @@ def _columns(system: System) -> dict[str, list[str]]:
 
 def _left_out(every: System, system: System) -> list[str]:
     """The outputs `fmu.port` of which an entry is not written."""
-    if system.recorded is None:
+    if system.recording.outputs is None:
         return []
     outputs = ((u.name, s) for u in every.fmus for s in u.description.outputs)
-    left_out = (f"{u}.{s.port}" for u, s in outputs if f"{u}.{s.name}" not in system.recorded)
+    left_out = (
+        f"{u}.{s.port}" for u, s in outputs if f"{u}.{s.name}" not in system.recording.outputs
+    )
     return [*dict.fromkeys(left_out)]
 
 
