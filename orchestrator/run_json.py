@@ -9,6 +9,7 @@ from typing import Any
 
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.base import plugins
+from hapticlink.orchestrator.base.loop_names import MECHANISM
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal
@@ -19,7 +20,6 @@ from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import held_polynomials
-from hapticlink.orchestrator.system.haptic_loop import MECHANISM
 from hapticlink.orchestrator.system.ports import carries_power
 from hapticlink.orchestrator.system.system import System
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
+from hapticlink.orchestrator.base.loop_names import JOINT_RATES
 from hapticlink.orchestrator.results.tables import Results
 
-RATES = "virtual_mechanism.qd"
 BOUND = 0.1
 
 
@@ -30,10 +30,10 @@ def coarse(results: Results) -> Iterator[str]:
     if not linkage or not speeds:
         return
     units = [(j["name"], unit) for j in linkage["joint"] for unit in COORDINATE_UNITS[j["type"]]]
-    table = of_block(results, RATES, len(units))
+    table = of_block(results, JOINT_RATES, len(units))
     if not table or not len(table["time"]):
         return
-    for (name, unit), rate in zip(units, table[RATES].T, strict=True):
+    for (name, unit), rate in zip(units, table[JOINT_RATES].T, strict=True):
         speed = speeds.get(name, 0.0)
         if (error := _turns(rate, speed) * speed) > BOUND * (most := np.abs(rate).max()):
             yield (

@@ -9,13 +9,19 @@ from typing import Any
 
 from hapticlink.analysis.findings.episodes import Episode, saturations
 from hapticlink.analysis.findings.port_blocks import meters
-from hapticlink.analysis.findings.tracking import of_block, of_user
+from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.control import Passivity
+from hapticlink.orchestrator.base.loop_names import (
+    CONTROLLER,
+    MEASURED_HANDLE_POSE,
+    PASSIVITY_DAMPING,
+    block_of_user,
+    signal_of_user,
+    user_of_block,
+)
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results
-
-HANDLE, DAMPING = "haptic_device.x", "controller.passivity_damping"
 
 
 def lines(results: Results) -> Iterator[str]:
@@ -36,7 +42,7 @@ def lines(results: Results) -> Iterator[str]:
                 f"warning: {name} is {short(1e3 * age)} ms old: the passivity controller pairs "
                 "its force with the motion of that time, and does not bound its energy"
             )
-    driven = [name for name in guarded if name.startswith("controller")]
+    driven = [name for name in guarded if user_of_block(name, CONTROLLER) is not None]
     for name, spans in groupby(saturations(results) if driven else (), key=_controller):
         if name in driven:
             seconds = sum(span.end - span.begin for span in spans)
@@ -57,7 +63,7 @@ def _guarded(run: Mapping[str, Any]) -> list[str]:
         for fmu in run["scene"].get("fmu", ())
         if fmu.get("block") == "virtual_wall" and fmu.get("settings", {}).get("passivity")
     ]
-    return [*(f"controller_{user}" if user else "controller" for user in _laws(run)), *walls]
+    return [*(block_of_user(CONTROLLER, user) for user in _laws(run)), *walls]
 
 
 def _laws(run: Mapping[str, Any]) -> dict[str, Passivity]:
@@ -75,11 +81,11 @@ def _counts(results: Results) -> Iterator[str]:
 
     run, devices = results.run, all_devices(results)
     for user, law in _laws(run).items():
-        handle = of_user(HANDLE, user)
+        handle = signal_of_user(MEASURED_HANDLE_POSE, user)
         table, device = of_block(results, handle, 3), devices.get(user)
         if table is None or device is None or not len(table["time"]):
             continue
-        acted = of_block(results, damping := of_user(DAMPING, user))
+        acted = of_block(results, damping := signal_of_user(PASSIVITY_DAMPING, user))
         if acted and not acted[damping].any():
             continue
         period = run["clocks"][run["fmus"][handle.partition(".")[0]]["rate"]]["longest"]
@@ -96,7 +102,7 @@ def _counts(results: Results) -> Iterator[str]:
 def _controller(saturated: Episode) -> str:
     """The controller of the motors that were at their limit, by the user's name."""
     user = saturated.said.partition(": ")[2]
-    return f"controller_{user}" if user else "controller"
+    return block_of_user(CONTROLLER, user)
 
 
 def _is_one(port: str, fmus: Collection[str], names: tuple[str, ...]) -> bool:

@@ -34,10 +34,15 @@ import numpy as np
 
 from hapticlink.analysis.findings.sample_arrivals import known_from
 from hapticlink.analysis.findings.tracking import of_block, poses, table_of
+from hapticlink.orchestrator.base.loop_names import (
+    DRIFT_WRENCH,
+    ENVIRONMENT_WRENCH,
+    MECHANISM,
+    MOTOR_WRENCH,
+    TOPOLOGY_WRENCH,
+    signal_of_user,
+)
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-
-BLOCK, CONTROLLER, HAND = "virtual_mechanism", "controller", "hand.F"
-CONTACT = f"{BLOCK}.F_env"
 
 
 class User(NamedTuple):
@@ -55,17 +60,15 @@ class User(NamedTuple):
 
 def user(name: str = "") -> User:
     """The signals of the user at a further point; the first user's name is empty."""
-    controller = f"{CONTROLLER}_{name}" if name else CONTROLLER
-    inputs = f"{BLOCK}.{name}." if name else f"{BLOCK}."
     point, handle = poses(name)
     return User(
         point,
         handle,
-        drift=f"{controller}.F_drift",
-        topology=f"{controller}.F_constraint",
-        motors=f"{controller}.F_motor",
-        contact=f"{inputs}F_env",
-        inputs=inputs,
+        drift=signal_of_user(DRIFT_WRENCH, name),
+        topology=signal_of_user(TOPOLOGY_WRENCH, name),
+        motors=signal_of_user(MOTOR_WRENCH, name),
+        contact=signal_of_user(ENVIRONMENT_WRENCH, name),
+        inputs=signal_of_user(f"{MECHANISM}.", name),
     )
 
 

@@ -12,27 +12,36 @@ from hapticlink.analysis.findings import friction_speed
 from hapticlink.analysis.findings.deadlines import finding
 from hapticlink.analysis.findings.forces import WRENCHES, all_wrenches
 from hapticlink.analysis.findings.tracking import (
-    BRANCH,
-    COUNTS,
-    DEVICE,
     folded,
     further_users,
     has_tracking,
     of_block,
-    of_user,
     pose_error,
 )
-from hapticlink.analysis.findings.tracking import MECHANISM as TRACKED
-from hapticlink.analysis.findings.user_port import ENERGY, HAND, pushed_by_others
+from hapticlink.analysis.findings.user_port import pushed_by_others
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
+from hapticlink.orchestrator.base.loop_names import (
+    CLOSURE_ERROR,
+    CONSTRAINT_COUNTS,
+    CONTACT_GAP,
+    COPY_BRANCH_OK,
+    HAND,
+    HAND_WRENCH,
+    HANDLE_POSE,
+    JOINT_COORDINATES,
+    JOINT_RATES,
+    MECHANISM,
+    MECHANISM_ENERGY,
+    MECHANISM_STOPS,
+    MOTOR_WRENCH,
+    POINT_POSE,
+    WORKSPACE_MARGIN,
+    signal_of_user,
+    user_of_block,
+)
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene.start_pose import outside
-
-MECHANISM = "virtual_mechanism"
-MARGIN = "haptic_device.workspace_margin"
-CLOSURE = "virtual_mechanism.closure_error"
-STOPS = "virtual_mechanism.stops"
 
 
 def ending(results: Results) -> str:
@@ -65,7 +74,7 @@ def numbers(results: Results) -> Iterator[str]:
             f"handle of {user} at most {short(further.distance_mm.max())} mm from its point; "
             f"turned from it by at most {short(further.angle_rad.max())} rad"
         )
-        margin = f"haptic_device_{user}.workspace_margin"
+        margin = signal_of_user(WORKSPACE_MARGIN, user)
         table = of_block(results, margin)
         if table and table[margin].min() < 0:
             yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
@@ -87,9 +96,9 @@ def numbers(results: Results) -> Iterator[str]:
             f"held {name} generated at most {short(1e3 * energy['peak'])} mJ at a time, "
             f"{short(1e3 * energy['generated'])} mJ in the end"
         )
-    table = of_block(results, CLOSURE)
+    table = of_block(results, CLOSURE_ERROR)
     if table and len(table["time"]):
-        yield f"loops close within {table[CLOSURE].max():.2g} m"
+        yield f"loops close within {table[CLOSURE_ERROR].max():.2g} m"
 
 
 def _saturated(results: Results) -> Iterator[str]:
@@ -164,13 +173,13 @@ def _passivity(results: Results) -> Iterator[str]:
 def _stopped(results: Results) -> Iterator[str]:
     """A line if the passive midpoint method had to stop the mechanism, and one if contacts change
     its energy between steps."""
-    table = of_block(results, STOPS)
+    table = of_block(results, MECHANISM_STOPS)
     if table and (results.run["scene"]["contacts"] or {}).get("detection") == "graphics":
         yield (
             "passive-midpoint makes no energy within a step, but each new frame of contacts may "
             "change it: take contacts.detection = 'haptics'"
         )
-    if table and len(table["time"]) and (stops := int(table[STOPS][-1])):
+    if table and len(table["time"]) and (stops := int(table[MECHANISM_STOPS][-1])):
         yield (
             f"warning: virtual_mechanism was stopped in {stops} steps, which its energy did not "
             "allow: take more mechanism.substeps or a higher rate"
@@ -201,24 +210,26 @@ NOTHING = 1e-9
 """Energy (J) that is not worth a line."""
 
 USED = {
-    "tracking": (TRACKED, DEVICE),
-    "drawing of the mechanism": ("virtual_mechanism.q",),
-    "forces": (*WRENCHES, "controller.F_motor"),
-    "constrained directions": COUNTS,
-    "closure": (CLOSURE,),
-    "folded frames": (BRANCH,),
-    "depth of contacts": ("virtual_mechanism.contact_gap",),
-    "friction": (friction_speed.RATES,),
-    "energy at the user's port": (HAND, DEVICE, ENERGY),
+    "tracking": (POINT_POSE, HANDLE_POSE),
+    "drawing of the mechanism": (JOINT_COORDINATES,),
+    "forces": (*WRENCHES, MOTOR_WRENCH),
+    "constrained directions": CONSTRAINT_COUNTS,
+    "closure": (CLOSURE_ERROR,),
+    "folded frames": (COPY_BRANCH_OK,),
+    "depth of contacts": (CONTACT_GAP,),
+    "friction": (JOINT_RATES,),
+    "energy at the user's port": (HAND_WRENCH, HANDLE_POSE, MECHANISM_ENERGY),
 }
 """The signals of what a run tells and draws."""
 
 
 def unrecorded(left_out: Collection[str], fmus: Iterable[str] = ()) -> Iterator[str]:
     """A line if what a run of these FMUs tells and draws misses signals that are not recorded."""
-    users = ["", *(name.removeprefix("hand_") for name in fmus if name.startswith("hand_"))]
+    users = ["", *(user for name in fmus if (user := user_of_block(name, HAND)))]
     missing = {
-        what: [s for user in users for name in names if (s := of_user(name, user)) in left_out]
+        what: [
+            s for user in users for name in names if (s := signal_of_user(name, user)) in left_out
+        ]
         for what, names in USED.items()
     }
     said = [f"{what} ({', '.join(signals)})" for what, signals in missing.items() if signals]
@@ -253,16 +264,21 @@ def replaced(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _start(results: Results) -> Iterator[str]:
-    device = of_block(results, MARGIN)
-    if device and of_block(results, DEVICE, 3) and len(device["time"]) and device[MARGIN][0] < 0:
-        yield f"warning: {outside(device[DEVICE][0], device[MARGIN][0])}"
+    device = of_block(results, WORKSPACE_MARGIN)
+    if (
+        device
+        and of_block(results, HANDLE_POSE, 3)
+        and len(device["time"])
+        and device[WORKSPACE_MARGIN][0] < 0
+    ):
+        yield f"warning: {outside(device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0])}"
     linkage = results.run["scene"]["linkage"]
     if not linkage:
         return
     size = sum(len(COORDINATE_UNITS[joint["type"]]) for joint in linkage["joint"])
-    table = of_block(results, f"{MECHANISM}.q", size)
+    table = of_block(results, JOINT_COORDINATES, size)
     if table and len(table["time"]):
-        yield from moved(linkage, table[f"{MECHANISM}.q"][0])
+        yield from moved(linkage, table[JOINT_COORDINATES][0])
 
 
 def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:

@@ -19,6 +19,7 @@ from hapticlink.analysis.sweep.row import Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins, temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.loop_names import JOINT_RATES, POINT_VELOCITY
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -28,7 +29,7 @@ SPANS = 8.0
 """Time constants of the leading mode over which the growth rate of a run is taken."""
 SHORTEST, LONGEST = 2.0, 30.0
 """Times (s) of a run, the longer one that of its verdict."""
-MOVING = ("virtual_mechanism.qd", "virtual_mechanism.v")
+MOVING = (JOINT_RATES, POINT_VELOCITY)
 GONE = 1e-9
 """Velocity, relative to the largest of the run, that is taken for rest."""
 

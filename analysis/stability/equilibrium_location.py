@@ -14,8 +14,8 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
 from hapticlink.analysis.stability.linearise import Linear
 from hapticlink.analysis.stability.trajectory import TOLERANCE, Trajectory, relative
 from hapticlink.components.contact.depth import depths
+from hapticlink.orchestrator.base.loop_names import MECHANISM
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.haptic_loop import MECHANISM
 
 THERE = 1e-3
 """Distance of a state and input of an FMU, relative to max(1, |z|), within which a run is there."""

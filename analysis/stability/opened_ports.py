@@ -27,6 +27,7 @@ from hapticlink.analysis.stability.linearise import Linear
 from hapticlink.analysis.stability.state_vector import SIGNALS
 from hapticlink.analysis.stability.tangent import Columns, Instruction
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.loop_names import HAND, MECHANISM
 from hapticlink.orchestrator.plan.operations import Get, Set, Step
 from hapticlink.orchestrator.run.energy.bonds import bond
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -72,7 +73,7 @@ def hand_port(system: System) -> HandPort:
     """Raises InputFault where no hand pushes on an FMU."""
     signals = SignalVector(system)
     for c in system.connections:
-        found = bond(c, system, signals) if system.block(c.source) == "hand" else None
+        found = bond(c, system, signals) if system.block(c.source) == HAND else None
         if found:
             inputs = tuple(c.inputs[i].name for i in found.entries)
             forces = tuple(found.of(signals.sources(c)))
@@ -84,7 +85,7 @@ def mechanism_port(system: System, hand: HandPort) -> MechanismPort | None:
     """The port of the virtual mechanism, at which the coupling acts; None where the hand holds the
     mechanism itself."""
     signals = SignalVector(system)
-    fmu = next((f.name for f in system.fmus if system.block(f.name) == "virtual_mechanism"), None)
+    fmu = next((f.name for f in system.fmus if system.block(f.name) == MECHANISM), None)
     if fmu is None or fmu == hand.handle:
         return None
     bonds = [(c, b) for c in system.into(fmu) if (b := bond(c, system, signals))]

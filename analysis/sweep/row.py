@@ -17,6 +17,7 @@ from hapticlink.analysis.findings.tracking import (
     pose_error,
 )
 from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.orchestrator.base.loop_names import CLOSURE_ERROR
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.tables import Results, Vector
 
@@ -40,7 +41,7 @@ def measure(experiment: Experiment) -> Row:
         "end_time_s": outcome.end_time,
         "message": _line(str(outcome.fault)) if outcome.fault else "",
         **_tracking(results),
-        **_largest(results, "closure_max_m", "virtual_mechanism.closure_error"),
+        **_largest(results, "closure_max_m", CLOSURE_ERROR),
         **_switches(results),
         **_folded(results),
         **_port(results),

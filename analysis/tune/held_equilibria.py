@@ -28,6 +28,12 @@ from hapticlink.analysis.stability.opened_ports import hand_port, response
 from hapticlink.analysis.tune.gains import Gains, Scales
 from hapticlink.analysis.tune.spring_hand import FIRM, LEVER
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import (
+    ENVIRONMENT_WRENCH,
+    HAND,
+    HAND_WRENCH,
+    HANDLE_POSE,
+)
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.scene import Scene
@@ -36,8 +42,6 @@ from hapticlink.orchestrator.system.built import built
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-DEVICE, HAND = "haptic_device", "hand"
-CONTACT = "virtual_mechanism.F_env"
 SOFT = 0.25
 """Scale of the scene's gains with which rest is looked for where they throw the handle off."""
 STEPS = 12
@@ -78,7 +82,7 @@ class Held:
     @property
     def touches(self) -> bool:
         """Whether a contact force acts at rest."""
-        return bool(self.signal(CONTACT).any())
+        return bool(self.signal(ENVIRONMENT_WRENCH).any())
 
     def stable(self, scales: Scales, hand: float) -> bool:
         """Whether no mode grows, neutral ones aside, with gains scaled by `scales` in a spring hand
@@ -124,7 +128,7 @@ class Held:
             self._set = {}, 0.0  # until all is done
             self._at = self._linear(self._home.point, NEARBY)
             self._rest(NEARBY)
-            if self.touches and not self._at.image[self._places(CONTACT)].any():
+            if self.touches and not self._at.image[self._places(ENVIRONMENT_WRENCH)].any():
                 raise InputFault("it comes off what it touches")
             self._set = dict(scales), hand
         return self._at
@@ -151,7 +155,7 @@ class Held:
 
     def _held(self, stiffness: float) -> Iterator[tuple[str, Scalar, float]]:
         """The hand's stiffness, the target moved so that it presses as before."""
-        x, F = self.signal(f"{DEVICE}.x_true"), self.signal(f"{HAND}.F")
+        x, F = self.signal(HANDLE_POSE), self.signal(HAND_WRENCH)
         scalars = self._map.system.fmu[HAND].description.scalars
         named = {s.name: s for s in scalars if s.causality == "parameter"}
         for i, stiff in enumerate((stiffness, stiffness, stiffness * LEVER)):

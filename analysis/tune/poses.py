@@ -10,17 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import MECHANISM, table_of
-from hapticlink.analysis.tune.held_equilibria import CONTACT, Held, Vector, held
+from hapticlink.analysis.findings.tracking import table_of
+from hapticlink.analysis.tune.held_equilibria import Held, Vector, held
 from hapticlink.analysis.tune.spring_hand import FIRM, spring
 from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import (
+    ENVIRONMENT_WRENCH,
+    JOINT_COORDINATES,
+    POINT_POSE,
+)
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
 
-JOINTS = "virtual_mechanism.q"
 LIGHT = 0.25
 """The force (N) with which a hand presses where that of the run slides off, as from a corner or a
 disc along the spring that the coupling is."""
@@ -59,11 +63,13 @@ class Pose:
 def poses(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     """Of a run, `count` evenly spaced ones from its start on, and the one in contact as the last
     one if there was any. Raises InputFault where the poses are not recorded."""
-    table = table_of(run, MECHANISM)
-    if table is None or JOINTS not in table or not len(table["time"]):
-        raise InputFault(f"{MECHANISM} and {JOINTS} are not recorded: no poses of a run")
-    times, points, joints = table["time"], table[MECHANISM], table[JOINTS]
-    force = table[CONTACT] if CONTACT in table else np.zeros((len(times), 3))
+    table = table_of(run, POINT_POSE)
+    if table is None or JOINT_COORDINATES not in table or not len(table["time"]):
+        raise InputFault(
+            f"{POINT_POSE} and {JOINT_COORDINATES} are not recorded: no poses of a run"
+        )
+    times, points, joints = table["time"], table[POINT_POSE], table[JOINT_COORDINATES]
+    force = table[ENVIRONMENT_WRENCH] if ENVIRONMENT_WRENCH in table else np.zeros((len(times), 3))
     moments = [int(i * len(times) / count) for i in range(count)]
     size = np.hypot(force[:, 0], force[:, 1])
     touching = np.flatnonzero(size)

@@ -12,6 +12,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
+from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import Delay, delays
 from hapticlink.orchestrator.results.run_folder import RunFolder
@@ -27,7 +28,6 @@ from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, kinds
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.run.step_check import StepErrors
 from hapticlink.orchestrator.run.step_control import Steps
-from hapticlink.orchestrator.system.haptic_loop import WORKSPACE
 
 Progress = Callable[[float], None]
 PAUSE = 0.02
@@ -161,7 +161,7 @@ def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
     if (
         outcome.reason == "stop_when"
         and condition
-        and (system.block(condition.fmu), condition.variable) == WORKSPACE
+        and f"{system.block(condition.fmu)}.{condition.variable}" == WORKSPACE_MARGIN
         and (why := unstable(system, outcome.energies))
     ):
         what = f"left its workspace, and {why}: the loop is unstable"

@@ -8,6 +8,14 @@ from typing import Any
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.linkage import GraphicsCopy
+from hapticlink.orchestrator.base.loop_names import (
+    CONTROLLER,
+    DEVICE,
+    ENVIRONMENT,
+    HAND,
+    MECHANISM,
+    block_of_user,
+)
 from hapticlink.orchestrator.scene.rates import AnyRate
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -63,22 +71,22 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
         scene = unskipped(scene)
     found = []
     if scene.hand:
-        found.append(BlockPlan("hand", "haptics", {"hand": scene.hand}))
+        found.append(BlockPlan(HAND, "haptics", {"hand": scene.hand}))
     for name, hand in scene.hands.items():
-        found.append(BlockPlan(f"hand_{name}", "haptics", {"hand": hand}, "hand"))
+        found.append(BlockPlan(block_of_user(HAND, name), "haptics", {"hand": hand}, HAND))
     if scene.controller:
         settings = settings_of(scene, "controller", "directions", "linkage")
         if others(scene):
             settings["controller"] = replace(scene.controller, contact=True)
-        found.append(BlockPlan("controller", "haptics", settings))
+        found.append(BlockPlan(CONTROLLER, "haptics", settings))
     for name, controller in scene.users.items():
         felt = replace(controller, contact=True)
         settings = {**settings_of(scene, "directions", "linkage"), "controller": felt}
-        found.append(BlockPlan(f"controller_{name}", "haptics", settings, "controller"))
+        found.append(BlockPlan(block_of_user(CONTROLLER, name), "haptics", settings, CONTROLLER))
     if scene.device:
-        found.append(BlockPlan("haptic_device", "haptics", {"device": scene.device}))
+        found.append(BlockPlan(DEVICE, "haptics", {"device": scene.device}))
     for name, device in scene.devices.items():
-        plan = BlockPlan(f"haptic_device_{name}", "haptics", {"device": device}, "haptic_device")
+        plan = BlockPlan(block_of_user(DEVICE, name), "haptics", {"device": device}, DEVICE)
         found.append(plan)
     if scene.linkage:
         settings = {"linkage": scene.linkage, "mechanism": scene.mechanism}
@@ -94,7 +102,7 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
             settings["length_scale"] = scene.directions.length_scale
         if scene.local_model:
             settings["local_model"] = True
-        found.append(BlockPlan("virtual_mechanism", scene.mechanism_at, settings))
+        found.append(BlockPlan(MECHANISM, scene.mechanism_at, settings))
     if scene.linkage and scene.graphics and (graphics_block(scene) or not skip):
         names = (f.name for f in fields(GraphicsCopy))
         copy = GraphicsCopy(**{name: getattr(scene.graphics, name) for name in names})
@@ -110,7 +118,7 @@ def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
         }
         if scene.devices:
             settings["users"] = tuple(scene.devices)
-        found.append(BlockPlan("virtual_environment", "graphics", settings))
+        found.append(BlockPlan(ENVIRONMENT, "graphics", settings))
     return tuple(found)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach
 from hapticlink.components.linkage.closures import rows
+from hapticlink.orchestrator.base.loop_names import ENVIRONMENT
 from hapticlink.orchestrator.scene.blocks import graphics_block, impedance, topology
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -44,7 +45,7 @@ def needs(scene: Scene) -> Iterator[Need]:
     )
     reasons = graphics_block(scene)
     yield Need(
-        "virtual_environment",
+        ENVIRONMENT,
         bool(reasons and scene.graphics),
         f"for {', '.join(reasons)}" if reasons else "nothing depends on it",
     )

@@ -26,6 +26,7 @@ from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand,
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.faults import Finding
+from hapticlink.orchestrator.base.loop_names import DEVICE, WORKSPACE_MARGIN
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
@@ -208,8 +209,8 @@ class Scene:
     def ends_when(self) -> str:
         """The condition that ends the run, its default included; "" where there is none."""
         if self.stop_when is None:
-            own = self.device and all(f.replaces != "haptic_device" for f in self.fmu)
-            return "haptic_device.workspace_margin < 0" if own else ""
+            own = self.device and all(f.replaces != DEVICE for f in self.fmu)
+            return f"{WORKSPACE_MARGIN} < 0" if own else ""
         return self.stop_when
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.loop_names import HAND
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import described
 from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
@@ -79,7 +80,7 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
 def _read_again(scene: Scene, ours: Iterable[Fmu]) -> Iterator[str]:
     """The hands that are plants, in iterated coupling: their force depends directly on the handle,
     and errs to order 1 unless it is read with the inputs at the end of the step."""
-    hands = [u.name for u in ours if u.description.block == "hand" and not u.sampled]
+    hands = [u.name for u in ours if u.description.block == HAND and not u.sampled]
     if scene.coupling == "iterated":
         yield from (name for name in hands if name not in scene.get_after_set)
 

@@ -11,7 +11,6 @@ import numpy as np
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.forces import all_wrenches, torques
 from hapticlink.analysis.findings.tracking import (
-    MECHANISM,
     constrained,
     folded,
     further_users,
@@ -21,6 +20,7 @@ from hapticlink.analysis.findings.tracking import (
 )
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator.base.loop_names import CLOSURE_ERROR, POINT_POSE
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.scene_part import scene_part
 from hapticlink.orchestrator.results.tables import Results
@@ -101,8 +101,8 @@ def _did(run: Results, until: float) -> Iterator[tuple[str, str]]:
     if device and (driven := torques(run, device)) and len(driven[0]):
         used = np.abs(driven[1][driven[0] <= until + 1e-12]).max(initial=0.0)
         yield "motors, largest share of their torque (%)", short(100 * used / device.torque_limit)
-    if (table := of_block(run, summary.CLOSURE)) and len(table["time"]):
-        closure = table[summary.CLOSURE][table["time"] <= until + 1e-12]
+    if (table := of_block(run, CLOSURE_ERROR)) and len(table["time"]):
+        closure = table[CLOSURE_ERROR][table["time"] <= until + 1e-12]
         yield "closure error, largest (m)", f"{closure.max(initial=0.0):.2g}"
     if (counted := constrained(run)) and len(counted[0]["time"]):
         count = counted[0][counted[1]][counted[0]["time"] <= until + 1e-12]
@@ -158,7 +158,7 @@ def _timing(run: Results) -> Iterator[tuple[str, str]]:
 def _apart(runs: Sequence[Results]) -> list[Row]:
     """The largest distance (mm) of the operational point from that of the first run at the same
     times, until the first end; none where a run has no such point, or another mechanism."""
-    tables = [of_block(run, MECHANISM, 3) for run in runs]
+    tables = [of_block(run, POINT_POSE, 3) for run in runs]
     if len(runs) < 2 or not one_mechanism(runs) or not all(t and len(t["time"]) for t in tables):
         return []
     first, *others = [t for t in tables if t]
@@ -166,7 +166,7 @@ def _apart(runs: Sequence[Results]) -> list[Row]:
     time = time[time <= min(t["time"][-1] for t in (first, *others))]
     found = [NONE]
     for table in others:
-        x = [np.interp(time, table["time"], table[MECHANISM][:, i]) for i in (0, 1)]
-        away = np.array(x) - first[MECHANISM][: len(time), :2].T
+        x = [np.interp(time, table["time"], table[POINT_POSE][:, i]) for i in (0, 1)]
+        away = np.array(x) - first[POINT_POSE][: len(time), :2].T
         found.append(short(1e3 * float(np.hypot(*away).max())))
     return [Row("operational point from that of the first run, largest (mm)", tuple(found))]

@@ -21,15 +21,16 @@ from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.loop_names import JOINT_COORDINATES, POINT_POSE
 from hapticlink.orchestrator.results.checked_run import load_whole
 from hapticlink.orchestrator.results.scene_part import by_user, scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-from hapticlink.visualization.live.frames import of_user, shown
+from hapticlink.visualization.live.frames import shown, shown_of_user
 from hapticlink.visualization.mechanism.picture import PORT, Picture
 
 PLACES = ("q", "x", "handle")
 """What a frame cannot be drawn without, of each user."""
-NEEDED = ("virtual_mechanism.q", "virtual_mechanism.x")
+NEEDED = (JOINT_COORDINATES, POINT_POSE)
 MOST = 4000
 """Frames of a run; of longer ones every second, third, ... sample is shown."""
 DIGITS = 7
@@ -148,7 +149,7 @@ def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
     found, missing = dict[str, str](), list[str]()
     asked = shown()
     for user in further_users(results):
-        asked |= {f"{user}.{key}": names for key, names in of_user(user).items()}
+        asked |= {f"{user}.{key}": names for key, names in shown_of_user(user).items()}
     for key, names in asked.items():
         for name in names:
             if name in left_out:

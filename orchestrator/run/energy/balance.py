@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hapticlink.orchestrator.base.faults import Diverged
+from hapticlink.orchestrator.base.loop_names import CONTROLLER, MECHANISM
 from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.haptic_loop import CONTROLLER, MECHANISM
 from hapticlink.orchestrator.system.system import System
 
 LEAST = 1e-6
