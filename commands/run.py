@@ -111,4 +111,4 @@ def _lines(made: Run, warned: Sequence[str], name: str, folder: Path) -> Iterato
         names = sorted(made.run["files"], key=lambda name: not name.endswith(TABLES))
         yield f"  {folder}/: {', '.join(names)}"
     else:
-        yield f"  {folder}/ is unchanged: the run has no row"
+        yield f"  nothing written to {folder}/: the run failed before its first sample"

@@ -76,6 +76,7 @@ def _left_out(every: System, system: System) -> list[str]:
     return [*dict.fromkeys(left_out)]
 
 
+@interrupt.held()
 def simulate(
     scene: str | Path | Scene,
     folder: Path | str,
@@ -91,19 +92,7 @@ def simulate(
     earlier run in `folder` are removed once the first rows of this one are written. Without `csv`
     the tables stay in the binary form in which a run writes them.
     """
-    with interrupt.held():
-        return _simulated(scene, Path(folder), options, progress, csv, real_time)
-
-
-def _simulated(
-    scene: str | Path | Scene,
-    folder: Path,
-    options: Options,
-    progress: Progress | None,
-    csv: bool,
-    real_time: RealTimeRun | None,
-) -> Experiment:
-    begin = perf_counter()
+    begin, folder = perf_counter(), Path(folder)
     read = open_scene.load(scene, options)
     with built(read) as every:
         system = with_fetched(every)

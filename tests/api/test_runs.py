@@ -50,7 +50,7 @@ def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
 def test_tables_too_large_are_not_read_back_and_that_is_told(
     bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("hapticlink.api.runs.MOST", 1000)
+    monkeypatch.setattr("hapticlink.api.runs.MAX_TABLE_BYTES", 1000)
     assert status("run", bar, "--out", tmp_path / "out") == 0
     assert "tables of more than 1000 bytes are not read back and drawn" in caplog.text
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"haptics.csv", "run.json"}
