@@ -16,14 +16,13 @@ from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import folders, tables
+from hapticlink.orchestrator.results import folder_lock, folders, tables
 from hapticlink.orchestrator.results.record import content
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_axes
-from hapticlink.visualization.figures import figure_process
 
 MAX_TABLE_BYTES = 2**30
 """Larger tables of a run in a folder are not read back; as numbers they take half of that."""
@@ -55,10 +54,10 @@ def run(
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
     (docs/real-time.md).
 
-    Raises InputFault for invalid input, before anything runs. A fault during the run raises no
-    exception: it is the `fault` of the returned Run, which has the results up to then. Ctrl-C
-    raises RunInterrupted, with the results so far as its `run`. Tables of more than 1 GiB in `out`
-    are not read back; use `load` for them.
+    Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
+    A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
+    results up to then. Ctrl-C raises RunInterrupted, with the results so far as its `run`. Tables
+    of more than 1 GiB in `out` are not read back; use `load` for them.
     """
     read = open_scene.load(scene, options)
     return run_paced(read, out, RealTimeRun() if real_time else None, figures, progress)
@@ -77,7 +76,8 @@ def run_paced(
     if out is None:
         ended = _in_memory(scene, progress, real_time, tables)
     else:
-        ended = _in_folder(scene, Path(out), progress, figures, real_time)
+        with folder_lock.held(Path(out)):
+            ended = _in_folder(scene, Path(out), progress, figures, real_time)
     if interrupt.came() or ended.record.end.reason == "interrupted":
         raise RunInterrupted(ended)
     return ended
@@ -146,7 +146,9 @@ def _explained(ended: Experiment) -> list[str]:
 
 def _drawn(ended: Experiment, results: Results) -> list[str]:
     """Writes the figures; returns their names. Raises Interrupted and OSError."""
-    return figure_axes.write(figure_process.pngs(results), ended.folder)
+    from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
+
+    return figure_axes.write(run_figures.pngs(results), ended.folder)
 
 
 def load(folder: str | Path) -> Run:

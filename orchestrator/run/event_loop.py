@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -25,6 +26,7 @@ from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, kinds
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
+from hapticlink.orchestrator.system.system import System
 
 Progress = Callable[[float], None]
 PAUSE = 0.02
@@ -81,13 +83,21 @@ def run(
         # Non-finite values are detected by 0 x NaN, for which numpy would warn.
         with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
             interrupt.check()
+            library, why = _library(plan.system)
+            if real_time and not library:
+                raise Fault(f"a run in real time needs the compiled loop: {why}")
             simulation = Simulation(plan.system, results, stack)
             if real_time:
                 stack.enter_context(real_time.of(plan, simulation))
-            loop = _loop(plan, simulation)
+            loop = (
+                CompiledLoop(plan, simulation, library)
+                if library
+                else PythonLoop(plan, simulation, {"everything": why})
+            )
             simulation.start()
             if real_time:
-                loop.prepare(kinds(plan))
+                assert isinstance(loop, CompiledLoop)
+                loop.events.prepare(kinds(plan))
                 stack.enter_context(real_time.pace.undisturbed())
             begin = shown = perf_counter()
 
@@ -95,7 +105,7 @@ def run(
                 nonlocal shown
                 time = plan.system.timeline.seconds(tick)
                 interrupt.check(time)
-                if real_time:
+                if real_time and isinstance(loop, CompiledLoop):
                     real_time.turn(loop)
                 if progress and perf_counter() - shown > PAUSE:
                     shown = perf_counter()
@@ -130,8 +140,8 @@ def run(
         if simulation:
             outcome.end_time = results.last
             outcome.details = _details(plan, simulation, loop, real_time)
-            if outcome.fault is None and (why := _judged(outcome, simulation)):
-                outcome.reason, outcome.fault = "diverged", why
+            if outcome.fault is None and (diverged := _judged(outcome, simulation)):
+                outcome.reason, outcome.fault = "diverged", diverged
     if progress:
         progress(outcome.end_time)
     return outcome
@@ -185,12 +195,11 @@ def _reason(fault: Fault) -> str:
     return next((reason for kind, reason in ends.items() if isinstance(fault, kind)), "fault")
 
 
-def _loop(plan: Plan, simulation: Simulation) -> PythonLoop:
-    """The compiled loop, or the one in Python where there is none."""
-    why = too_long(simulation)
-    if not why:
-        try:
-            return CompiledLoop(plan, simulation, load())
-        except Unavailable as reason:
-            why = str(reason)
-    return PythonLoop(plan, simulation, {"everything": why})
+def _library(system: System) -> tuple[ctypes.CDLL | None, str]:
+    """The compiled loop; None where it cannot run the system, with the reason."""
+    if why := too_long(system):
+        return None, why
+    try:
+        return load(), ""
+    except Unavailable as reason:
+        return None, str(reason)

@@ -34,8 +34,8 @@ class Advancer:
         calls: Callable[[Part], Sequence[Call]],
     ) -> None:
         system, signals = simulation.system, simulation.signals
-        assert system.step_control is not None
-        self._settings = settings = system.step_control
+        assert system.coupling.step_control is not None
+        self._settings = settings = system.coupling.step_control
         self._clock, self._values, self._meters = clock, signals.values, simulation.meters
         self._calls, self._seconds = calls, system.timeline.seconds
         base, longest = system.timeline.base, system.timeline.clock(clock).longest

@@ -5,7 +5,7 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -99,13 +99,10 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     return found
 
 
-def warm_up() -> None:
-    """Draws a figure that nobody sees: the first one takes longest, as it loads fonts."""
-    ended = Results(None, {"end": {"reason": "duration"}}, {})
-    figure, axes = titled(ended, "0", "0", "0")
-    axes.plot([0, 1], label="0")
-    figure_axes.legend_below(figure)
-    png(figure)
+def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
+    """Name and PNG of each figure of a run, each drawn when it is asked for."""
+    for name, draw in drawings(results).items():
+        yield name, png(draw())
 
 
 def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:

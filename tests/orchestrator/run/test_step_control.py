@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,9 +19,10 @@ from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.run.event_loop import Outcome
 from hapticlink.orchestrator.run.step_control import rounded
 from hapticlink.orchestrator.scene.records import StepControl
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import EnergyPorts, System
 from tests.orchestrator.coupled import POWER, ROWS, described, error, simulate, system
 from tests.orchestrator.native_mass import held
+from tests.orchestrator.systems import with_coupling
 from tests.shared_fixtures import clock
 
 Fmus = Mapping[str, Description]
@@ -165,23 +167,20 @@ def test_the_values_of_a_run_taken_back_leave_no_trace(fmus: Fmus, tmp_path: Pat
 
 def test_ecco_needs_power_energy_and_extrapolation(fmus: Fmus) -> None:
     made = controlled(fmus, ecco(1e-4))
-    for change, remedy in (
-        ({"power": ()}, r"\[\[power\]\]"),
-        ({"step_control": StepControl(method="ecco", tolerance=1.0, min=1e-3)}, "give energy"),
-        ({"coupling": "gauss-seidel-plants"}, "interpolates"),
+    without = StepControl(method="ecco", tolerance=1.0, min=1e-3)
+    for changed, remedy in (
+        (replace(made, energy=EnergyPorts()), r"\[\[power\]\]"),
+        (with_coupling(made, step_control=without), "give energy"),
+        (with_coupling(made, scheme="gauss-seidel-plants"), "interpolates"),
     ):
         with pytest.raises(InputFault, match=remedy):
-            list(delays(Plan(System(**{**vars_of(made), **change}))))  # type: ignore[arg-type]
+            delays(Plan(changed))
 
 
 def test_there_must_be_something_to_control(fmus: Fmus) -> None:
     made = controlled(fmus, doubling(0.1))
     with pytest.raises(InputFault, match="there are none"):
-        list(delays(Plan(System(**{**vars_of(made), "connections": ()}))))  # type: ignore[arg-type]
-
-
-def vars_of(made: System) -> dict[str, object]:
-    return {name: getattr(made, name) for name in made.__dataclass_fields__}
+        delays(Plan(replace(made, connections=())))
 
 
 @given(st.floats(0, 1e9))
