@@ -22,9 +22,7 @@ def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
     try:
         from dask.distributed import Client, wait
     except ImportError:
-        raise InputFault(
-            "--scheduler needs Dask; pip install '.[distributed]' in the checkout"
-        ) from None
+        raise InputFault("--scheduler needs Dask: pip install 'dask[distributed]'") from None
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as error:

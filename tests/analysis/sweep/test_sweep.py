@@ -489,7 +489,7 @@ def test_without_dask_the_scheduler_says_what_to_install(
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
     arguments = ("--vary", "duration=0.1", "--out", tmp_path / "out", "--scheduler", "tcp://a:1")
     assert status("sweep", bar, *arguments) == 2
-    assert "pip install '.[distributed]'" in capsys.readouterr().err
+    assert "pip install 'dask[distributed]'" in capsys.readouterr().err
 
 
 def test_a_cluster_makes_the_same_table(bar: Path, tmp_path: Path, in_this_process: None) -> None:
