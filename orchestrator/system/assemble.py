@@ -68,7 +68,6 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         scene.substeps,
         (*scene.get_after_set, *_read_again(scene, ours)),
         scene.iteration,
-        scene.step_control,
         refused,
         rules.springs,
         haptic_loop.energy_in_play(scene),

@@ -17,7 +17,6 @@ from hapticlink.orchestrator.scene.records import (
     Latency,
     PowerPort,
     SetSpring,
-    StepControl,
 )
 
 
@@ -102,7 +101,6 @@ class System:
     substeps: Mapping[str, int] = field(default_factory=dict)
     get_after_set: tuple[str, ...] = ()
     iteration: Iteration = field(default_factory=Iteration)
-    step_control: StepControl | None = None
     refused: tuple[Refused, ...] = ()
     springs: tuple[SetSpring, ...] = ()
     energy_in_play: float | None = None

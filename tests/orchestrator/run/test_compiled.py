@@ -14,7 +14,7 @@ import pytest
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
-from hapticlink.orchestrator.scene.records import Iteration, StepControl
+from hapticlink.orchestrator.scene.records import Iteration
 from tests.orchestrator import coupled
 from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
 from tests.orchestrator.native_mass import held
@@ -187,14 +187,9 @@ def test_every_status_of_a_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 
 
 ITERATED = {"iteration": Iteration(method="newton", tolerance=1e-10), "between": "hermite"}
-DOUBLING = StepControl(method="doubling", tolerance=0.01, min="1/50000")
-ECCO = StepControl(method="ecco", tolerance=1e-4, min="1/50000", energy=100.0)
 REPEATED: dict[str, tuple[str, dict[str, Any]]] = {
     "Newton": ("iterated", ITERATED),
     "Aitken, substeps": ("iterated", {"between": "foh", "substeps": 2}),
-    "doubling": ("jacobi", {"step_control": DOUBLING, "hold": "foh"}),
-    "doubling, iterated": ("iterated", {"step_control": DOUBLING, "between": "foh"}),
-    "ecco": ("gauss-seidel", {"step_control": ECCO, "hold": "smooth"}),
 }
 
 
@@ -202,10 +197,9 @@ REPEATED: dict[str, tuple[str, dict[str, Any]]] = {
 def test_steps_that_are_taken_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
 ) -> None:
-    """The two-mass oscillator, iterated or in steps of controlled size."""
+    """The two-mass oscillator, iterated."""
     coupling, settings = REPEATED[how]
     fmus = held(tmp_path)
-    base = Fraction(1, 50000) if "step_control" in settings else None
     found = []
     for choice in ("python", "compiled"):
         monkeypatch.setenv(CHOICE, choice)
@@ -215,7 +209,6 @@ def test_steps_that_are_taken_back(
             coupling,
             Fraction(1, 50),
             Fraction(1, 2),
-            base=base,
             get_after_set=("one", "two"),
             power=coupled.POWER,
             **settings,
