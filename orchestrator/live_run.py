@@ -265,10 +265,10 @@ class LiveRun:
         """The connection with another hold or latency."""
         system = self._simulation.system
         new = held_by(c, hold, delay)
-        why = misfit(new.hold or "", new, system.fmu, system.power, False)
-        if system.coupling == "iterated":
+        why = misfit(new.hold or "", new, system.fmu, system.energy.power, False)
+        if system.coupling.scheme == "iterated":
             why = "steps are repeated"
-        spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.springs)
+        spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
         on_force = spring and any(
             HOLDS[d.hold].needs == "spring" for d in system.connections if d.hold
         )

@@ -47,7 +47,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
             for u in system.fmus
         },
         friction_speeds=_friction_speeds(scene, system),
-        coupling=system.coupling,
+        coupling=system.coupling.scheme,
         loops=list(plan.loops()),
         connections=[c.name for c in system.connections],
         replaced=dict(system.replacements),
@@ -57,15 +57,17 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         },
         held_as={c.name: c.kind for c in held if c.kind},
         latencies={c.name: c.latency for c in held if c.latency},
-        substeps={u.name: system.substeps.get(u.name, 1) for u in system.fmus if not u.sampled},
+        substeps={
+            u.name: system.coupling.substeps.get(u.name, 1) for u in system.fmus if not u.sampled
+        },
         within_a_step={
             c.name: _within_a_step(
-                held_polynomials.order(system, c), system.substeps.get(c.target, 1)
+                held_polynomials.order(system, c), system.coupling.substeps.get(c.target, 1)
             )
             for c in system.connections
             if held_polynomials.degree(system, c)
         },
-        get_after_set=list(system.get_after_set),
+        get_after_set=list(system.coupling.get_after_set),
         power_across_rates=power_across_rates(system),
         not_recorded=not_recorded,
     )
@@ -93,7 +95,7 @@ def _friction_speeds(scene: Scene, system: System) -> dict[str, float]:
 
 
 def _compilers(scene: Scene) -> tuple[str, ...]:
-    return ("ziglang",) if scene.packaging == "native" and blocks(scene) else ()
+    return ("ziglang",) if scene.packaging == "native" and blocks(scene).built else ()
 
 
 def _seeds(scene: Scene, system: System) -> dict[str, int]:

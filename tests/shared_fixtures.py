@@ -15,7 +15,7 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
 
 
@@ -111,7 +111,7 @@ def stamped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Timeline, str
             Fmu(n, d, timeline.of.get(n, "graphics" if n == "graphics" else "haptics"))
             for n, d in described.items()
         )
-        return System(units, connected(units, ROWS, timeline)[0], timeline, coupling)
+        return System(units, connected(units, ROWS, timeline)[0], timeline, Coupling(coupling))
 
     return make
 

@@ -252,9 +252,9 @@ def lifted_map(system: System, at: float = 0.0, scene: Scene | None = None) -> I
                 f"delays of {c.name}: latency and loss are random, so that no two periods are "
                 "alike; the map needs a constant latency"
             )
-    tolerance = min(system.iteration.tolerance, CONVERGED)
-    exactly = replace(system.iteration, method="newton", tolerance=tolerance)
-    system = replace(system, iteration=exactly)
+    tolerance = min(system.coupling.iteration.tolerance, CONVERGED)
+    exactly = replace(system.coupling.iteration, method="newton", tolerance=tolerance)
+    system = replace(system, coupling=replace(system.coupling, iteration=exactly))
     with (
         temporary_folders.room() as room,
         RunFolder(room) as results,

@@ -51,10 +51,10 @@ class RunLimit:
     where that fails."""
 
     def __init__(self, run: Results) -> None:
-        self._end = tracking(run)[0][-1]
+        self._end = Measures(run).tracking[""].end_s
         self._distance = TRACKED * motion(run)["distance"]
         if not np.isfinite(self._distance):
-            raise InputFault(f"the scene's own run fails: {run.run['fault']}")
+            raise InputFault(f"the scene's own run fails: {run.record.fault}")
 
     def motion(self, run: Results) -> dict[str, float]:
         """The `motion` of a run. Raises InputFault where it fails, ends early, or the handle leaves

@@ -48,7 +48,7 @@ class Plan:
         """The operations of a kind of event in the order of the coupling scheme. Raises InputFault
         for a scheme of a plugin that gives anything else."""
         if kind not in self._blocks:
-            coupling = self.system.coupling
+            coupling = self.system.coupling.scheme
             block = SCHEMES[coupling].block(self.system, kind)
             if not isinstance(block, tuple) or not all(isinstance(op, Operation) for op in block):
                 what = shortened(repr(block))
@@ -67,11 +67,13 @@ class Plan:
         left = [u.name for u in self.system.fmus if u.clock in going and u.name not in stepped]
         left += [f"the rows of {f.clock}" for f in event.firings if f.clock not in recorded]
         if left:
-            raise InputFault(f"coupling = {self.system.coupling!r} leaves out {', '.join(left)}")
+            raise InputFault(
+                f"coupling = {self.system.coupling.scheme!r} leaves out {', '.join(left)}"
+            )
 
     def loops(self) -> tuple[AlgebraicLoop, ...]:
         """The algebraic loops among FMUs that the scheme puts in an order, in that order."""
-        ordered = SCHEMES[self.system.coupling].ordered(self.system)
+        ordered = SCHEMES[self.system.coupling.scheme].ordered(self.system)
         return tuple(dependency_order.loops(self.system, ordered))
 
     def unrolled(self, event: Event) -> Iterator[Operation]:

@@ -55,7 +55,7 @@ class FixedPoint:
     ) -> None:
         system, signals = simulation.system, simulation.signals
         self._guess, self._body, self._again = calls
-        self._settings: Iteration = system.iteration
+        self._settings: Iteration = system.coupling.iteration
         self._signals, self._meters, self._dticks = signals, simulation.meters, operation.dticks
         self.counts = Iterations()
         self._seconds = system.timeline.seconds
@@ -157,9 +157,9 @@ def _constant(c: Connection, system: System) -> bool:
     """Whether the target's input is constant over its step and linear in the guess, and its outputs
     are those after the step."""
     return (
-        system.substeps.get(c.target, 1) == 1
+        system.coupling.substeps.get(c.target, 1) == 1
         and held_polynomials.order(system, c) == 0
-        and c.target not in system.get_after_set
+        and c.target not in system.coupling.get_after_set
         and c.latency is None
         and c.kind in (None, "table")
     )

@@ -51,7 +51,7 @@ class Simulation:
         self.isolated = isolated(system.fmus)
         self.instances = opened(system, self.signals, self.isolated, stack)
         stack.callback(self._dismiss)
-        repeated = system.coupling == "iterated"
+        repeated = system.coupling.scheme == "iterated"
         self.step_checks = {
             fmu.name: StepCheck(self.instances[fmu.name])
             for fmu in (() if repeated else system.fmus)
@@ -92,14 +92,14 @@ class Simulation:
             if derived := self._derived(incoming):
                 derive = self.instances[fmu.name].connect_derivatives
                 self.derivative_setters[fmu.name] = derive(*derived)
-            if fmu.name in self.system.get_after_set:
+            if fmu.name in self.system.coupling.get_after_set:
                 sources = [p for c in incoming for p in self.signals.sources(c)]
                 self.now_setters[fmu.name] = connect(scalars, sources)
         for clock in self.system.timeline.clocks:
             recorded = self.signals.recorded(clock.name)
             columns = None if recorded is None else [*recorded]
             places = [] if recorded is None else [*recorded.values()]
-            every = self.system.every
+            every = self.system.recording.every
             made = self._results.recorder(clock.name, columns, values, places, every)
             self.recorders[clock.name] = self._stack.enter_context(made)
             for fmu in self.system.fmus:

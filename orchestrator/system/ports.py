@@ -36,7 +36,7 @@ def power_across_rates(system: System) -> list[str]:
     return [
         c.name
         for c in system.connections
-        if carries_power(c, system.power)
+        if carries_power(c, system.energy.power)
         and system.fmu[c.source].clock != system.fmu[c.target].clock
     ]
 

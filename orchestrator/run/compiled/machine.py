@@ -49,7 +49,7 @@ PATIENCE = 20_000_000
 
 def too_long(system: System) -> str:
     """Why the times of a run are not exact in the compiled loop, "" where they are."""
-    timeline, parts = system.timeline, max(system.substeps.values(), default=1)
+    timeline, parts = system.timeline, max(system.coupling.substeps.values(), default=1)
     base, last = timeline.base, timeline.end + max(c.longest for c in timeline.clocks)
     if max(last * parts * base.numerator, base.denominator * parts) < EXACT:
         return ""
@@ -88,7 +88,7 @@ class Machine:
 
     def _make_holds(self) -> None:
         simulation, system = self._simulation, self._simulation.system
-        repeats = system.coupling == "iterated"
+        repeats = system.coupling.scheme == "iterated"
         shared = tanks(simulation.holds.values(), repeats)
         for name, hold in simulation.holds.items():
             own = parts(hold).own

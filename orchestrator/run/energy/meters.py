@@ -19,7 +19,7 @@ class Meters:
         self.of_source: dict[str, list[str]] = {}
         self.of_target: dict[str, list[str]] = {}
         self._seconds = float(system.timeline.base)
-        self.shares = {name: 1.0 / parts for name, parts in system.substeps.items()}
+        self.shares = {name: 1.0 / parts for name, parts in system.coupling.substeps.items()}
         for c in system.connections:
             found = bond(c, system, signals)
             if found is None:

@@ -21,6 +21,7 @@ from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.compiled import compiled
 from tests.orchestrator.coupled import ROWS, simulate, system
 from tests.orchestrator.native_mass import FLAGS, native
+from tests.orchestrator.systems import with_coupling
 
 STEP, WRONG, FAILING = 1.0, 2.0, 3.0
 """What an FMU offers: derivatives of its step, others, or an error."""
@@ -78,8 +79,8 @@ def test_where_the_jacobian_is_not_that_of_a_step_differences_are_taken(tmp_path
     """Substeps, and feed-through read after the step with other inputs."""
     made = iterated(tmp_path, STEP, "foh")
     for other in (
-        replace(made, substeps={"one": 1, "two": 2}),
-        replace(made, get_after_set=("two",)),
+        with_coupling(made, substeps={"one": 1, "two": 2}),
+        with_coupling(made, get_after_set=("two",)),
     ):
         outcome, table = solved(other, tmp_path)
         assert outcome.details.iterations is not None
