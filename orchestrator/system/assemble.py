@@ -73,7 +73,6 @@ def from_scene(
         Coupling(
             scene.coupling,
             scene.iteration,
-            scene.step_control,
             scene.substeps,
             (*scene.get_after_set, *_read_again(scene, ours)),
         ),

@@ -34,7 +34,7 @@ def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
     given = clocks(scene, planned)
     exactly = [p for p in given.paces.values() if not p.on_ticks]
     spans = [span for p in exactly for span in (_period(p), p.first or _period(p))]
-    base = common_base([*spans, *([exact(scene.step_control.min)] if scene.step_control else [])])
+    base = common_base(spans)
     a_tick = int(haptic / base)
     found = []
     for name, pace in given.paces.items():
