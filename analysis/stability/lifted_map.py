@@ -249,7 +249,7 @@ def lifted_map(system: System, at: float = 0.0, scene: Scene | None = None) -> I
     Raises InputFault where there is none: adaptive step sizes, rates and latencies that vary, an
     FMU whose state cannot be read.
     """
-    if system.step_control:
+    if system.coupling.step_control:
         raise InputFault("step_control adapts the steps to the state: the map needs fixed ones")
     for c in system.connections:
         if c.latency and (c.latency.loss or c.latency.max not in (None, c.latency.min)):
@@ -257,9 +257,9 @@ def lifted_map(system: System, at: float = 0.0, scene: Scene | None = None) -> I
                 f"delays of {c.name}: latency and loss are random, so that no two periods are "
                 "alike; the map needs a constant latency"
             )
-    tolerance = min(system.iteration.tolerance, CONVERGED)
-    exactly = replace(system.iteration, method="newton", tolerance=tolerance)
-    system = replace(system, iteration=exactly)
+    tolerance = min(system.coupling.iteration.tolerance, CONVERGED)
+    exactly = replace(system.coupling.iteration, method="newton", tolerance=tolerance)
+    system = replace(system, coupling=replace(system.coupling, iteration=exactly))
     with (
         temporary_folders.room() as room,
         RunFolder(room) as results,

@@ -122,7 +122,7 @@ def _kind(system: System) -> Hashable:
     time = system.timeline
     paces = tuple((c.name, c.first, c.longest, c.shortest, len(c.starts)) for c in time.clocks)
     fmus = tuple((f.name, f.description.guid, f.clock) for f in system.fmus)
-    return time.base, paces, fmus, tuple(map(repr, system.connections)), system.coupling
+    return time.base, paces, fmus, tuple(map(repr, system.connections)), system.coupling.scheme
 
 
 def _starts(system: System) -> dict[tuple[str, str], tuple[Scalar, float]]:

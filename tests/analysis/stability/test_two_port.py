@@ -28,7 +28,7 @@ from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.run.test_multirate import F, V, X
 from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed
@@ -92,7 +92,7 @@ def judged(folder: Path, rate: int) -> Passivity:
     rows = [(f"device.{s}", f"{to}.{s}") for s in "xv" for to in ("hand", "coupling")]
     rows += [("mechanism.x", "coupling.x_l"), ("mechanism.v", "coupling.v_l")]
     rows += [("coupling.F", "device.F"), ("coupling.F", "mechanism.F"), ("hand.F", "device.F_h")]
-    made = System(fmus, connected(fmus, rows, timeline)[0], timeline, "gauss-seidel")
+    made = System(fmus, connected(fmus, rows, timeline)[0], timeline, Coupling("gauss-seidel"))
     place = SignalVector(made).scalar
     hand = HandPort(
         "hand", "device", ("F_h",), (place("hand", "F"),),

@@ -33,7 +33,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed
 
@@ -160,7 +160,7 @@ def system(
         unit("linkage", linkage, "graphics"),
     )
     connections = connected(units, [*FAST, *ROWS[linkage]], timeline)[0]
-    return System(units, connections, timeline, "gauss-seidel")
+    return System(units, connections, timeline, Coupling("gauss-seidel"))
 
 
 @pytest.mark.parametrize(
