@@ -101,8 +101,8 @@ def test_baumgarte_is_stable_up_to_its_limit_off_the_closures(share: float, verd
     found = hl.stability("five-bar", options)
     assert found.verdict == verdict
     assert len(found.neutral) >= 2  # it moves freely
-    said = "growth up to 0.051 1/s cannot be distinguished from none"
-    assert any(said in line for line in found.lines())
+    line = "growth up to 0.051 1/s cannot be distinguished from none"
+    assert any(line in text for text in found.lines())
 
 
 @pytest.mark.parametrize(("start", "at", "pull"), [(0.1, 0.0, 50.0), (1.0, 0.95, 1.0)])
@@ -373,7 +373,7 @@ def held_by_spring() -> tuple[dict[str, Any], float]:
     """A spring hand that holds `closed-loop-direct`, and its spectral radius with zoh."""
     hand = {"type": "spring", "stiffness": [300.0, 300.0, 1.0], "damping": [5.0, 5.0, 0.01]}
     target = [[0.0, 0.0445, 0.0148, -0.7878]]
-    options = {"graphics.rate": 128, "hand": hand | {"target": target}}
+    options = {"graphics.rate": 64, "hand": hand | {"target": target}}
     return options, hl.stability("closed-loop-direct", options).radius
 
 
