@@ -50,6 +50,11 @@ except Unavailable:
     LOOPS = ["python"]
 
 
+needs_compiled_loop = pytest.mark.skipif(
+    "compiled" not in LOOPS, reason="there is no compiled loop here"
+)
+
+
 @pytest.fixture(params=LOOPS)
 def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """The event loop of the test's runs."""

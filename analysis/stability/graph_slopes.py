@@ -19,16 +19,14 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.one_pass import one_pass
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 FUNCTIONS, ABOUT = "resources/functions.casadi.json", "resources/component.json"
 KEPT = 32
 """Graphs that a process keeps, as many as FMUs."""

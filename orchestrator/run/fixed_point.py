@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.plan.operations import Repeat
+from hapticlink.orchestrator.results.record import Iterations
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.jacobians import Through
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -19,21 +19,6 @@ from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.ports import beside
 from hapticlink.orchestrator.system.system import Connection, System
-
-
-@dataclass
-class Iterations:
-    """Counts of a run's fixed-point iterations: steps that were iterated, iterations and rollbacks
-    in all, the most iterations of a step, Jacobians evaluated by differences and by directional
-    derivatives, and steps that did not converge."""
-
-    steps: int = 0
-    iterations: int = 0
-    rollbacks: int = 0
-    max_iterations: int = 0
-    jacobians: int = 0
-    directional_jacobians: int = 0
-    unconverged: int = 0
 
 
 def total(counts: Iterable[Iterations]) -> Iterations | None:

@@ -11,6 +11,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.results.files import Recorder
+from hapticlink.orchestrator.results.record import LinkCounts
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
@@ -134,11 +135,7 @@ class Simulation:
         rows.sort(key=lambda row: row[1])
         return [r[0] for r in rows], [r[1] for r in rows], [r[2] for r in rows]
 
-    def links(self) -> dict[str, dict[str, int]]:
+    def links(self) -> dict[str, LinkCounts]:
         """Per connection with a latency, the number of samples sent, lost and overtaken."""
         links = {n: getattr(h, "link", None) for n, h in self.holds.items()}
-        return {
-            n: {"sent": k.sent, "lost": k.lost, "overtaken": k.overtaken}
-            for n, k in links.items()
-            if k
-        }
+        return {n: LinkCounts(k.sent, k.lost, k.overtaken) for n, k in links.items() if k}

@@ -57,6 +57,7 @@ def from_scene(
     rules = rules_of(scene, fmus, connections)
     assigned, refused = assign(fmus, connections, timeline, rules)
     problems += checks.unfit(scene, fmus, assigned, refused, rules.springs)
+    problems += replacements.unfit(scene, replaced, haptic_loop.rows(scene), fmus, connections)
     problems += checks.step_sizes(fmus, timeline)
     problems += checks.iterated(scene, fmus, assigned)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None

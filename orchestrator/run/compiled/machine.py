@@ -39,6 +39,7 @@ from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 from hapticlink.orchestrator.run.metered_operations import Feed, Move, Read, Sample
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
+from hapticlink.orchestrator.system.system import System
 
 EXACT = 2**53
 """Up to here every whole number is a double, and the quotient of two is rounded once."""
@@ -46,12 +47,9 @@ PATIENCE = 20_000_000
 """ns after which Python gets a turn: signals, progress."""
 
 
-def too_long(simulation: Simulation) -> str:
+def too_long(system: System) -> str:
     """Why the times of a run are not exact in the compiled loop, "" where they are."""
-    timeline, parts = (
-        simulation.system.timeline,
-        max(simulation.system.coupling.substeps.values(), default=1),
-    )
+    timeline, parts = system.timeline, max(system.coupling.substeps.values(), default=1)
     base, last = timeline.base, timeline.end + max(c.longest for c in timeline.clocks)
     if max(last * parts * base.numerator, base.denominator * parts) < EXACT:
         return ""

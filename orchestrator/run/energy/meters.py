@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from hapticlink.orchestrator.results.record import Energy
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
-from hapticlink.orchestrator.run.energy.meter import Energy, Mark, Meter
+from hapticlink.orchestrator.run.energy.meter import Mark, Meter
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import System
 

@@ -51,7 +51,7 @@ def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path: Path, between: str) -
     """Linear plants: the Jacobian told is exact, so Newton needs no differences."""
     outcome, table = solved(iterated(tmp_path, STEP, between), tmp_path)
     without, same = solved(iterated(tmp_path, STEP, between, FLAGS[:-1]), tmp_path)
-    counts, plain = outcome.iterations, without.iterations
+    counts, plain = outcome.details.iterations, without.details.iterations
     assert counts is not None
     assert plain is not None
     assert (counts.jacobians, counts.directional_jacobians) == (0, 1)
@@ -69,9 +69,9 @@ def test_derivatives_that_do_not_help_give_way_to_differences(
 ) -> None:
     outcome, table = solved(iterated(tmp_path, offered, "foh"), tmp_path)
     _, same = solved(iterated(tmp_path, STEP, "foh"), tmp_path)
-    assert outcome.iterations is not None
-    assert outcome.iterations.jacobians >= 1
-    assert outcome.iterations.unconverged == 0
+    assert outcome.details.iterations is not None
+    assert outcome.details.iterations.jacobians >= 1
+    assert outcome.details.iterations.unconverged == 0
     np.testing.assert_allclose(table["one.x"], same["one.x"], rtol=0, atol=1e-8)
 
 
@@ -83,9 +83,9 @@ def test_where_the_jacobian_is_not_that_of_a_step_differences_are_taken(tmp_path
         with_coupling(made, get_after_set=("two",)),
     ):
         outcome, table = solved(other, tmp_path)
-        assert outcome.iterations is not None
-        assert outcome.iterations.directional_jacobians == 0
-        assert outcome.iterations.jacobians >= 1
+        assert outcome.details.iterations is not None
+        assert outcome.details.iterations.directional_jacobians == 0
+        assert outcome.details.iterations.jacobians >= 1
         assert table["two.calls"][-1] == 0
 
 

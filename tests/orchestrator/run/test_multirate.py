@@ -19,7 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.lifted_map import opened
+from hapticlink.analysis.stability.lifted_map import lifted_map
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.switching import joint_spectral_radius
 from hapticlink.analysis.stability.trajectory import trajectory
@@ -187,7 +187,7 @@ def test_limit_of_the_coupling_to_one_percent(
 
 def radius(made: System) -> float:
     """The spectral radius of the lifted map, over a hyperperiod."""
-    with opened(made) as map_:
+    with lifted_map(made) as map_:
         found = modes(equilibrium(map_, trajectory(map_, 10.0)), map_.period)
     return max(abs(mode.z) for mode in found if not mode.neutral)
 

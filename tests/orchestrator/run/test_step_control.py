@@ -114,12 +114,12 @@ def test_it_takes_fewer_steps_than_a_fixed_step_for_the_same_error(
     rate = 160
     fixed, uniform = solved(controlled(fmus, None, Fraction(1, rate), until=until), tmp_path)
     assert varied < uniform
-    assert outcome.calls["one"]["step"] < 0.8 * fixed.calls["one"]["step"]
+    assert outcome.details.calls["one"]["step"] < 0.8 * fixed.calls["one"]["step"]
 
 
 def test_what_was_done_is_counted(fmus: Fmus, tmp_path: Path) -> None:
     outcome, _ = solved(controlled(fmus, doubling(0.01)), tmp_path)
-    steps, calls = outcome.steps["haptics"], outcome.calls["one"]
+    steps, calls = outcome.details.controlled_steps["haptics"], outcome.details.calls["one"]
     assert steps.rejected > 0
     assert steps.shortest <= 4 / 50000 < steps.longest <= 0.02
     # Each try is a step and its two halves; the forced ones are of one tick, which has no halves.
@@ -147,8 +147,8 @@ def test_a_sampled_block_is_never_cut(tmp_path: Path) -> None:
     )  # fmt: skip
     outcome, table = simulate(made, tmp_path)
     assert outcome.fault is None
-    assert outcome.calls["law"]["step"] == 9
-    assert outcome.calls["plant"]["step"] > 8 * 12
+    assert outcome.details.calls["law"]["step"] == 9
+    assert outcome.details.calls["plant"]["step"] > 8 * 12
     np.testing.assert_array_equal(table["law.stamp"], table["time"])
     np.testing.assert_array_equal(table["law.seen_d"], table["time"])
     np.testing.assert_array_equal(table["plant.seen_f"][1:], table["time"][:-1])
