@@ -11,12 +11,12 @@ from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.scene import dropped_keys as dropping
 from hapticlink.orchestrator.scene import families, toml_keys
 from hapticlink.orchestrator.scene.find_scene import find, folder_of
-from hapticlink.orchestrator.scene.overrides import told
+from hapticlink.orchestrator.scene.overrides import as_typed
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import Path, Place, flatten, key_lines, place_of, whole
 
-LONGEST = 20
+MAX_EXTENDED = 20
 """Scenes that extend one another."""
 
 
@@ -71,8 +71,8 @@ def document(
         _, found = find(base, folder)
     except InputFault as fault:
         raise refuse(f"{fault}; a path is relative to this file") from None
-    if len(above) >= LONGEST:
-        raise refuse(f"the last of {LONGEST} scenes, each over the next: put some into one")
+    if len(above) >= MAX_EXTENDED:
+        raise refuse(f"the last of {MAX_EXTENDED} scenes, each over the next: put some into one")
     where = folder_of(base, folder)
     base = str(where / FilePath(base).name) if where else base
     so_far = (*(above or (name,)), str(FilePath(base).resolve()) if where else base)
@@ -123,7 +123,7 @@ def with_family(
     try:
         expanded = families.members(linkage)
     except families.FamilyError as error:
-        option = told(set_by[error.path]) if error.path in set_by else None
+        option = as_typed(set_by[error.path]) if error.path in set_by else None
         file, line = place_of(error.path, places)
         finding = Finding(".".join(map(str, error.path)), error.message, line, option, file)
         raise SceneFault(name, [finding]) from None
