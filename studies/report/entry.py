@@ -9,6 +9,7 @@ from pathlib import Path
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.scene.overrides import as_typed
 
 
 @dataclass(frozen=True)
