@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import folders, tables
+from hapticlink.orchestrator.results import folder_lock, folders, tables
 from hapticlink.orchestrator.results.record import content
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.run.real_time import RealTimeRun
@@ -53,10 +53,10 @@ def run(
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
     (docs/real-time.md).
 
-    Raises InputFault for invalid input, before anything runs. A fault during the run raises no
-    exception: it is the `fault` of the returned Run, which has the results up to then. Ctrl-C
-    raises RunInterrupted, with the results so far as its `run`. Tables of more than 1 GiB in `out`
-    are not read back; use `load` for them.
+    Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
+    A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
+    results up to then. Ctrl-C raises RunInterrupted, with the results so far as its `run`. Tables
+    of more than 1 GiB in `out` are not read back; use `load` for them.
     """
     with interrupt.held():
         read = open_scene.load(scene, options)
@@ -81,7 +81,8 @@ def run_paced(
             told = ended.run | _told(found) if found else ended.run
             made = Run(None, told, found.tables if found else {})
         else:
-            made = _in_folder(scene, Path(out), progress, figures, real_time)
+            with folder_lock.held(Path(out)):
+                made = _in_folder(scene, Path(out), progress, figures, real_time)
         if interrupt.came() or made.run["end"]["reason"] == "interrupted":
             raise RunInterrupted(made)
     return made

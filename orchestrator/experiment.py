@@ -14,7 +14,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.record import content
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Results, Table, load, size
@@ -88,25 +88,28 @@ def simulate(
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
-    Raises InputFault before the run for invalid input, and Interrupted for a signal before the run.
-    A fault during the run is in the outcome, and its results up to then are kept. Results of an
-    earlier run in `folder` are removed once the first rows of this one are written. Without `csv`
-    the tables stay in the binary form in which a run writes them.
+    Raises InputFault before the run for invalid input and where another run writes to `folder`, and
+    Interrupted for a signal before the run. A fault during the run is in the outcome, and its
+    results up to then are kept. Results of an earlier run in `folder` are removed once the first
+    rows of this one are written. Without `csv` the tables stay in the binary form in which a run
+    writes them.
     """
     with interrupt.held():
-        return _simulated(scene, Path(folder), options, progress, csv, real_time)
+        begin = perf_counter()
+        read = open_scene.load(scene, options)
+        with folder_lock.held(Path(folder)):
+            return _simulated(read, Path(folder), progress, csv, real_time, begin)
 
 
 def _simulated(
-    scene: str | Path | Scene,
+    read: Scene,
     folder: Path,
-    options: Options,
     progress: Progress | None,
     csv: bool,
     real_time: RealTimeRun | None,
+    begin: float,
 ) -> Experiment:
-    begin = perf_counter()
-    read = open_scene.load(scene, options)
+    """begin: when the scene began to be read (s)."""
     with built(read) as every:
         system = with_fetched(every)
         plan = Plan(system)
@@ -121,7 +124,7 @@ def _simulated(
         alone = isolated(system.fmus)
         risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
         csv = csv and read.record.format == "csv"
-        with RunFolder(folders.ensure(folder), before, csv) as results:
+        with RunFolder(folder, before, csv) as results:
             with crash_monitor.watched(folder) if risky else nullcontext():
                 outcome = run(plan, results, progress, real_time)
             try:
