@@ -80,26 +80,14 @@ def document(
         raise refuse(f"runs in a circle: {' -> '.join(so_far)}")
     below, below_places = document(found, base, where, so_far, base)
     below = dropping.taken(below, dropped, lambda message: refuse(message, "drop"))
-    below_places = {
-        p: at for p, at in below_places.items() if toml_keys.value(below, p) is not None
-    }
-    return _merged(below, data), _merged_places(below_places, below, places, data)
-
-
-def _merged_places(
-    base_places: Mapping[Path, Place],
-    base: Mapping[str, Any],
-    top_places: Mapping[Path, Place],
-    top: Mapping[str, Any],
-) -> dict[Path, Place]:
-    """File and line of each key of `_merged(base, top)`: none in `base` of what `top` replaces."""
-    replaced = set(_replaced(base, top))
-    kept = {
+    replaced = set(_replaced(below, data))
+    inherited = {
         path: place
-        for path, place in base_places.items()
-        if not any(path[:i] in replaced for i in range(1, len(path) + 1))
+        for path, place in below_places.items()
+        if toml_keys.value(below, path) is not None
+        and not any(path[:i] in replaced for i in range(1, len(path) + 1))
     }
-    return kept | dict(top_places)
+    return _merged(below, data), inherited | places
 
 
 def _replaced(base: Mapping[str, Any], top: Mapping[str, Any], at: Path = ()) -> Iterator[Path]:
