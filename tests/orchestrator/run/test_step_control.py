@@ -69,11 +69,11 @@ def test_steps_that_are_taken_back_do_no_work(fmus: Fmus, tmp_path: Path) -> Non
     """The spring's work is that of steps of 0.1 ms; each was tried as a whole one first."""
     fixed, _ = solved(controlled(fmus, None, Fraction(1, 10000)), tmp_path)
     tried, _ = solved(controlled(fmus, doubling(0.01)), tmp_path)
-    assert len(fixed.energies) > 0
-    for name, energy in fixed.energies.items():
-        scale = max(abs(e.ideal) for e in fixed.energies.values())
-        assert tried.energies[name].ideal == pytest.approx(energy.ideal, abs=0.01 * scale)
-        assert tried.energies[name].held == pytest.approx(energy.held, abs=0.01 * scale)
+    assert len(fixed.details.meters) > 0
+    for name, energy in fixed.details.meters.items():
+        scale = max(abs(e.ideal) for e in fixed.details.meters.values())
+        assert tried.details.meters[name].ideal == pytest.approx(energy.ideal, abs=0.01 * scale)
+        assert tried.details.meters[name].held == pytest.approx(energy.held, abs=0.01 * scale)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,10 @@ def test_iterated_coupling_takes_longer_steps_for_the_same_tolerance(
     )
     iterated, second = solved(made, tmp_path)
     assert max(first, second) < 0.001
-    assert iterated.steps["haptics"].taken < explicit.steps["haptics"].taken
+    assert (
+        iterated.details.controlled_steps["haptics"].taken
+        < explicit.details.controlled_steps["haptics"].taken
+    )
 
 
 def test_it_takes_fewer_steps_than_a_fixed_step_for_the_same_error(
@@ -114,7 +117,7 @@ def test_it_takes_fewer_steps_than_a_fixed_step_for_the_same_error(
     rate = 160
     fixed, uniform = solved(controlled(fmus, None, Fraction(1, rate), until=until), tmp_path)
     assert varied < uniform
-    assert outcome.details.calls["one"]["step"] < 0.8 * fixed.calls["one"]["step"]
+    assert outcome.details.calls["one"]["step"] < 0.8 * fixed.details.calls["one"]["step"]
 
 
 def test_what_was_done_is_counted(fmus: Fmus, tmp_path: Path) -> None:
