@@ -16,6 +16,7 @@ from cyclopts import Parameter, validators
 
 from hapticlink.commands import completion
 from hapticlink.commands.options import Out, Set, Swap, default_folder, options
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
@@ -173,7 +174,7 @@ def _has_screen() -> bool:
 def _served(host: str, port: int | None, token: str) -> Link:
     """The server, on the port asked for. Raises InputFault where it cannot start."""
     if not find_spec("websockets"):
-        raise InputFault("the page needs the package websockets: pip install 'hapticlink[view]'")
+        raise InputFault(f"the page needs the package websockets: {install_command('view')}")
     module = "hapticlink.visualization.live.server"
     made = Link(module, host, str(PORT if port is None else port), token)
     if port is None and made.first and "error" in made.first:
