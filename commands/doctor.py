@@ -17,8 +17,9 @@ HIDDEN = ("test",)
 
 
 def doctor(*, json: Json = False) -> int:
-    """Tell versions, optional parts that are missing and how to install them, and the cache; build
-    a small FMU of each packaging that is there, and run it. The exit status is 1 if that fails."""
+    """Report versions, optional packages that are missing and how to install them, and the cache;
+    build a small FMU of each packaging that is available, and run it. The exit status is 1 if that
+    fails."""
     found = _found()
     tell(_lines(found), found, quiet=False, as_json=json)
     return 0 if all(state == "works" for state in found["runs"].values()) else 1

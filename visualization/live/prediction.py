@@ -22,20 +22,21 @@ from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live.controls import Settings
 
-MOST = {"native": 1e8, "python": 1e7}
+MAX_COST = {"native": 1e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map
 is computed, by the packaging of the FMUs; 1e7 take about 2 s of processor time with native ones."""
 SEARCH = 0.25
 """Simulated time (s) within which an equilibrium is sought."""
 RATES = range(1, 201)
-"""Graphics rates (Hz) that may be told to be quicker."""
+"""Graphics rates (Hz) that may be suggested in place of a slow one."""
 
 Parameters = Mapping[str, Sequence[float]]
 """Tunable parameters, `fmu.port`, with their values."""
 
 
 def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
-    """The verdict, "" where there is none, what is said of it, and why."""
+    """`verdict` ("" where there is none), `said`, which is its one line on the page, and `why`, its
+    tooltip."""
     try:
         found = judged(scene, settings, parameters)
     except Fault as fault:
@@ -45,10 +46,10 @@ def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[
 
 
 def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Stability:
-    """The stability of the run. Raises InputFault where the map would take long, and as
+    """The stability of the run. Raises InputFault where its computation would take long, and as
     `stability` does."""
     if settings.jitter:
-        raise InputFault("frames of random lengths never repeat; set the jitter to 0")
+        raise InputFault("with jitter the system never repeats; set the jitter to 0")
     changed = _at_rate(scene, settings.rate)
     with (
         interrupt.held(),
@@ -79,17 +80,17 @@ def _at_rate(scene: Scene, rate: float | None) -> Scene:
 
 
 def _require_quick(scene: Scene, system: System) -> None:
-    """Raises InputFault for a map that would take long, with the nearest rate whose map would not,
-    if there is one."""
-    most = MOST[scene.packaging] / size(system) ** 2
+    """Raises InputFault where the lifted map would take long to compute, with the nearest rate at
+    which it would not, if there is one."""
+    most = MAX_COST[scene.packaging] / size(system) ** 2
     if (count := _ticks(scene)) <= most:
         return
     if scene.graphics is None or not isinstance(scene.graphics.rate, int | float):
-        raise InputFault(f"all repeats only after {count} ticks")
+        raise InputFault(f"the system repeats only after {count} ticks")
     rate = scene.graphics.rate
     quick = [r for r in RATES if _ticks(_at_rate(scene, r)) <= most]
     nearest = min(quick, key=lambda r: abs(r - rate), default=None)
-    remedy = f", {nearest} Hz would be quick" if nearest else ""
+    remedy = f", {nearest} Hz would be fast" if nearest else ""
     raise InputFault(f"{rate:g} Hz repeats only after {count} ticks{remedy}")
 
 
