@@ -80,7 +80,7 @@ def run(scene: str, folder: Path, skipping: str, *options: str) -> Experiment:
 
 def counts(made: Experiment, skipping: str) -> tuple[int, int, int]:
     """Operations of the graphs of all steps, FMI calls, and values set or fetched by them."""
-    scene, system, calls = made.scene, made.system, made.outcome.calls
+    scene, system, calls = made.scene, made.system, made.outcome.details.calls
     found = costs.costs(scene, timeline(scene), skip=skipping == ON)
     operations = sum(c.cost.step * calls[c.name]["step"] for c in found)
     moved = 0

@@ -39,10 +39,10 @@ def graph_slopes(found: Description, fmu: str, scene: Scene | None) -> GraphSlop
         return None
     if carried := _read(found.path, found.guid):
         return carried
-    block = next((b for b in blocks(scene) if b.name == fmu), None) if scene else None
+    block = next((b for b in blocks(scene).built if b.name == fmu), None) if scene else None
     if block is None:
         return None
-    made = component(block.made_by, block.settings)
+    made = component(block.block, block.settings)
     functions = {f.name(): f for f in one_pass(made).functions}
     return GraphSlopes(functions, made.timing == "sampled", made.substeps)
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigvals
 from scipy.optimize import minimize_scalar
 
-from hapticlink.analysis.stability.opened_ports import Response
+from hapticlink.analysis.stability.port_response import Response
 from hapticlink.orchestrator.base.arrays import Complex, Matrix
 
 STILL = 1e-9
@@ -26,7 +26,7 @@ HELD = 1e-5
 SHARP = 0.1
 """Half width w P of a resonance that a grid of frequencies can miss."""
 SEARCH = 16
-"""Evaluations of the search for the angle at which most is lacking."""
+"""Evaluations of the search for the angle of the largest damping shortage."""
 
 
 @dataclass(frozen=True)
@@ -134,15 +134,17 @@ class Scale:
         )
 
 
-def with_worst(angles: Matrix, lacks: Callable[[float], float]) -> Matrix:
-    """The angles, and beside the one at which `lacks` is largest the one where it peaks, unless it
-    is the last one."""
-    worst = int(np.argmax([lacks(angle) for angle in angles]))
+def with_worst(angles: Matrix, shortage: Callable[[float], float]) -> Matrix:
+    """The angles, and beside the one at which the `shortage` is largest the one where it peaks,
+    unless it is the last one."""
+    worst = int(np.argmax([shortage(angle) for angle in angles]))
     if worst == len(angles) - 1:
         return angles
     bounds = angles[max(worst - 1, 0)], angles[min(worst + 1, len(angles) - 1)]
     options = {"maxiter": SEARCH, "xatol": 1e-9}
-    found = minimize_scalar(lambda a: -lacks(a), bounds=bounds, method="bounded", options=options)
+    found = minimize_scalar(
+        lambda a: -shortage(a), bounds=bounds, method="bounded", options=options
+    )
     return np.union1d(angles, [float(found.x)])
 
 

@@ -32,7 +32,7 @@ class Relative:
     Raises ValueError for a hand that `Hand` does not know."""
 
     def __init__(self, scene: Scene) -> None:
-        made = {b.name: component(b.made_by, b.settings) for b in blocks(scene)}
+        made = {b.name: component(b.block, b.settings) for b in blocks(scene).built}
         mechanism, controller = made["virtual_mechanism"], made["controller"]
         assert scene.device
         self.hand, device = Hand(scene.hand), numbers(scene.device)

@@ -52,13 +52,13 @@ _TUNABLE = (
 )
 
 
-def _parameters(device: Device) -> list[Variable]:
+def _parameters(device: Device, encoders: bool) -> list[Variable]:
     def of(rows: tuple[tuple[str, str, str], ...], variability: Variability) -> list[Variable]:
         return [Variable(n, (), u, getattr(device, n), d, variability) for n, u, d in rows]
 
     start = Variable("x_start", (3,), POSE, 0.0, "pose of the handle at the start", "fixed")
     parameters = [start, *of(_FIXED, "fixed"), *of(_TUNABLE, "tunable")]
-    if device.sensing == "encoders":
+    if encoders:
         parameters += of((("encoder_resolution", "rad", "angle of one encoder count"),), "fixed")
         gains = device.observer
         parameters += [
@@ -79,16 +79,15 @@ def _plant(block: Block) -> ca.Function:
     return ca.Function("ode", [state, drive, block.p.vector, block.t], [derivative])
 
 
-def haptic_device(device: Device) -> Component:
+def haptic_device(device: Device, encoders: bool = False) -> Component:
     """The FMU `haptic_device`, with the parameters of `device`.
 
-    sensing "ideal": x, v and F_hand_observed are the true values. "encoders": x is the pose that
+    Without `encoders`, x, v and F_hand_observed are the true values. With them, x is the pose that
     belongs to the quantised base angles, v and F_hand_observed come from the observer. M and
     c = C_d v are evaluated at the measured pose and velocity, workspace_margin at the true pose.
     All dimensions are assumed, since the report only gives the 0.09 degrees of an encoder count.
     At t = 0 the handle is at rest at x_start and the observed force is zero.
     """
-    encoders = device.sensing == "encoders"
     states = [
         Variable("x_true", (3,), POSE, description="pose of the handle"),
         Variable("v_true", (3,), TWIST, description="velocity of the handle"),
@@ -116,7 +115,7 @@ def haptic_device(device: Device) -> Component:
                 power=Power("x_true"),
             ),
         ],
-        parameters=_parameters(device),
+        parameters=_parameters(device, encoders),
         states=states,
         outputs=[
             Variable("x", (3,), POSE, description="measured pose of the handle"),

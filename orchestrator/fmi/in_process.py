@@ -98,6 +98,7 @@ class InProcess(WithStates):
             modelIdentifier=self.description.identifier,
             unzipDirectory=self._folder,
             instanceName=self.name,
+            libraryPath=python_libraries.shared(self._folder, self.description.identifier),
         )
         require_success(slave)
         self.holds_python = python_libraries.prepare(slave.dll, self._folder)

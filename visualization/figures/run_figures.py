@@ -94,7 +94,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
         found["user_port"] = partial(_port, results, port)
     if generated := _generated(results):
         found["energies"] = partial(_energies, results, generated)
-    if (paced := results.run.get("real_time")) and paced["ticks"]:
+    if (paced := results.record.real_time) and paced["ticks"]:
         found["real_time"] = partial(real_time, results)
     return found
 
@@ -142,7 +142,7 @@ def _mark(results: Results, axes: Axes) -> None:
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
     """Label, line style and path (mm) of operational point, handle and further points."""
-    linkage = results.run["scene"]["linkage"] or {}
+    linkage = results.record.scene["linkage"] or {}
     further = [
         (signal_of_user(POINT_POSE, point["name"]), f"point {point['name']}", "-.")
         for point in linkage.get("point", ())
@@ -226,7 +226,7 @@ def _constraints(results: Results, table: Table, name: str) -> Figure:
 
 
 def _port(results: Results, port: UserPort) -> Figure:
-    peak = 1e3 * port.told["peak"]
+    peak = 1e3 * port.measured.peak
     title = f"The rendering generates at most {short(peak)} mJ"
     if peak > 0 and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
@@ -245,10 +245,7 @@ def _port(results: Results, port: UserPort) -> Figure:
 
 def _generated(results: Results) -> dict[str, float]:
     """Energy (J) that the hold of each connection generated, connections across rates first."""
-    across = results.run.get("energies", "none")  # a crash leaves none
-    within = results.run.get("energies_within_a_rate", {})
-    booked = ({} if across == "none" else across) | within
-    return {name: energy["generated"] for name, energy in booked.items()}
+    return {name: energy.generated for name, energy in results.record.meters.items()}
 
 
 def _energies(results: Results, generated: dict[str, float]) -> Figure:

@@ -85,7 +85,7 @@ class Slopes:
     apart: frozenset[str] | None
 
 
-class Tangent:
+class ForwardSensitivity:
     """The slopes of the operations of a simulation; `closures` are those of its mechanism."""
 
     def __init__(self, simulation: Simulation, closures: Closures | None) -> None:
