@@ -103,7 +103,6 @@ def test_baumgarte_is_stable_up_to_its_limit_off_the_closures(share: float, verd
     assert len(found.neutral) >= 2  # it moves freely
     line = "growth up to 0.051 1/s cannot be distinguished from none"
     assert any(line in text for text in found.lines())
-    )
 
 
 @pytest.mark.parametrize(("start", "at", "pull"), [(0.1, 0.0, 50.0), (1.0, 0.95, 1.0)])
