@@ -111,7 +111,7 @@ Change = Callable[[dict[str, Any]], object]
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda run: run.clear(), "not the folder of a run"),
+        (lambda run: run.clear(), "scene: field required"),
         (lambda run: run.pop("fmus"), "fmus: field required"),
         (lambda run: run.update(end=3), "end: input should be a valid dictionary"),
         (lambda run: run["scene"].update(linkage=None), r"no \[linkage\]"),
