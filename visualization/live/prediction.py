@@ -42,7 +42,7 @@ def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[
     except Fault as fault:
         short = str(fault).partition(";")[0].partition("\n")[0]
         return {"verdict": "", "said": f"not computed: {short}", "why": str(fault)}
-    return {"verdict": found.verdict, "said": _said(found), "why": "\n".join(found.lines())}
+    return {"verdict": found.verdict, "said": _summary(found), "why": "\n".join(found.lines())}
 
 
 def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Stability:
@@ -61,7 +61,7 @@ def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Stabilit
         system = replace(
             whole,
             timeline=timeline(changed),
-            fmus=tuple(_with(fmu, parameters) for fmu in whole.fmus),
+            fmus=tuple(_with_parameters(fmu, parameters) for fmu in whole.fmus),
             connections=tuple(
                 held_by(c, s.holds.get(c.name), s.delays.get(c.name)) for c in whole.connections
             ),
@@ -100,7 +100,7 @@ def _ticks(scene: Scene) -> int:
     return hyperperiod(time) // time.clocks[0].longest
 
 
-def _with(fmu: Fmu, parameters: Parameters) -> Fmu:
+def _with_parameters(fmu: Fmu, parameters: Parameters) -> Fmu:
     """An FMU with other start values of parameters."""
     starts = {scalar.name: (scalar, value) for scalar, value in fmu.starts}
     for name, values in parameters.items():
@@ -111,7 +111,7 @@ def _with(fmu: Fmu, parameters: Parameters) -> Fmu:
     return replace(fmu, starts=tuple(starts.values()))
 
 
-def _said(found: Stability) -> str:
+def _summary(found: Stability) -> str:
     rate = f"{abs(found.growth):.2g} 1/s"
     if found.verdict == "stable":
         return f"stable at rest, decays {rate}"

@@ -76,7 +76,7 @@ def flat(value: Any) -> list[float]:
 
 
 def test_a_long_run_is_thinned_and_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recorded_frames, "MOST", 100)
+    monkeypatch.setattr(recorded_frames, "MAX_FRAMES", 100)
     run = Recorded(str(folder))
     assert len(run.times) <= 100
     assert run.told()["every"] == 3
@@ -145,7 +145,7 @@ def test_text_of_a_scene_cannot_end_the_data(tmp_path: Path) -> None:
 def test_an_animation_moves_begins_anew_and_has_the_same_bytes_each_time(
     folder: Path, tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(animation, "MOST", 4)
+    monkeypatch.setattr(animation, "MAX_FRAMES", 4)
     made = [tmp_path / f"{i}{ending}" for i in (1, 2)]
     for path in made:
         replay_page.write([Recorded(str(folder))], path)
