@@ -20,7 +20,7 @@ import fmpy
 
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.fmus.native.compiler_cache import compiler_cache
-from hapticlink.fmus.versions import version
+from hapticlink.fmus.versions import install_command, version
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
 TARGETS = {
@@ -57,7 +57,7 @@ def compiler_version() -> str:
     except PackageNotFoundError:
         raise FmuError(
             "native FMUs are compiled with ziglang, which is not installed: "
-            "pip install '.[native]' in the checkout, or take packaging = \"python\""
+            f'{install_command("native")}, or set packaging = "python"'
         ) from None
 
 

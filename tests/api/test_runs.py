@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.fmus.versions import install_command
 from hapticlink.visualization.figures import run_figures
 from tests.shared_fixtures import sets, status
 
@@ -144,7 +146,7 @@ def test_without_pandas_a_frame_says_what_to_install(
     bar: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(hl.InputFault, match="needs pandas: pip install pandas"):
+    with pytest.raises(hl.InputFault, match=re.escape(install_command("pandas"))):
         hl.run(bar).frame("haptics")
 
 

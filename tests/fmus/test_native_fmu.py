@@ -447,7 +447,7 @@ def test_without_ziglang_the_extra_is_named(tmp_path, monkeypatch):
         raise PackageNotFoundError(name)
 
     monkeypatch.setattr(compiler, "version", missing)
-    with pytest.raises(FmuError, match=r"pip install '\.\[native\]'"):
+    with pytest.raises(FmuError, match=r'pip install "hapticlink\[native\]"'):
         build_native(sample_components.stateless(), tmp_path)
     assert list(tmp_path.iterdir()) == []
 
