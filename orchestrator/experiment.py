@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import current_directory, interrupt
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
@@ -95,7 +95,8 @@ def simulate(
         begin = perf_counter()
         read = open_scene.load(scene, options)
         with folder_lock.held(Path(folder)):
-            return _simulated(read, Path(folder), progress, csv, real_time, begin)
+            folder = Path(folder).absolute()  # whatever the FMUs do to the current directory
+            return _simulated(read, folder, progress, csv, real_time, begin)
 
 
 def _simulated(
@@ -118,10 +119,13 @@ def _simulated(
             clocks = dict.fromkeys(beside(plan)[0].values())
             story["files"] += [f"{clock}_{SAMPLES}.{read.record.format}" for clock in clocks]
         alone = isolated(system.fmus)
-        risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
         csv = csv and read.record.format == "csv"
+        foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         with RunFolder(folder, story, csv) as results:
-            with crash_monitor.watched(folder) if risky else nullcontext():
+            with (
+                crash_monitor.watched(folder) if foreign else nullcontext(),
+                current_directory.restored(*foreign),
+            ):
                 outcome = run(plan, results, progress, real_time)
             ending = _ending(system, outcome, build_time)
             try:

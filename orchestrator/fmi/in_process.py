@@ -9,7 +9,6 @@ messages that the FMU logged are part of the error.
 from __future__ import annotations
 
 import ctypes
-import os
 import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
@@ -20,12 +19,14 @@ from typing import Any
 import numpy as np
 from fmpy import fmi2
 
+from hapticlink.orchestrator.base import current_directory
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
 from hapticlink.orchestrator.fmi.instance import Vector
+from hapticlink.orchestrator.fmi.load_library import loaded
 from hapticlink.orchestrator.fmi.retry import Retry
 from hapticlink.orchestrator.fmi.setter import Places, Setter
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
@@ -35,7 +36,6 @@ from hapticlink.orchestrator.fmi.status import (
     ERROR,
     FATAL,
     STATUS,
-    require_success,
     succeeded,
     worse,
 )
@@ -60,17 +60,15 @@ class InProcess(WithStates):
         self._key = messages.opened()
 
     def _load(self) -> None:
-        before = os.getcwd()
         try:
             self._folder = process_cache.unpack(self.description, self._folder)
-            self.slave = self._instantiate()
+            with current_directory.restored(self.name):
+                self.slave = self._instantiate()
         except Exception as error:  # FMPy raises bare Exception
             said = str(error)
             if said.startswith("Failed to instantiate"):
                 said = "its instantiation failed; its guid may not be that of its binary"
             raise self._fault(f"could not be loaded: {said}", 0.0) from error
-        finally:
-            os.chdir(before)  # FMPy leaves it changed where a library cannot be loaded
         outputs = self.description.outputs
         self.gets = self.fewer = self._transfers("Get", outputs, self.outputs)
         if self.seldom:
@@ -93,14 +91,10 @@ class InProcess(WithStates):
             self._advance = self.retry.step
 
     def _instantiate(self) -> Any:
-        slave = self._library(
-            guid=self.description.guid,
-            modelIdentifier=self.description.identifier,
-            unzipDirectory=self._folder,
-            instanceName=self.name,
-            libraryPath=python_libraries.shared(self._folder, self.description.identifier),
+        about = self.description
+        slave = loaded(
+            self._library, about.fmi, about.guid, about.identifier, self._folder, self.name
         )
-        require_success(slave)
         self.holds_python = python_libraries.prepare(slave.dll, self._folder)
         slave.instantiate(loggingOn=True, **self._logging())
         return slave
