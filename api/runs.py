@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.analysis.findings import summary
-from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.analysis.findings.measures import Measures
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
@@ -17,12 +17,12 @@ from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders, tables
+from hapticlink.orchestrator.results.record import content
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_axes
-from hapticlink.visualization.figures import figure_process
 
 MOST = 2**30
 """Bytes of tables that a run in a folder reads back; as numbers they take half of that."""
@@ -90,8 +90,8 @@ def run_paced(
 
 def _told(results: Results) -> dict[str, Any]:
     """What run.json says of the results: warnings, and the energy at the user's port."""
-    port = user_port(results)
-    return {"user_port": port and port.told, "warnings": list(summary.lines(results))}
+    port = Measures(results).port
+    return {"user_port": port and content(port), "warnings": list(summary.lines(results))}
 
 
 def _in_folder(
@@ -137,7 +137,9 @@ def _explained(ended: Experiment) -> list[str]:
 
 def _drawn(ended: Experiment, found: Results) -> list[str]:
     """Writes the figures; returns their names. Raises Interrupted and OSError."""
-    return figure_axes.write(figure_process.pngs(found), ended.folder)
+    from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
+
+    return figure_axes.write(run_figures.pngs(found), ended.folder)
 
 
 def load(folder: str | Path) -> Run:

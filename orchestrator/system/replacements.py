@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.scene.blocks import replaced_blocks
+from hapticlink.orchestrator.scene.blocks import BlockPlan
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
@@ -21,16 +21,13 @@ MAX_PORTS = 12
 """Ports of one kind that a message lists."""
 
 
-def replaced(scene: Scene) -> dict[str, Component]:
+def replaced(plans: Mapping[str, BlockPlan]) -> dict[str, Component]:
     """The blocks that FMUs replace, by name. Raises InputFault where the settings of one give no
     block."""
-    found = {}
-    for name, plan in replaced_blocks(scene).items():
-        try:
-            found[name] = component(plan.made_by, plan.settings)
-        except FmuError as error:
-            raise InputFault(str(error)) from error
-    return found
+    try:
+        return {name: component(plan.block, plan.settings) for name, plan in plans.items()}
+    except FmuError as error:
+        raise InputFault(str(error)) from error
 
 
 def replacements(

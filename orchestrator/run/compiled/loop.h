@@ -167,7 +167,7 @@ enum { NO_MATRIX, PROJECTOR, SEMIDEFINITE };
 
 enum {
     ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
-    MEAN, PASSIVE_SET_POSITION, OBSERVED, SLOPE
+    MEAN, PASSIVE_SET_POSITION, OBSERVED, SLOPE, SMOOTH_SLOPE /* of SMOOTH, no hold */
 };
 
 /* --- meters, tables --------------------------------------------------------------------------- */

@@ -159,7 +159,7 @@ def test_parts_that_fail_or_give_something_else(tmp_path: Path) -> None:
     integrator = (
         "from hapticlink.components.integrators.base import Integrator\n"
         "class Mine(Integrator):\n    order = 1\n"
-        "    def step(self, ode, x, u, p, t, h, positions): return {}"
+        "    def step(self, ode, x, u, p, t, h): return {}"
     )
     scheme = "from hapticlink.orchestrator.plan.schemes import Scheme"
     raising = "def mine(*_, n: int = 0): raise RuntimeError('no')"
