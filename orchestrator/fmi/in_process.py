@@ -9,6 +9,7 @@ messages that the FMU logged are part of the error.
 from __future__ import annotations
 
 import ctypes
+import logging
 import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,7 @@ from fmpy import fmi2
 
 from hapticlink.orchestrator.base import current_directory
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries
+from hapticlink.orchestrator.fmi import arithmetic, messages, process_cache, python_libraries
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
@@ -64,6 +65,7 @@ class InProcess(WithStates):
             self._folder = process_cache.unpack(self.description, self._folder)
             with current_directory.restored(self.name):
                 self.slave = self._instantiate()
+            self._keep_arithmetic()
         except Exception as error:  # FMPy raises bare Exception
             said = str(error)
             if said.startswith("Failed to instantiate"):
@@ -83,6 +85,8 @@ class InProcess(WithStates):
                 status = do_step(time, size)
             except SystemError as error:
                 raise self.raised(self.do_step, error) from error
+            finally:
+                self._keep_arithmetic()
             return self._settled(status, time)
 
         self._advance: Callable[[float, float], int] = advance
@@ -163,7 +167,9 @@ class InProcess(WithStates):
         try:
             for transfer in transfers:
                 setattr(self.place, counted, getattr(self.place, counted) + 1)
-                if not succeeded(status := transfer.call()):
+                status = transfer.call()
+                self._keep_arithmetic()
+                if not succeeded(status):
                     raise self.failed(transfer.name, status)
         except SystemError as error:
             raise self.raised(transfer.name, error) from error
@@ -223,6 +229,13 @@ class InProcess(WithStates):
             getattr(self.slave, name)(self.slave.component, *arguments)
         except Exception as error:
             raise self.failed(name, getattr(error, "status", ERROR)) from error
+        finally:
+            self._keep_arithmetic()
+
+    def _keep_arithmetic(self) -> None:
+        """Restores how this process rounds numbers where an FMU of others has changed it."""
+        if self.description.block is None and arithmetic.restored():
+            self.place.altered += 1
 
     # --- the loop -------------------------------------------------------------------------
 
@@ -316,6 +329,12 @@ class InProcess(WithStates):
             return fault
         finally:
             messages.closed(self._key)
+            self._keep_arithmetic()
+            if self.place.altered:
+                said = (
+                    "%s changed how this process rounds numbers, in %d calls: restored after each"
+                )
+                logging.getLogger(__name__).warning(said, self.name, self.place.altered)
             # pythonfmu puts resources/ on sys.path for good.
             sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]
             process_cache.leave(self._folder)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -90,3 +93,44 @@ def test_runs_in_threads_leave_the_current_directory_alone(
     while any(thread.is_alive() for thread in threads):
         assert Path.cwd() == tmp_path
     assert ends == ["duration"] * 18
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+@pytest.mark.parametrize(
+    ("place", "act"),
+    [("step", "upward"), ("step", "zero"), ("step", "flush"), ("get", "upward"), ("set", "zero"),
+     ("enter", "upward"), ("make", "upward")],
+)  # fmt: skip
+def test_another_rounding_mode_is_restored_and_told(
+    tmp_path: Path,
+    loop: str,
+    fmi: str,
+    place: str,
+    act: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The numbers of the other FMU are the same to the bit."""
+    hostile_fmu(tmp_path, fmi)
+    good = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").results.haptics
+    assert "rounds" not in caplog.text
+    scene = hostile_scene(tmp_path, name := f"{place}_{act}_3")
+    bad = simulate(scene, tmp_path / "bad").results.haptics
+    assert bad["source.slope"].tolist() == good["source.slope"].tolist()
+    assert f"{name} changed how this process rounds numbers" in caplog.text
+    assert 1.0 + 2.0**-53 == 1.0  # of this process, too
+    assert 2.0**-1074 > 0.0
+
+
+@pytest.mark.parametrize("loop", ["compiled", "python"])
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
+    hostile_fmu(tmp_path, fmi)
+    scene, out = hostile_scene(tmp_path, "step_exit_20"), tmp_path / "out"
+    command = [sys.executable, "-m", "hapticlink", "run", str(scene), "--out", str(out)]
+    environment = os.environ | {"HAPTICLINK_LOOP": loop}
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert "the process of the run ended after t = 0.296875 s" in ended.stderr
+    found = tables.load(out)
+    assert found.run["fault"]["kind"] == "Crash"
+    assert found.haptics["time"].tolist() == [k / 64 for k in range(20)]
