@@ -331,9 +331,7 @@ class InProcess(WithStates):
             messages.closed(self._key)
             self._keep_arithmetic()
             if self.place.altered:
-                said = (
-                    "%s changed how this process rounds numbers, in %d calls: restored after each"
-                )
+                said = "%s changed how this process rounds numbers, in %d calls; it is restored"
                 logging.getLogger(__name__).warning(said, self.name, self.place.altered)
             # pythonfmu puts resources/ on sys.path for good.
             sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]
