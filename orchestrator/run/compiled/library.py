@@ -25,11 +25,13 @@ def load() -> ctypes.CDLL:
     compiled."""
     if os.environ.get(CHOICE) == "python":
         raise Unavailable(f"{CHOICE}=python")
-    return _loaded()
+    return loaded()
 
 
 @cache
-def _loaded() -> ctypes.CDLL:
+def loaded() -> ctypes.CDLL:
+    """The library, whatever CHOICE says. Raises Unavailable where it can neither be found nor
+    be compiled."""
     built = build.HERE / build.name()
     found = ctypes.CDLL(str(built if built.exists() else _compiled()))
     pointer, integer, number = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -39,6 +41,7 @@ def _loaded() -> ctypes.CDLL:
         "push": (pointer, pointer, integer, integer),
         "value": (pointer, pointer, integer, number, pointer),
         "watch": (ctypes.c_int,),
+        "guard": (ctypes.c_int,),
         "now": (),
         "wait": (integer,),
         "python": (pointer,) * 3,
