@@ -249,7 +249,7 @@ class Block:
         x, u, p, t, h = self.x.vector, self.u.vector, self.p.vector, self.t, self.h
         x1 = pack(self.x.variables, step) if isinstance(step, Mapping) else ca.densify(step)
         is_memory = [v.name in memory for v in self.x.variables for _ in range(v.size)]
-        kept = ca.vertcat(*(x[i] if held else x1[i] for i, held in enumerate(is_memory)))
+        without_memory = ca.vertcat(*(x[i] if held else x1[i] for i, held in enumerate(is_memory)))
         once, options = {"cse": not shared}, {"cse": True}
         names = ["x", "u", "p", "t", "h"]
         return Component(
@@ -273,7 +273,7 @@ class Block:
                 options,
             ),
             substeps=substeps,
-            substep=ca.Function("substep", [x, u, p, t, h], [kept], names, ["x1"], once)
+            substep=ca.Function("substep", [x, u, p, t, h], [without_memory], names, ["x1"], once)
             if substeps > 1 and memory
             else None,
             documentation=documentation,

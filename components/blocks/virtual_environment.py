@@ -55,7 +55,6 @@ def virtual_environment(
     """
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
-    units = coordinate_units(linkage)
     counts = further_points.counts(users) if directions else []
     block = Block(
         inputs=follow_mechanism.inputs(linkage, copy),
@@ -68,7 +67,7 @@ def virtual_environment(
         ],
         states=[*states(linkage), *(Variable(name) for name in counts)],
         outputs=[
-            *_outputs(linkage, units),
+            *_pose_outputs(linkage),
             *([mobility_output()] if mobility else []),
             *(direction_outputs() if directions else []),
             *(further_points.mobility_output(name) for name in users if mobility),
@@ -88,9 +87,9 @@ def virtual_environment(
         output["Lambda_inv"] = space.Lambda_inv
         output |= further_points.mobilities(space, users)
     if directions:
-        for name, found in further_points.directions(block, space, users, q0, q1).items():
-            initial[name], step[name] = found.first, found.after
-            output |= found.output
+        for name, directed in further_points.directions(block, space, users, q0, q1).items():
+            initial[name], step[name] = directed.first, directed.after
+            output |= directed.output
     if linkage.closed:
         output |= _branch(block, model)
     if contacts:
@@ -118,7 +117,8 @@ def _direction_parameters(linkage: Linkage, directions: Directions) -> list[Vari
     return [length, *direction_parameters(directions)]
 
 
-def _outputs(linkage: Linkage, units: tuple[str, ...]) -> list[Variable]:
+def _pose_outputs(linkage: Linkage) -> list[Variable]:
+    units = coordinate_units(linkage)
     return [
         Variable("x", (3,), POSE, description="pose of the copy's operational point"),
         Variable("v", (3,), TWIST, description="its velocity", derivative_of="x"),

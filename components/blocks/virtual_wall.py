@@ -77,35 +77,32 @@ def virtual_wall(
         states += observer.states(Passivity(), ("m",), ("N",))
         outputs += observer.OUTPUTS
     block = Block(inputs=inputs, parameters=parameters, states=states, outputs=outputs)
+    return _component(block, unilateral)
+
+
+def _component(block: Block, unilateral: bool) -> Component:
+    """The block with the parts whose variables it has."""
     u, p = block.u, block.p
-    x = quantised(u["x"], p["quantum"]) if quantum is not None else u["x"]
-    F = -p["stiffness"] * (x - p["position"])
-    if differenced:
+    x = quantised(u["x"], p["quantum"]) if "quantum" in p else u["x"]
+    v = ca.SX(0)
+    if "x_last" in block.x:
         v = (x - block.x["x_last"]) / p[STEP_SIZE]
-    elif moved:
+    elif "v" in u:
         v = u["v"]
-    if damping is not None:
+    F = -p["stiffness"] * (x - p["position"])
+    if "damping" in p:
         F -= p["damping"] * v
     if unilateral:
         F = ca.if_else(x > p["position"], ca.fmin(F, 0.0), 0.0)
-    initial: dict[str, ca.SX] = {"x_last": x} if differenced else {}
-    after = dict(initial)
-    if pulse is not None:
+    initial: dict[str, ca.SX] = {"x_last": x} if "x_last" in block.x else {}
+    after, output = dict(initial), dict[str, ca.SX]()
+    if "pulse" in p:
         inside = x > p["position"]
-        samples = ca.fmax(ca.floor(p["pulse_duration"] / p[STEP_SIZE] + 0.5), 1.0)
-        begun = ca.logic_and(inside, ca.logic_not(block.x["inside"]))
-        strength = -p["pulse"] * ca.fmax(v, 0.0) / (samples * p[STEP_SIZE])
-        force = ca.if_else(begun, strength, block.x["pulse_force"])
-        left = ca.if_else(begun, samples, block.x["samples_left"])
-        F += ca.if_else(left > 0.0, force, 0.0)
+        pulse, states = _pulse(block, inside, v)
+        F += pulse
         initial |= {"inside": inside, "pulse_force": ca.SX(0), "samples_left": ca.SX(0)}
-        after |= {
-            "inside": inside,
-            "pulse_force": force,
-            "samples_left": ca.fmax(left - 1.0, 0.0),
-        }
-    output: dict[str, ca.SX] = {}
-    if passivity is not None:
+        after |= states
+    if "mass" in p:
         guarded = observer.passive(F, x, p["mass"], block.x, p)
         F, output = guarded.wrench, guarded.output
         initial, after = initial | guarded.initial, after | guarded.step
@@ -118,3 +115,19 @@ def virtual_wall(
         output={"F": F, **output},
         documentation=__doc__ or "",
     )
+
+
+def _pulse(block: Block, inside: ca.SX, v: ca.SX) -> tuple[ca.SX, dict[str, ca.SX]]:
+    """The force of the pulse (N), and its states at the next sample."""
+    p, x = block.p, block.x
+    samples = ca.fmax(ca.floor(p["pulse_duration"] / p[STEP_SIZE] + 0.5), 1.0)
+    begun = ca.logic_and(inside, ca.logic_not(x["inside"]))
+    strength = -p["pulse"] * ca.fmax(v, 0.0) / (samples * p[STEP_SIZE])
+    force = ca.if_else(begun, strength, x["pulse_force"])
+    left = ca.if_else(begun, samples, x["samples_left"])
+    states = {
+        "inside": inside,
+        "pulse_force": force,
+        "samples_left": ca.fmax(left - 1.0, 0.0),
+    }
+    return ca.if_else(left > 0.0, force, 0.0), states

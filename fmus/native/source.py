@@ -74,7 +74,7 @@ def _room(text: str, of: str) -> int:
     return max(int(n) for n in re.findall(rf"\*sz_{of} = (\d+);", text))
 
 
-def functions(made: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
+def functions(given: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
     """Static C functions in which each instruction of CasADi's virtual machine is a statement on
     local variables, and the C files with the pieces of those that are long.
 
@@ -82,7 +82,7 @@ def functions(made: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
     them: with these branches the time to compile grows with the square of the length.
     """
     generator = ca.CodeGenerator("component")
-    for function in made:
+    for function in given:
         generator.add(function if function.is_a("SXFunction") else function.expand())
     text = "#define CASADI_SYMBOL_EXPORT static\n" + generator.dump()
     text = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", text)

@@ -57,10 +57,10 @@ class InProcess(WithStates):
             self._folder = process_cache.unpack(self.description, self._folder)
             self.slave = self._instantiate()
         except Exception as error:  # FMPy raises bare Exception
-            said = str(error)
-            if said.startswith("Failed to instantiate"):
-                said = "its instantiation failed; its guid may not be that of its binary"
-            raise self._fault(f"could not be loaded: {said}", 0.0) from error
+            reason = str(error)
+            if reason.startswith("Failed to instantiate"):
+                reason = "its instantiation failed; its guid may not be that of its binary"
+            raise self._fault(f"could not be loaded: {reason}", 0.0) from error
         finally:
             os.chdir(before)  # FMPy leaves it changed where a library cannot be loaded
         outputs = self.description.outputs
@@ -291,7 +291,7 @@ class InProcess(WithStates):
     def abandon(self) -> None:
         self._status = FATAL
 
-    def _said(self) -> list[str]:
+    def _logged(self) -> list[str]:
         return messages.newest(self._key)
 
     def close(self) -> FmuFault | None:

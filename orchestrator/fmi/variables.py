@@ -83,8 +83,8 @@ class Scalar:
 def entry_of(name: str) -> tuple[str, tuple[int, ...]]:
     """`x` and (2, 3) of `x[2,3]`: the vector or matrix that a scalar is an entry of, and its
     indices; () for a scalar by itself."""
-    found = _ENTRY.search(name)
-    return _ENTRY.sub("", name), tuple(map(int, re.findall(r"\d+", found[0]))) if found else ()
+    match = _ENTRY.search(name)
+    return _ENTRY.sub("", name), tuple(map(int, re.findall(r"\d+", match[0]))) if match else ()
 
 
 def differences(tree: ElementTree.Element) -> set[str | None]:
@@ -131,29 +131,29 @@ def numbers(
         )
 
 
-MOST = 10**6
+MAX_NUMBERS = 10**6
 """Numbers of an FMU; the largest have some 10^5."""
 
 
 def require_countable(model: Any) -> None:
     """Raises ValueError for arrays with more entries than memory could hold."""
     count = sum(math.prod(variable.shape or ()) for variable in model.modelVariables)
-    if count > MOST:
-        raise ValueError(f"{count} numbers with all entries of its arrays; at most {MOST}")
+    if count > MAX_NUMBERS:
+        raise ValueError(f"{count} numbers with all entries of its arrays; at most {MAX_NUMBERS}")
 
 
 def derivatives(model: Any) -> dict[str, str]:
     """By name of an output, the name of its time derivative: by the attribute `derivative`, or
     der(y) if variable names are structured (FMI 2.0.5 sections 2.2.7 and 2.2.9)."""
     structured = model.variableNamingConvention == "structured"
-    found: dict[str, str] = {}
+    by_output: dict[str, str] = {}
     for variable in model.modelVariables:
         names = _names(variable)
         if variable.derivative is not None:
-            found |= dict(zip(_names(variable.derivative), names, strict=False))
+            by_output |= dict(zip(_names(variable.derivative), names, strict=False))
         elif structured and (y := _DERIVATIVE.fullmatch(variable.name)):
-            found |= {y[1] + name.removeprefix(variable.name): name for name in names}
-    return found
+            by_output |= {y[1] + name.removeprefix(variable.name): name for name in names}
+    return by_output
 
 
 def _names(variable: Any) -> list[str]:
