@@ -4,8 +4,8 @@ Beyond the middle of the thinner one of two shapes the nearest side is another o
 which they met: the force changes its direction, and a corner that has sunk past the axis of a
 capsule can lose or gain its spring (detection.py), and with it energy. Two polygons that go right
 through each other, and shapes that cross with no corner in the other, have no deep corner that
-shows it: `overlaps` finds them by separating axes. The walls of the enclosure are half planes, in which any
-depth is meaningful.
+shows it: `overlaps` finds them by separating axes. The walls of the enclosure are half planes, in
+which any depth is meaningful.
 """
 
 from __future__ import annotations
