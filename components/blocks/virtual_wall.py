@@ -23,6 +23,9 @@ from hapticlink.components.control import passivity as observer
 from hapticlink.components.quantisation import quantised
 from hapticlink.components.specs.control import Passivity
 
+PERIOD = 1e-3
+"""Where `step_size` (s) starts, which a run sets."""
+
 
 def virtual_wall(
     stiffness: float,
@@ -34,7 +37,6 @@ def virtual_wall(
     measured_velocity: bool,
     pulse: tuple[float, float] | None = None,
     passivity: float | None = None,
-    step_s: float = 1e-3,
 ) -> Component:
     """The FMU `virtual_wall`, sampled: F of t_k from the inputs at t_k.
 
@@ -42,7 +44,7 @@ def virtual_wall(
     the encoder (m), whose reading is rounded down to a whole number of them; None reads x exactly,
     and so does the parameter 0. pulse: M (kg) and D (s), None without; D is rounded to whole
     periods, at least one. The backward difference starts with v = 0; its T is the parameter
-    `step_size`, which starts at step_s (s). passivity: m (kg) of the device, with which a passivity
+    `step_size`. passivity: m (kg) of the device, with which a passivity
     controller of default settings (control/passivity.py) bounds its damping; None without.
     """
     moved = damping is not None or pulse is not None
@@ -64,7 +66,7 @@ def virtual_wall(
             Variable("pulse_duration", (), "s", pulse[1], "duration of the impulse"),
         ]
     if differenced or pulse is not None or passivity is not None:
-        parameters += [Variable(STEP_SIZE, (), "s", step_s, "period T", "fixed")]
+        parameters += [Variable(STEP_SIZE, (), "s", PERIOD, "period T", "fixed")]
     states = [Variable("x_last", (), "m")] if differenced else []
     if pulse is not None:
         states += [Variable("inside"), Variable("pulse_force", (), "N"), Variable("samples_left")]

@@ -41,11 +41,8 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
     header = "\n".join(
         [
             *(f"#define {name} {value}" for name, value in sizes.items()),
-            _table(
-                "char *const names",
-                _texts(names),
-            ),
-            _table("char *const state_names", _texts(component.state_texts)),
+            _table("char *const names", map(json.dumps, names)),
+            _table("char *const state_names", map(json.dumps, component.state_texts)),
             _table("double starts", map(_number, starts)),
             _table("char is_fixed", (str(int(flag)) for flag in fixed)),
             text,
@@ -57,10 +54,6 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
 def _table(declared: str, entries: Iterable[str]) -> str:
     """A C array with an additional 0 at its end, since a C array must not be empty."""
     return f"static const {declared}[] = {{{', '.join([*entries, '0'])}}};"
-
-
-def _texts(names: Iterable[str]) -> Iterable[str]:
-    return map(json.dumps, names)
 
 
 def _number(value: float) -> str:

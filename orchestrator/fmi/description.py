@@ -38,10 +38,7 @@ if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
 
 @dataclass(frozen=True)
 class Description:
-    """A co-simulation FMU, as its modelDescription.xml describes it.
-
-    fmi is "2" or "3"; flags are the capabilities of its CoSimulation element that are true.
-    """
+    """A co-simulation FMU, as its modelDescription.xml describes it."""
 
     path: Path
     guid: str
@@ -49,9 +46,12 @@ class Description:
     timing: Timing
     scalars: tuple[Scalar, ...]
     fmi: str = "2"
+    """The major version: "2" or "3"."""
     units: dict[str, Unit] = field(default_factory=dict)
     flags: frozenset[str] = frozenset()
+    """The capabilities of its CoSimulation element that are true."""
     step_size: str | None = None
+    """Of its default experiment (s), as it is written."""
     dependencies: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """By output: the variables that it depends on directly. An output that is not here may depend
     on every input."""

@@ -28,12 +28,7 @@ _ENTRY = re.compile(r"\[[\d, ]+\]$")
 
 @dataclass(frozen=True)
 class Scalar:
-    """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array.
-
-    conversion: applied to values of a connection to it. nominal: nominal value (FMI 2.0.5 section
-    2.2.7), 1 by default. bound: magnitude beyond which a block of this project is outside of its
-    model.
-    """
+    """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array."""
 
     name: str
     reference: int
@@ -43,10 +38,15 @@ class Scalar:
     variability: str = "continuous"
     start: float = 0.0
     relative: bool = False
+    """Whether it is a difference, to which the offset of a unit does not apply."""
     entry: int = 0
+    """Its index among the entries of its array, row by row."""
     conversion: Linear = SAME
+    """Applied to values of a connection to it."""
     nominal: float = 1.0
+    """Nominal value (FMI 2.0.5 section 2.2.7)."""
     bound: float | None = None
+    """The magnitude beyond which a block of this project is outside of its model."""
     initial: str | None = None
     items: tuple[tuple[str, int], ...] = ()
     """Of an enumeration: name and value of each."""
