@@ -24,7 +24,7 @@ ROWS = 500
 def lines(results: Results) -> Iterator[str]:
     """A line for the deepest contact beyond the middle of a shape, and for the stiffest
     pair that pushes or sticks."""
-    scene = results.run["scene"]
+    record, scene = results.record, results.record.scene
     table = of_block(results, CONTACT_GAP)
     if table is None or not len(table["time"]) or not scene["linkage"] or not scene["contacts"]:
         return
@@ -34,8 +34,8 @@ def lines(results: Results) -> Iterator[str]:
         yield from _deep(linkage, contacts, table)
     mechanism = scene_part(results, "mechanism", Mechanism)
     if mechanism.integrator != "passive-midpoint" and len(table["time"]) > 1:
-        rate = results.run["fmus"][CONTACT_GAP.partition(".")[0]]["rate"]
-        step_s = results.run["clocks"][rate]["longest"] / mechanism.substeps
+        rate = record.fmus[CONTACT_GAP.partition(".")[0]].rate
+        step_s = record.clocks[rate].longest / mechanism.substeps
         implicit = mechanism.integrator == "linearly-implicit"
         yield from _stiff(linkage, contacts, step_s, implicit)
 

@@ -26,7 +26,7 @@ BOUND = 0.1
 
 def coarse(results: Results) -> Iterator[str]:
     """A line for each joint whose friction errs by more than BOUND of its largest rate."""
-    linkage, speeds = results.run["scene"]["linkage"], results.run.get("friction_speeds", {})
+    linkage, speeds = results.record.scene["linkage"], results.record.friction_speeds
     if not linkage or not speeds:
         return
     units = [(j["name"], unit) for j in linkage["joint"] for unit in COORDINATE_UNITS[j["type"]]]
@@ -43,7 +43,7 @@ def coarse(results: Results) -> Iterator[str]:
             )
 
 
-def _turns(rate: NDArray[np.float64], least: float) -> int:
-    """How often `rate` changes its sign, counted once it is beyond `least`."""
-    signs = np.sign(rate[np.abs(rate) > least])
+def _turns(rate: NDArray[np.float64], smallest: float) -> int:
+    """How often `rate` changes its sign, counted once it is beyond `smallest`."""
+    signs = np.sign(rate[np.abs(rate) > smallest])
     return int(np.count_nonzero(signs[1:] != signs[:-1]))

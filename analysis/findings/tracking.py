@@ -29,7 +29,7 @@ class Tracking(NamedTuple):
 
 def further_users(results: Results) -> list[str]:
     """The points at which users beside the first one hold a device."""
-    users = (user_of_block(name, DEVICE) for name in results.run["fmus"])
+    users = (user_of_block(name, DEVICE) for name in results.record.fmus)
     return [u for u in users if u and all(of_block(results, signal, 3) for signal in poses(u))]
 
 
@@ -53,11 +53,10 @@ def of_any_shape(results: Results, signal: str) -> Table | None:
     """The table that contains a signal of a block of the haptic loop, or of the FMU in its place;
     None for an FMU of others that only has the same name, of whose ports nothing is known."""
     name = signal.partition(".")[0]
-    fmu = results.run["fmus"].get(name)
-    if fmu is None:
+    fmu = results.record.fmus.get(name)
+    if fmu is None or not (name == fmu.block or name.startswith(f"{fmu.block}_")):
         return None
-    block = fmu.get("block", name)
-    return table_of(results, signal) if name == block or name.startswith(f"{block}_") else None
+    return table_of(results, signal)
 
 
 def has_tracking(results: Results) -> bool:

@@ -19,7 +19,7 @@ mobility modulates power. It needs the mechanism's own (`mechanism.directions`) 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,6 +52,7 @@ from hapticlink.orchestrator.base.loop_names import (
     block_of_user,
     signal_of_user,
 )
+from hapticlink.orchestrator.results.record import BlockEnergy, PortEnergy
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 
@@ -65,16 +66,19 @@ class UserPort(NamedTuple):
     works: dict[str, float]
 
     @property
-    def told(self) -> dict[str, Any]:
-        """For run.json."""
+    def measured(self) -> PortEnergy:
+        """What run.json says of it."""
         peak = int(np.argmax(self.generated_J))
-        found = {"generated": self.generated_J[-1], "peak": self.generated_J[peak]}
-        found |= {"time_of_peak": self.time_s[peak]}
-        blocks = {
-            name: {"generated": float(energy[-1]), "peak": float(energy.max())}
-            for name, energy in self.blocks_J.items()
-        }
-        return {k: float(v) for k, v in found.items()} | {"blocks": blocks, "works": self.works}
+        return PortEnergy(
+            generated=float(self.generated_J[-1]),
+            peak=float(self.generated_J[peak]),
+            time_of_peak=float(self.time_s[peak]),
+            blocks={
+                name: BlockEnergy(float(energy[-1]), float(energy.max()))
+                for name, energy in self.blocks_J.items()
+            },
+            works=self.works,
+        )
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
@@ -93,12 +97,12 @@ def user_port(results: Results) -> UserPort | None:
     stored = energy - energy[0]
     put_in = {"": works(results, HAND_WRENCH, HANDLE_POSE, time)[0]}
     further = np.zeros(len(time))
-    for name in results.run["connections"]:
+    for name in results.record.connections:
         hand, _, target = name.partition(" -> ")
         point = target.removesuffix(".F_hand").removeprefix(f"{MECHANISM}.")
         if target != f"{MECHANISM}.{point}.F_hand":
             continue
-        if with_device := block_of_user(DEVICE, point) in results.run["fmus"]:
+        if with_device := block_of_user(DEVICE, point) in results.record.fmus:
             hand, position = signal_of_user(HAND_WRENCH, point), signal_of_user(HANDLE_POSE, point)
         else:
             position = f"{MECHANISM}.{point}.x"
@@ -111,7 +115,7 @@ def user_port(results: Results) -> UserPort | None:
         else:
             further += done
     generated = stored - further - sum(put_in.values())
-    lacks = needed(results, put_in) & {*results.run.get("not_recorded", ())}
+    lacks = needed(results, put_in) & {*results.record.not_recorded}
     blocks = {} if lacks else by_block(results, time, stored - further, put_in)
     return UserPort(time, generated, blocks, _works(results, device, time))
 
@@ -120,7 +124,7 @@ def pushed_by_others(results: Results) -> list[str]:
     """The connections to handles from other sources than the hands of their users."""
     return [
         name
-        for name in results.run["connections"]
+        for name in results.record.connections
         for user in ("", *further_users(results))
         if name.endswith(f" -> {signal_of_user(HANDLE_POSE, user).partition('.')[0]}.F_hand")
         and not name.startswith(f"{signal_of_user(HAND_WRENCH, user)} ")
@@ -156,7 +160,7 @@ def _held_mobility(results: Results, device: Table) -> Vector | None:
     where it is not held, or not by zoh, or the mechanism's own is not put out."""
     held, own = (of_block(results, signal, 3, 3) for signal in MOBILITIES)
     crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
-    if not held or own is not device or results.run["holds"].get(crossing) != "zoh":
+    if not held or own is not device or results.record.holds.get(crossing) != "zoh":
         return None
     rows = np.searchsorted(held["time"], device["time"] + 1e-12, "right") - 1
     change = held[MOBILITIES[0]][rows] - device[MOBILITIES[1]]

@@ -13,12 +13,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hapticlink.analysis.tune.gains import Scales
-from hapticlink.analysis.tune.held_equilibria import Complex, Held, Matrix, Vector
+from hapticlink.analysis.tune.held_equilibria import Held
 from hapticlink.analysis.tune.largest_scale import DOUBLINGS
 from hapticlink.analysis.tune.spring_hand import FIRM
 from hapticlink.analysis.tune.stability_limits import FINE
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.loop_names import (
     ENVIRONMENT_WRENCH,

@@ -94,13 +94,13 @@ _SENSED_STATES = [
 ]
 
 
-def _parameters(device: Device) -> list[Variable]:
+def _parameters(device: Device, sensed: bool) -> list[Variable]:
     def of(rows: tuple[tuple[str, str, str], ...], variability: Variability) -> list[Variable]:
         return [Variable(n, (), u, getattr(device, n), d, variability) for n, u, d in rows]
 
     start = Variable("x_start", (3,), POSE, 0.0, "pose of the handle at the start", "fixed")
     parameters = [start, *of(_FIXED, "fixed"), *of(_TUNABLE, "tunable")]
-    if device.sensing == "encoders":
+    if sensed:
         parameters += of((("encoder_resolution", "rad", "angle of one encoder count"),), "fixed")
         gains = device.observer
         parameters += [
@@ -163,36 +163,35 @@ class _Encoders:
         return {"x_measured": pose, "x_observer": after.x1, "v_observer": after.x2}
 
 
-def haptic_device(device: Device) -> Component:
+def haptic_device(device: Device, encoders: bool = False) -> Component:
     """The FMU `haptic_device`, with the parameters of `device`.
 
-    sensing "ideal": x, v and F_hand_observed are the true values. "encoders": x is the pose that
+    Without `encoders`, x, v and F_hand_observed are the true values. With them, x is the pose that
     belongs to the quantised base angles, v and F_hand_observed come from the observer. M and
     c = C_d v are evaluated at the measured pose and velocity, workspace_margin at the true pose.
     All dimensions are assumed, since the report only gives the 0.09 degrees of an encoder count.
     At t = 0 the handle is at rest at x_start and the observed force is zero.
     """
-    sensed = device.sensing == "encoders"
     block = Block(
         inputs=_INPUTS,
-        parameters=_parameters(device),
-        states=[*_STATES, *(_SENSED_STATES if sensed else [])],
+        parameters=_parameters(device, encoders),
+        states=[*_STATES, *(_SENSED_STATES if encoders else [])],
         outputs=_OUTPUTS,
     )
     x, u, p = block.x, block.u, block.p
-    encoders = _Encoders(block, device.observer.rule) if sensed else None
+    measured = _Encoders(block, device.observer.rule) if encoders else None
     pose, v, F_hand = (
-        (encoders.pose, encoders.velocity, encoders.F_hand)
-        if encoders
+        (measured.pose, measured.velocity, measured.F_hand)
+        if measured
         else (x["x_true"], x["v_true"], u["F_hand"])
     )
     tau = pantograph.motor_torques(u["F_motor"], pose, p)
     motion = _moved(block, tau, device.substeps)
     initial = {"x_true": p["x_start"], "v_true": ca.SX.zeros(3)}
     step = {"x_true": motion[:3], "v_true": motion[3:]}
-    if encoders:
-        initial |= encoders.initial()
-        step |= encoders.step(motion[:3], tau)
+    if measured:
+        initial |= measured.initial()
+        step |= measured.step(motion[:3], tau)
     M, c = pantograph.motion(pose, v, p)
     return block.component(
         "haptic_device",

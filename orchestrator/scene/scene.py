@@ -192,10 +192,21 @@ class Scene:
         return None
 
     @property
-    def users(self) -> dict[str, Controller]:
-        """The controllers of the devices at further points, by point."""
+    def all_hands(self) -> dict[str, Hand]:
+        """The hands by the points that they hold; the first one's name is empty."""
+        return ({"": self.hand} if self.hand else {}) | dict(self.hands)
+
+    @property
+    def all_devices(self) -> dict[str, Device]:
+        """The devices by user, who is named by the point; the first one's name is empty."""
+        return ({"": self.device} if self.device else {}) | dict(self.devices)
+
+    @property
+    def all_controllers(self) -> dict[str, Controller]:
+        """The controllers of `all_devices`, by user."""
+        first = {"": self.controller} if self.controller else {}
         own = self.controller or Controller()
-        return {name: self.controllers.get(name, own) for name in self.devices}
+        return first | {name: self.controllers.get(name, own) for name in self.devices}
 
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""

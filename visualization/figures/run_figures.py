@@ -5,7 +5,7 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -94,18 +94,15 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
         found["user_port"] = partial(_port, results, port)
     if generated := _generated(results):
         found["energies"] = partial(_energies, results, generated)
-    if (paced := results.run.get("real_time")) and paced["ticks"]:
+    if (paced := results.record.real_time) and paced["ticks"]:
         found["real_time"] = partial(real_time, results)
     return found
 
 
-def warm_up() -> None:
-    """Draws a figure that nobody sees: the first one takes longest, as it loads fonts."""
-    ended = Results(None, {"end": {"reason": "duration"}}, {})
-    figure, axes = titled(ended, "0", "0", "0")
-    axes.plot([0, 1], label="0")
-    figure_axes.legend_below(figure)
-    png(figure)
+def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
+    """Name and PNG of each figure of a run, each drawn when it is asked for."""
+    for name, draw in drawings(results).items():
+        yield name, png(draw())
 
 
 def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
@@ -145,7 +142,7 @@ def _mark(results: Results, axes: Axes) -> None:
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
     """Label, line style and path (mm) of operational point, handle and further points."""
-    linkage = results.run["scene"]["linkage"] or {}
+    linkage = results.record.scene["linkage"] or {}
     further = [
         (signal_of_user(POINT_POSE, point["name"]), f"point {point['name']}", "-.")
         for point in linkage.get("point", ())
@@ -229,7 +226,7 @@ def _constraints(results: Results, table: Table, name: str) -> Figure:
 
 
 def _port(results: Results, port: UserPort) -> Figure:
-    peak = 1e3 * port.told["peak"]
+    peak = 1e3 * port.measured.peak
     title = f"The rendering generates at most {short(peak)} mJ"
     if peak > 0 and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
@@ -248,10 +245,7 @@ def _port(results: Results, port: UserPort) -> Figure:
 
 def _generated(results: Results) -> dict[str, float]:
     """Energy (J) that the hold of each connection generated, connections across rates first."""
-    across = results.run.get("energies", "none")  # a crash leaves none
-    within = results.run.get("energies_within_a_rate", {})
-    booked = ({} if across == "none" else across) | within
-    return {name: energy["generated"] for name, energy in booked.items()}
+    return {name: energy.generated for name, energy in results.record.meters.items()}
 
 
 def _energies(results: Results, generated: dict[str, float]) -> Figure:

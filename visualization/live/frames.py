@@ -31,8 +31,8 @@ from hapticlink.orchestrator.base.loop_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.results.record import Energy
 from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
-from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.visualization.mechanism.picture import PORT
 
 SHOWN = {

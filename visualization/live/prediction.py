@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hapticlink.analysis.stability.analysis import Stability, at_rest
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.modes import leading
+from hapticlink.analysis.stability.scene_stability import Stability, at_rest
 from hapticlink.analysis.stability.state_vector import size
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
-import hapticlink as hl
 from hapticlink.components.blocks import BLOCKS
 from hapticlink.orchestrator.base import loop_names
 from hapticlink.orchestrator.base.loop_names import block_of_user, signal_of_user, user_of_block
-from hapticlink.orchestrator.system.built import built
+from tests.orchestrator.systems import system_of
 
 
 def _constants() -> Iterator[str]:
@@ -18,16 +16,15 @@ def _constants() -> Iterator[str]:
             yield from (value,) if isinstance(value, str) else value
 
 
-def _outputs(scene: str, options: dict[str, Any]) -> Iterator[str]:
-    with built(hl.scene(scene, options)) as system:
-        for fmu in system.fmus:
-            yield from (f"{fmu.name}.{s.port}" for s in fmu.description.outputs)
+def _outputs(scene: str, options: tuple[str, ...]) -> Iterator[str]:
+    for fmu in system_of(scene, *options).fmus:
+        yield from (f"{fmu.name}.{s.port}" for s in fmu.description.outputs)
 
 
 def test_every_name_is_a_block_or_an_output_of_one() -> None:
-    options = {"mechanism.directions": True, "controller.passivity": True}
-    midpoint = {"mechanism.integrator": "passive-midpoint"}
-    scenes = {"closed-loop": {}, "obstacles": options, "pendulum": midpoint}
+    options = ("mechanism.directions=true", "controller.passivity=true")
+    midpoint = ("mechanism.integrator=passive-midpoint",)
+    scenes = {"closed-loop": (), "obstacles": options, "pendulum": midpoint}
     known = {*BLOCKS, *(name for item in scenes.items() for name in _outputs(*item))}
     missing = sorted({*_constants()} - known)
     assert not missing, missing
