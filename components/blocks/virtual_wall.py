@@ -44,8 +44,8 @@ def virtual_wall(
     the encoder (m), whose reading is rounded down to a whole number of them; None reads x exactly,
     and so does the parameter 0. pulse: M (kg) and D (s), None without; D is rounded to whole
     periods, at least one. The backward difference starts with v = 0; its T is the parameter
-    `step_size`. passivity: m (kg) of the device, with which a passivity
-    controller of default settings (control/passivity.py) bounds its damping; None without.
+    `step_size`. passivity: m (kg) of the device, with which a passivity controller of default
+    settings (control/passivity.py) bounds its damping; None without.
     """
     moved = damping is not None or pulse is not None
     differenced = moved and not measured_velocity
