@@ -66,16 +66,9 @@ def virtual_environment(
             *(contact_forces.detection_parameters(linkage, contacts) if contacts else []),
         ],
         states=[*states(linkage), *(Variable(name) for name in counts)],
-        outputs=[
-            *_pose_outputs(linkage),
-            *([mobility_output()] if mobility else []),
-            *(direction_outputs() if directions else []),
-            *(further_points.mobility_output(name) for name in users if mobility),
-            *(further_points.direction_outputs(users) if directions else []),
-            *_branch_outputs(linkage),
-            *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
-            *(held_matrices.ports(linkage) if local_model else []),
-        ],
+        outputs=_outputs(
+            linkage, directions, contacts, users, mobility=mobility, local_model=local_model
+        ),
     )
     model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
     q1, qd1 = follow_mechanism.step(block, model, copy)
@@ -117,12 +110,27 @@ def _direction_parameters(linkage: Linkage, directions: Directions) -> list[Vari
     return [length, *direction_parameters(directions)]
 
 
-def _pose_outputs(linkage: Linkage) -> list[Variable]:
+def _outputs(
+    linkage: Linkage,
+    directions: Directions | None,
+    contacts: Contacts | None,
+    users: further_points.Users,
+    *,
+    mobility: bool,
+    local_model: bool,
+) -> list[Variable]:
     units = coordinate_units(linkage)
     return [
         Variable("x", (3,), POSE, description="pose of the copy's operational point"),
         Variable("v", (3,), TWIST, description="its velocity", derivative_of="x"),
         Variable("q", (len(units),), units, description="the copy's coordinates"),
+        *([mobility_output()] if mobility else []),
+        *(direction_outputs() if directions else []),
+        *(further_points.mobility_output(name) for name in users if mobility),
+        *(further_points.direction_outputs(users) if directions else []),
+        *_branch_outputs(linkage),
+        *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
+        *(held_matrices.ports(linkage) if local_model else []),
     ]
 
 
