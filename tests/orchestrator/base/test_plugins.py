@@ -93,7 +93,7 @@ REGISTER = "from hapticlink.{0} import {1}\n{2}\n{1}.register('mine', {3})\n"
 HOLDS, METHODS, BLOCKS, FAMILIES, SCHEMES, COMMANDS, FORCES = (
     ("orchestrator.holds", "HOLDS"), ("components.integrators", "METHODS"),
     ("components.blocks", "BLOCKS"), ("orchestrator.scene.families", "FAMILIES"),
-    ("orchestrator.plan.schemes", "SCHEMES"), ("orchestrator.commands", "COMMANDS"),
+    ("orchestrator.plan.schemes", "SCHEMES"), ("commands", "COMMANDS"),
     ("components.forces", "FORCES"),
 )  # fmt: skip
 
