@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import IO, Any
 
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.fmi.worker_process import APART
+from hapticlink.orchestrator.fmi.worker_process import OWN_GROUP
 
 MAX_WAITING = 256
 """Messages that wait in either direction; of older ones frames are dropped."""
@@ -26,7 +26,7 @@ class Link:
     def __init__(self, module: str, *arguments: str) -> None:
         command = [sys.executable, "-P", "-m", module, *arguments]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **APART
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **OWN_GROUP
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

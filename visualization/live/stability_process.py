@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.fmi.worker_process import APART
+from hapticlink.orchestrator.fmi.worker_process import OWN_GROUP
 
 REST = 1.0
 """Time (s) for which nothing was changed before the verdict is computed."""
@@ -56,7 +56,9 @@ class StabilityProcess:
     async def _answer(self, asked: bytes) -> None:
         await asyncio.sleep(REST)
         command = (sys.executable, "-P", "-m", __name__)
-        process = await asyncio.create_subprocess_exec(*command, stdin=PIPE, stdout=PIPE, **APART)
+        process = await asyncio.create_subprocess_exec(
+            *command, stdin=PIPE, stdout=PIPE, **OWN_GROUP
+        )
         assert process.stdin
         assert process.stdout
         try:
