@@ -127,8 +127,8 @@ def test_power_across_rates_is_told_and_kept_in_check(tmp_path: Path) -> None:
         assert set(run["power_across_rates"]) == set(run["energies"]) == forces
         made[hold] = sum(e["generated"] for e in run["energies"].values())
     assert {run["holds"][name] for name in forces} == {"passive"}
-    reasons = run["holds_that_did_not_fit"]
-    assert "not a declared power connection" in reasons["virtual_mechanism.x -> controller.x_S"]["reason"]
+    refused = run["holds_that_did_not_fit"]["virtual_mechanism.x -> controller.x_S"]
+    assert "not a declared power connection" in refused["reason"]
     assert made["zoh"] > 0.1
     assert made["passive"] < 0
 
