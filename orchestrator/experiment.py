@@ -78,6 +78,7 @@ def _left_out(every: System, system: System) -> list[str]:
     return [*dict.fromkeys(left_out)]
 
 
+@interrupt.held()
 def simulate(
     scene: str | Path | Scene,
     folder: Path | str,
@@ -94,24 +95,9 @@ def simulate(
     rows of this one are written. Without `csv` the tables stay in the binary form in which a run
     writes them.
     """
-    with interrupt.held():
-        begin = perf_counter()
-        read = open_scene.load(scene, options)
-        with folder_lock.held(Path(folder)):
-            folder = Path(folder).absolute()  # whatever the FMUs do to the current directory
-            return _simulated(read, folder, progress, csv, real_time, begin)
-
-
-def _simulated(
-    read: Scene,
-    folder: Path,
-    progress: Progress | None,
-    csv: bool,
-    real_time: RealTimeRun | None,
-    begin: float,
-) -> Experiment:
-    """begin: when the scene began to be read (s)."""
-    with built(read) as every:
+    begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
+    read = open_scene.load(scene, options)
+    with folder_lock.held(folder), built(read) as every:
         system = with_fetched(every)
         plan = Plan(system)
         plan.check()

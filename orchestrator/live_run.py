@@ -297,7 +297,7 @@ class LiveRun:
         system = self._simulation.system
         new = held_by(c, hold, delay)
         why = misfit(new.hold or "", new, system.fmu, system.energy.power, False)
-        if system.coupling.scheme == "iterated" or system.coupling.step_control:
+        if system.coupling.scheme == "iterated":
             why = "steps are repeated"
         spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
         on_force = spring and any(

@@ -130,7 +130,6 @@ def lines(results: Results) -> Iterator[str]:
     yield from _passivity(results)
     yield from _stopped(results)
     yield from _contacts(results)
-    yield from _forced(record)
     for name, link in record.links.items():
         if link.lost or link.overtaken:
             yield (
@@ -154,13 +153,6 @@ def _steps(record: RunRecord) -> Iterator[str]:
         yield f"warning: {counts.unconverged} of {counts.steps} iterated steps did not converge"
     for fmu, errors in record.step_errors.items():
         yield from long_steps(fmu, errors, record.fmus[fmu].block)
-
-
-def _forced(record: RunRecord) -> Iterator[str]:
-    for clock, steps in record.controlled_steps.items():
-        if steps.forced:
-            few = f"{steps.forced} of {steps.taken} steps were accepted at the smallest size"
-            yield f"warning: {clock}: {few} although their error was too large"
 
 
 def _refused_holds(record: RunRecord) -> Iterator[str]:

@@ -67,10 +67,10 @@ class InProcess(WithStates):
                 self.slave = self._instantiate()
             self._keep_arithmetic()
         except Exception as error:  # FMPy raises bare Exception
-            said = str(error)
-            if said.startswith("Failed to instantiate"):
-                said = "its instantiation failed; its guid may not be that of its binary"
-            raise self._fault(f"could not be loaded: {said}", 0.0) from error
+            reason = str(error)
+            if reason.startswith("Failed to instantiate"):
+                reason = "its instantiation failed; its guid may not be that of its binary"
+            raise self._fault(f"could not be loaded: {reason}", 0.0) from error
         outputs = self.description.outputs
         self.gets = self.fewer = self._transfers("Get", outputs, self.outputs)
         if self.seldom:
@@ -308,7 +308,7 @@ class InProcess(WithStates):
     def abandon(self) -> None:
         self._status = FATAL
 
-    def _said(self) -> list[str]:
+    def _logged(self) -> list[str]:
         return messages.newest(self._key)
 
     def close(self) -> FmuFault | None:

@@ -21,8 +21,8 @@ class Place(ctypes.Structure):
 
     def calls(self) -> dict[str, int]:
         """The number of calls of the loop by kind, without those that were not made."""
-        found = {name: getattr(self, name + "s") for name in _CALLS}
-        return {name: count for name, count in found.items() if count}
+        counts = {name: getattr(self, name + "s") for name in _CALLS}
+        return {name: count for name, count in counts.items() if count}
 
     def start(self) -> None:
         """Count from here."""

@@ -115,8 +115,8 @@ class Isolated(Instance):
         return set_from
 
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
-        found: Matrix | None = self._ask("jacobian", outputs, inputs)
-        return found
+        matrix: Matrix | None = self._ask("jacobian", outputs, inputs)
+        return matrix
 
     def enter_initialization(self, stop_time: float) -> None:
         self._answer()  # of `_load`

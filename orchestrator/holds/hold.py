@@ -7,18 +7,17 @@ from typing import ClassVar, Literal
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.restorable import Restorable
 
 Needs = Literal["derivative", "integral", "power", "spring"]
 
 
-class Hold(Restorable, ABC):
+class Hold(ABC):
     """Gives the value of an input between two samples of its source. Times are in ticks.
 
     At t = 0 a hold receives the source's initial output, stamped 0, before its value is read, also
     where samples are delayed. There is no sample of the time before: until the second one arrives,
-    the hold has only that. A rollback restores a hold from a deep copy of its attributes, so they
-    must contain its whole state.
+    the hold has only that. The lifted map of a scene reads and writes the state of a hold in its
+    attributes, so they must contain all of it.
     """
 
     needs: ClassVar[Needs | None] = None
@@ -30,8 +29,6 @@ class Hold(Restorable, ABC):
     """Whether every value is one of the samples, unchanged, so that a matrix keeps its kind."""
     degree: ClassVar[int] = 0
     """Degree of the value as a polynomial in time within a step of the target; 0 if constant."""
-    order: ClassVar[int] = 1
-    """Order of the global error between plants of one rate, which step control uses."""
     interpolates: ClassVar[bool] = False
     """Whether it interpolates once the sample of the step's end is known (coupling "iterated")."""
     downsamples: ClassVar[bool] = False

@@ -169,7 +169,6 @@ def _details(
         iterations=loop.iterations(),
         unstable=unstable(system, energies),
         step_errors={name: found for name, found in errors.items() if found},
-        controlled_steps=loop.steps(),
         energies={name: e for name, e in energies.items() if name in across} or "none",
         energies_within_a_rate={name: e for name, e in energies.items() if name not in across},
     )

@@ -36,7 +36,7 @@ EVERY = 97
 prime, so that checks fall on all phases between two rates."""
 FIRST = 13
 SLOT = 2
-"""Slot of the saved FMU state, beside those of iteration and step control."""
+"""Slot of the saved FMU state, beside that of iteration."""
 JUMP, SHARE = 2.0, 0.05
 """A step is checked where the one before has changed v by more than a JUMP of the largest change
 that led to a check, and by more than a SHARE of the largest v."""

@@ -142,6 +142,8 @@ def _shown(value: Any) -> str:
 
 def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     """The message for an unknown key, or for one that belongs to another `type` of the table."""
+    if path == ("step_control",):
+        return "steps are as long as their rate says: take it out, with a higher rate or `substeps`"
     kinds, table, key = schema.at(path[:-1], data), value(data, path[:-1]), str(path[-1])
     types = {name: k for k in kinds for name in schema.types(k)}
     branch = loc[-2] if len(loc) > 1 else None  # without a type, pydantic tried the default's

@@ -34,7 +34,7 @@ PATIENCE = 120.0
 """Seconds after which it is hung, on a machine that is busy with other things."""
 MEMORY = 6 << 30
 """Bytes of address space."""
-CRASHED = ("Traceback", "Fatal Python error", internal_error.TOLD)
+CRASHED = ("Traceback", "Fatal Python error", internal_error.PREFIX)
 MESSAGE = 20_000
 """Characters of a message that somebody may read."""
 

@@ -25,7 +25,7 @@ from websockets.http11 import Request, Response
 
 from hapticlink.visualization.live import messages
 from hapticlink.visualization.live.link import read
-from hapticlink.visualization.live.stability_process import MapBeside
+from hapticlink.visualization.live.stability_process import StabilityProcess
 from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
 from hapticlink.visualization.mechanism.picture import Picture
 
@@ -57,7 +57,7 @@ class Pages:
         self._holding: dict[str, ServerConnection | None] = {"": None}
         self._picture: Picture | None = None
         self._kept: dict[str, str] = {}
-        self._map = MapBeside(self.show)
+        self._map = StabilityProcess(self.show)
         self._files = {p.name: p for p in PAGE.iterdir() if p.suffix in TYPES}
 
     # --- from the haptic loop -----------------------------------------------------------------
@@ -145,7 +145,7 @@ def _response(status: HTTPStatus, file: Path | None = None) -> Response:
 
 async def _bound(pages: Pages, host: str, port: int) -> Server:
     return await serve(
-        pages.window, host, port, process_request=pages.answer, max_size=messages.MOST,
+        pages.window, host, port, process_request=pages.answer, max_size=messages.MAX_CHARACTERS,
         compression=None, server_header=None, open_timeout=5, close_timeout=1,
     )  # fmt: skip
 

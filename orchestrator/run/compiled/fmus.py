@@ -54,7 +54,7 @@ def of_instance(
         saved = instance.retry.saved[0]
         c.get_state, c.state = address(saved.get), ctypes.addressof(saved.state)
     if isinstance(instance, InProcess3):
-        c.event, c.terminate, c.early = map(ctypes.addressof, instance.told)
+        c.event, c.terminate, c.early = map(ctypes.addressof, instance.step_flags)
         c.reached = ctypes.addressof(instance.reached)
     c.gets, c.n_gets = of_transfers(instance.gets, instance, memory), len(instance.gets)
     c.outputs, c.n_outputs = instance.outputs.ctypes.data, len(instance.outputs)

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.delayed import Delayed
 from hapticlink.orchestrator.holds.energy_account import Account
@@ -22,7 +21,6 @@ from hapticlink.orchestrator.holds.mean import Mean
 from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
-from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.holds.second_order import SecondOrder
 from hapticlink.orchestrator.holds.slope import Slope
 from hapticlink.orchestrator.holds.smooth import Smooth
@@ -82,20 +80,19 @@ def parts(hold: Hold) -> Parts:
     return Parts(hold, angles, matrix, link, further, far)
 
 
-def can(hold: Hold, rolls_back: bool) -> bool:
+def can(hold: Hold, repeats: bool) -> bool:
     """Whether there is C for a hold: not for classes of plugins, not for matrices whose hold needs
-    more than their samples, and not for samples in transit or an energy account that a rollback
-    takes back."""
+    more than their samples, and not for samples in transit or an energy account where steps are
+    repeated."""
     found = parts(hold)
     if found.matrix and found.own.needs:
         return False
     grows = found.link or isinstance(found.own, Account)
-    return type(found.own) in KINDS and not (grows and rolls_back)
+    return type(found.own) in KINDS and not (grows and repeats)
 
 
-class State(Restorable):
-    """Words of 8 bytes with a structure at their beginning and its arrays behind it, which is all
-    that a rollback restores."""
+class State:
+    """Words of 8 bytes with a structure at their beginning and its arrays behind it."""
 
     def __init__(self, words: int) -> None:
         self.words, self._end = np.zeros(words, np.int64), 0
@@ -110,12 +107,6 @@ class State(Restorable):
         at = self._end
         self.place(ctypes.sizeof(kind) // 8)
         return kind.from_buffer(self.words.data, 8 * at)
-
-    def saved(self) -> NDArray[np.int64]:
-        return self.words.copy()
-
-    def restore(self, saved: NDArray[np.int64]) -> None:
-        self.words[:] = saved
 
 
 def _words(kind: type[ctypes.Structure]) -> int:
@@ -287,7 +278,7 @@ class CompiledHold(Hold, State):
         return found
 
 
-def tanks(holds: Iterable[Hold], rolls_back: bool) -> dict[int, CompiledTank]:
+def tanks(holds: Iterable[Hold], repeats: bool) -> dict[int, CompiledTank]:
     """The energy tanks in C, by the id of the tank, of those all whose holds have C."""
     shared: dict[int, tuple[EnergyTank, list[Hold]]] = {}
     for hold in holds:
@@ -297,5 +288,5 @@ def tanks(holds: Iterable[Hold], rolls_back: bool) -> dict[int, CompiledTank]:
     return {
         key: CompiledTank(tank)
         for key, (tank, of) in shared.items()
-        if all(can(hold, rolls_back) for hold in of)
+        if all(can(hold, repeats) for hold in of)
     }

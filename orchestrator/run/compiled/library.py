@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from hapticlink.fmus import cache as fmu_cache
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.run.compiled import build
 
 CHOICE = "HAPTICLINK_LOOP"
@@ -62,7 +63,7 @@ def _compiled() -> Path:
     library = root / build.name()
     if library.exists():
         return library
-    why = "it is not built, and there is no C compiler: pip install '.[native]'"
+    why = f"it is not built, and there is no C compiler: {install_command('native')}"
     for compiler in build.compilers():
         try:
             root.mkdir(parents=True, exist_ok=True)

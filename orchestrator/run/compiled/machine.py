@@ -88,21 +88,18 @@ class Machine:
 
     def _make_holds(self) -> None:
         simulation, system = self._simulation, self._simulation.system
-        rolls_back = (
-            system.coupling.scheme == "iterated" or system.coupling.step_control is not None
-        )
-        shared = tanks(simulation.holds.values(), rolls_back)
+        repeats = system.coupling.scheme == "iterated"
+        shared = tanks(simulation.holds.values(), repeats)
         for name, hold in simulation.holds.items():
             own = parts(hold).own
             needed = getattr(own, "tank", None)
             tank = shared.get(id(needed))
-            if not can(hold, rolls_back) or (needed and tank is None):
+            if not can(hold, repeats) or (needed and tank is None):
                 continue
             simulation.holds[name] = self._made(name, hold, tank)
         compiled = [h for h in simulation.holds.values() if isinstance(h, CompiledHold)]
         for hold in compiled:
             hold.join(compiled)
-        simulation.springs[:] = [shared.get(id(tank), tank) for tank in simulation.springs]
 
     def _made(self, name: str, hold: Hold, tank: CompiledTank | None = None) -> CompiledHold:
         signals = self._simulation.signals
@@ -114,7 +111,7 @@ class Machine:
         """Replace the hold of a connection. Raises InputFault where the old or the new one has no
         C."""
         for each in (hold, self._simulation.holds[name]):
-            if not isinstance(each, CompiledHold) and not can(each, rolls_back=False):
+            if not isinstance(each, CompiledHold) and not can(each, repeats=False):
                 kind = type(parts(each).own).__name__
                 raise InputFault(f"hold of {name}: there is no C for {kind}: take `reset`")
         self._simulation.holds[name] = made = self._made(name, hold)
