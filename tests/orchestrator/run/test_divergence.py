@@ -62,7 +62,7 @@ def test_energy_that_nobody_put_in(tmp_path: Path, capsys: pytest.CaptureFixture
     heun = "mechanism.integrator=heun"
     assert simulate("pendulum", tmp_path / "fine", [fine, heun]).outcome.fault is None
     options = ("--set", coarse, "--set", heun)
-    assert status("run", "pendulum", "--out", tmp_path / "coarse", *options) == 1
+    assert status("run", "pendulum", "--no-figures", "--out", tmp_path / "coarse", *options) == 1
     told = capsys.readouterr()
     assert "J more than it had at the start and was given: the run has diverged" in told.err
     assert "pendulum: diverged at 10 s" in told.out
@@ -95,6 +95,6 @@ def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path: Pa
 def test_holds_that_make_more_than_was_put_in_are_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert status("run", "sampled-spring", "--out", tmp_path) == 0
+    assert status("run", "sampled-spring", "--no-figures", "--out", tmp_path) == 0
     said = "neither hands nor mechanism put in any on the whole: the loop is not passive"
     assert said in capsys.readouterr().out

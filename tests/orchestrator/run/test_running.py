@@ -10,7 +10,7 @@ import pytest
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.results import tables
 from tests.orchestrator.foreign_fmus import COMMAND, fmu_table, python_fmu, run, scene
-from tests.shared_fixtures import status
+from tests.shared_fixtures import run_once, status
 
 SHORT = ("--set", "duration=0.2")
 ROCKER = "linkage.start.rocker=2.9"
@@ -51,7 +51,7 @@ def test_a_start_that_assembly_moves_far_is_told(
 ) -> None:
     for options, count in (((), 0), (("--set", ROCKER), 1)):
         assert status("info", "four-bar", *options) == 0
-        assert status("run", "four-bar", "--out", tmp_path, *SHORT, *options) == 0
+        assert status("run", "four-bar", "--no-figures", "--out", tmp_path, *SHORT, *options) == 0
         told = capsys.readouterr().out
         assert told.count("the loops do not close at the given start") == 2 * count
     assert told.count("rocker from 2.9 to ") == 2
@@ -91,10 +91,8 @@ def test_a_scene_of_given_fmus_has_nothing_to_build(
     assert not (tmp_path / "fmus").exists()
 
 
-def test_a_signal_of_another_rate_is_told_where_it_is(tmp_path: Path) -> None:
-    phase = ("--set", "phases.virtual_mechanism=0.0005")
-    assert status("run", "closed-loop", "--out", tmp_path, *SHORT, *phase) == 0
-    found = tables.load(tmp_path)
+def test_a_signal_of_another_rate_is_told_where_it_is() -> None:
+    found = run_once("closed-loop", {"duration": 0.2, "phases.virtual_mechanism": 0.0005})
     (table,) = (n for n, t in found.tables.items() if "virtual_mechanism.x" in t)
     assert table != "haptics"
     with pytest.raises(KeyError, match=rf"it is in tables\['{table}'\]"):
