@@ -185,7 +185,7 @@ def test_limit_of_the_coupling_to_one_percent(
 def radius(made: System) -> float:
     """The spectral radius of the lifted map, over a hyperperiod."""
     with lifted_map(made) as map_:
-        found = modes(equilibrium(map_, trajectory(map_, 10.0)), map_.period)
+        found = modes(equilibrium(map_, trajectory(map_, 0.2)), map_.period)
     return max(abs(mode.z) for mode in found if not mode.neutral)
 
 
