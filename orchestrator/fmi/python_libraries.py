@@ -79,7 +79,8 @@ def _libraries() -> Path:
     if root is not None:
         with suppress(OSError):
             folder = root / "libraries"
-            folder.mkdir(parents=True, exist_ok=True)
+            fmu_cache.private(root)
+            fmu_cache.private(folder)
             if os.access(folder, os.W_OK | os.X_OK):
                 return folder
     folder = Path(temporary_folders.new())
