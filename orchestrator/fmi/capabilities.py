@@ -6,6 +6,7 @@ from hapticlink.orchestrator.fmi.description import Description
 
 VARIABLE_STEP = "canHandleVariableCommunicationStepSize"
 INPUT_DERIVATIVES = "canInterpolateInputs"
+NEEDS_TOOL = "needsExecutionTool"
 STATE = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
 """FMI 2.0.5 section 4.3.1, FMI 3.0 section 4.3.1."""
 DIRECTIONAL_DERIVATIVES = {

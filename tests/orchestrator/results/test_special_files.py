@@ -73,7 +73,7 @@ def test_a_folder_in_the_place_of_run_json_is_told(
 ) -> None:
     folder_as_story(out)
     assert status("run", "pendulum", "--out", out, "--no-figures") != 0
-    assert "directory" in capsys.readouterr().err
+    assert "it is no file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
