@@ -12,12 +12,18 @@ Needs = Literal["derivative", "integral", "power", "spring"]
 
 
 class Hold(ABC):
-    """Gives the value of an input between two samples of its source. Times are in ticks.
+    """A hold reconstructs the value of an input between two samples of its source.
 
-    At t = 0 a hold receives the source's initial output, stamped 0, before its value is read, also
-    where samples are delayed. There is no sample of the time before: until the second one arrives,
-    the hold has only that. The lifted map of a scene reads and writes the state of a hold in its
-    attributes, so they must contain all of it.
+    1. Times are whole ticks; `HoldContext.seconds` converts them.
+    2. At t = 0 the hold receives the source's initial output, stamped 0, before its value is read,
+       also where samples are delayed. There is no sample of the time before: until the second one
+       arrives, the hold has only that.
+    3. `push` takes a sample with the instant at which the source had it (its stamp) and the instant
+       at which the target gets it (its arrival). Stamps never decrease.
+    4. `value` may be called several times at a tick, for different instants, and returns a vector
+       of `HoldContext.size` finite numbers, which the caller does not change.
+    5. The whole state of a hold is in its attributes: the lifted map of a scene reads and writes it
+       there.
     """
 
     needs: ClassVar[Needs | None] = None
