@@ -153,7 +153,7 @@ def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path: Path) -> No
     run = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").run
     assert set(run["isolated"]) == {"good_none_0", "source"}
     scene = hostile_scene(tmp_path, "make_sleep_0")
-    command = [sys.executable, "-m", "hapticlink", "run", str(scene), "--out", str(tmp_path / "o")]
+    command = [*COMMAND, "run", str(scene), "--out", str(tmp_path / "o")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         time.sleep(4.0)
         assert process.poll() is None
