@@ -66,7 +66,7 @@ class Hold(ABC):
         """The input for the instant `tick + ahead`, read by the target at `tick` and computed from
         the samples known by then.
 
-        `ahead` is in ticks, and may be a fraction of one. For a plant that holds its inputs constant
-        over a step it is half the step, for a sampled block 0; in real time it is less by what the
-        event comes late, and may be negative.
+        `ahead` is in ticks, and may be a fraction of one. For a plant that holds its inputs
+        constant over a step it is half the step, for a sampled block 0; in real time it is less by
+        what the event comes late, and may be negative.
         """
