@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from hapticlink import commands
-from hapticlink.orchestrator.base import internal_error
+from hapticlink.commands import internal_error
 
 ENOUGH = 0.5
 """Seconds from a run's first row on after which it is ended."""

@@ -14,6 +14,7 @@ from typing import Any
 import jsonschema
 import pytest
 
+from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.scene import (
     find_scene,
     key_descriptions,
@@ -21,7 +22,6 @@ from hapticlink.orchestrator.scene import (
     reference,
     schema,
 )
-from hapticlink.orchestrator.scene.json_schema import json_schema
 from hapticlink.orchestrator.scene.scene import Scene
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.shared_fixtures import status
