@@ -48,7 +48,8 @@ called; or a function itself. Its arguments and docstring define the command, an
 exit status."""
 
 app.register_install_completion_command(
-    help="Write the script that completes commands, options, scenes and keys in your shell."
+    add_to_startup=False,  # nobody has asked for a change of ~/.bashrc
+    help="Write the script that completes commands, options, scenes and keys in your shell.",
 )
 
 Plugin = Annotated[

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -134,3 +135,33 @@ def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
     found = tables.load(out)
     assert found.run["fault"]["kind"] == "Crash"
     assert found.haptics["time"].tolist() == [k / 64 for k in range(20)]
+
+
+def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path: Path) -> None:
+    """A tool that never answers would hang the run; one signal ends it while it loads."""
+    hostile_fmu(tmp_path, "2", needsExecutionTool="true")
+    run = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").run
+    assert set(run["isolated"]) == {"good_none_0", "source"}
+    scene = hostile_scene(tmp_path, "make_sleep_0")
+    command = [sys.executable, "-m", "hapticlink", "run", str(scene), "--out", str(tmp_path / "o")]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(4.0)
+        assert process.poll() is None
+        process.terminate()
+        _, said = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert "interrupted" in said
+
+
+def test_what_a_run_does_not_use_of_fmi_3_is_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    scene = hostile_scene(tmp_path, "good_none_0")
+    hostile_fmu(tmp_path, "3")
+    simulate(scene, tmp_path / "out")
+    assert "not used" not in caplog.text
+    flags = ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate")
+    hostile_fmu(tmp_path, "3", **dict.fromkeys(flags, "true"))
+    simulate(scene, tmp_path / "out")
+    offered = "event mode, early return, intermediate update, which is not used"
+    assert f"good_none_0 offers {offered}" in caplog.text
