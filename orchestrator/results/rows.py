@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import to_json
 
+from hapticlink.orchestrator.base.faults import InputFault
+
 SUFFIX = ".rows"
 AT_A_TIME = 1 << 16
 """Bytes of rows that are made text at a time."""
@@ -126,7 +128,10 @@ def _parts(path: Path) -> Iterator[Rows]:
 
 
 def _columns(line: bytes) -> tuple[str, ...]:
-    return tuple(next(csv.reader([line.decode()])))
+    try:
+        return tuple(next(csv.reader([line.decode()])))
+    except (csv.Error, UnicodeDecodeError, StopIteration) as error:
+        raise InputFault(f"the rows of a run: no header that names columns: {error}") from error
 
 
 def _quoted(name: str) -> str:
