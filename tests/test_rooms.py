@@ -41,6 +41,7 @@ BUILDINGS = {
         "ssp",
         ".",
     ),
+    "programs": (".",),
     "analysis": ("findings", "stability", "sweep", "maps", "tune"),
     "visualization": (".", "mechanism", "figures", "live", "replay", "compare"),
     "api": (".",),

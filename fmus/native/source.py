@@ -46,7 +46,7 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
                 _texts(names),
             ),
             _table("char *const state_names", _texts(component.state_texts)),
-            _table("double starts", map(_number, starts)),
+            _table("double starts", map(number, starts)),
             _table("char is_fixed", (str(int(flag)) for flag in fixed)),
             text,
         ]
@@ -63,7 +63,7 @@ def _texts(names: Iterable[str]) -> Iterable[str]:
     return map(json.dumps, names)
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     if math.isfinite(value):
         return repr(float(value))
     return "NAN" if math.isnan(value) else "INFINITY" if value > 0 else "-INFINITY"

@@ -236,7 +236,7 @@ class CompiledHold(Hold, State):
             self._account = CompiledAccount(own)
             c.account = ctypes.addressof(self._account.c)
             self._account.c.tank = tank.words.ctypes.data if tank else None
-        self._room = 0
+        self.room = 0
         self.grow()
         if tank and isinstance(own, PassiveSetPosition):
             c.tank, c.row = tank.words.ctypes.data, own.row
@@ -259,12 +259,12 @@ class CompiledHold(Hold, State):
 
     def grow(self) -> None:
         """Make room for more samples."""
-        self._room = 2 * self._room or FEW
+        self.room = 2 * self.room or FEW
         if self.link is not None:
-            self._transit.to(self._room)
-            self.link.room = self._room
+            self._transit.to(self.room)
+            self.link.room = self.room
         if self._account:
-            self._account.to(self._room)
+            self._account.to(self.room)
 
     def serve(self, code: int) -> None:
         """Do what `push` or `value` in C have returned for."""
