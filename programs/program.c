@@ -6,7 +6,7 @@
  *     fmi2DoStep   all events from where the program stands up to, but not at, the last tick at or
  *                  before the end of the step: what happens at a tick needs the inputs of that tick
  *     fmi2GetReal  an output of a block at its newest communication point that is not past the
- *                  program's: of the block itself, or of the vector of signals while the block is
+ *                  program's: of the block itself, or of its clock's newest row while the block is
  *                  ahead, as slow ones are
  *     fmi2SetReal  inputs and parameters go to the block; those of the block that is left out stand
  *                  in the vector of signals
@@ -369,6 +369,10 @@ static int serve(Model *m, int code) {
                 return 1;
             }
         }
+        if (op->code == RECORD) { /* a table holds the newest row */
+            *l->tables[op->a].rows = 0;
+            return 1;
+        }
         if ((op->code == SAMPLE || op->code == MOVE) && meter_fold(l->meters[op->a])) return 1;
         break;
     case FAILED: case STEPPED: case UNSAVED: case UNRESTORED:
@@ -505,7 +509,8 @@ static fmi2Status value_of(Model *m, const Variable *v, double *value) {
     case OUTPUT:
         if (m->now.mode == INITIALIZATION && settle(m) != fmi2OK) return fmi2Error;
         if (l->fmus[member_fmus[v->member]].place->end > seconds(m, m->now.tick)) {
-            *value = l->values[v->place];
+            const Table *t = l->tables + member_tables[v->member];
+            *value = t->block[1 + v->place - (t->view - l->values)];
             return fmi2OK;
         }
     default: return members[v->member].get(m->members[v->member], &v->reference, 1, value);

@@ -143,7 +143,8 @@ class Regions:
 
 
 class _Fields(dict[str, Any]):
-    """Fields of structures by name, the nearest first, then the counts that are known."""
+    """Fields of structures by name, the nearest first, then the counts that are known; a pointer to
+    a number is an array of it."""
 
     def __init__(self, known: tuple[Any, ...], counts: Mapping[str, int]) -> None:
         super().__init__()
@@ -152,5 +153,7 @@ class _Fields(dict[str, Any]):
     def __missing__(self, name: str) -> Any:
         for entry in self._known:
             if hasattr(entry, name):
-                return getattr(entry, name)
+                value = getattr(entry, name)
+                is_pointer = name in POINTERS.get(type(entry).__name__, {})
+                return (ctypes.c_int64 * 1).from_address(value) if is_pointer else value
         return self._given[name]

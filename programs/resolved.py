@@ -81,6 +81,8 @@ class Resolved:
     """The connections of the loop's holds, in its order."""
     meters: list[str]
     """Those of its energy meters."""
+    tables: list[str]
+    """The clocks of its tables."""
     patterns: list[Pattern]
     """Of each clock."""
     recorded: frozenset[str]
@@ -188,6 +190,7 @@ def _resolved(
     setters = (structures.Setter * len(into))()
     for c, fmu in zip(setters, into, strict=True):
         _start_setter(simulation, fmu, c, memory)
+    rows = _newest_rows(machine, simulation)
     meters = (ctypes.POINTER(structures.Meter) * len(machine.names("meter"))).from_address(
         machine.loop.meters
     )
@@ -211,7 +214,8 @@ def _resolved(
         meters=machine.names("meter"),
         patterns=events.patterns,
         recorded=recorded,
-        kept=(machine, events, setters, memory),
+        tables=machine.names("table"),
+        kept=(machine, events, setters, memory, rows),
     )
 
 
@@ -229,8 +233,6 @@ def _as_before_the_start(simulation: Simulation, outside: str | None) -> None:
         values[simulation.signals.fmu(outside)] = start[simulation.signals.fmu(outside)]
     for instance in simulation.instances.values():
         ctypes.memset(ctypes.addressof(instance.place), 0, ctypes.sizeof(instance.place))
-    for recorder in simulation.recorders.values():
-        recorder.room.value = 1
     for check in simulation.step_checks.values():
         check.found, check.times = check.found[:STEP_CHECKS], check.times[:STEP_CHECKS]
     for connection, meter in simulation.meters.of.items():
@@ -246,6 +248,21 @@ def _steps_apart(system: System, connection: str) -> int:
     c, timeline = system.connection[connection], system.timeline
     clocks = [timeline.clock(system.fmu[fmu].clock) for fmu in (c.source, c.target)]
     return max(clock.longest for clock in clocks) // min(clock.shortest for clock in clocks)
+
+
+def _newest_rows(machine: Machine, simulation: Simulation) -> list[object]:
+    """Gives each table room for one row: all outputs of its clock at the newest event. What is
+    returned has to be kept."""
+    kept: list[object] = []
+    n = len(machine.names("table"))
+    tables = (structures.Table * n).from_address(machine.loop.tables)
+    for c, clock in zip(tables, machine.names("table"), strict=True):
+        outputs = simulation.signals.values[simulation.signals.clock(clock)]
+        row, numbers = np.zeros(1 + len(outputs)), np.array([0, 1], np.int64)
+        c.block, c.view, c.where, c.n = row.ctypes.data, outputs.ctypes.data, None, len(outputs)
+        c.rows, c.room = numbers[:1].ctypes.data, numbers[1:].ctypes.data
+        kept += [row, numbers]
+    return kept
 
 
 def _start_setter(simulation: Simulation, fmu: str, c: structures.Setter, memory: Memory) -> None:
@@ -264,7 +281,7 @@ def _kinds(timeline: Timeline) -> Iterator[Event]:
     ends = [clock.starts[-1] for clock in timeline.clocks if isinstance(clock.starts, tuple)]
     clocks = tuple(replace(clock, starts=_endless(clock.starts)) for clock in timeline.clocks)
     repeats = math.lcm(*(_repeats(clock.starts) for clock in clocks))
-    until = min([max(clock.first for clock in clocks) + repeats, *ends])
+    until = min(ends) if ends else max(clock.first for clock in clocks) + repeats
     found: dict[Event, None] = {}
     endless = replace(timeline, clocks=clocks, end=NO_END)
     for tick, event in islice(moments(endless), MAX_EVENTS):

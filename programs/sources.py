@@ -136,6 +136,8 @@ def _scene(
             _table("int slot_members", map(str, slot_members)),
             _table("int member_fmus", (str(resolved.fmus.index(fmu)) for fmu in members)),
             _table("int fmu_members", (str(members.index(fmu)) for fmu in resolved.fmus)),
+            _table("int member_tables", (
+                str(resolved.tables.index(resolved.system.fmu[fmu].clock)) for fmu in members)),
             _table("int start_fmus", map(str, resolved.start_fmus)),
             _table("Pattern patterns", (f"{{{p.n}, {p.ticks}}}" for p in resolved.patterns)),
             _table("Latency latencies", latencies),

@@ -193,7 +193,7 @@ typedef struct {
  * are filled; NULL where there is no table. due: whether the next one is. room: 0 before the
  * first. reached: time of the newest, written or not. */
 typedef struct {
-    double *block;
+    double *block /* [room[0] * (1 + n)] */;
     const double *view /* [n] */;
     const int64_t *where /* [n] */;
     int64_t *rows;
