@@ -54,13 +54,14 @@ def build(
         raise InputFault("--without leaves a block out of one FMU: add --as-one")
     if all_platforms and read.packaging != "native":
         raise InputFault("--all-platforms compiles: add --set packaging=native")
-    if not blocks(read):
+    planned = blocks(read)
+    if not planned.built:
         raise InputFault(f"{read.title}: nothing to build: its FMUs are given as files")
     folder = folders.ensure(out)
     starts = _starts(read)
     with temporary_folders.room() as room:
         platforms = PLATFORMS if all_platforms else ()
-        files = fmu_files(read, timeline(read), room, platforms, starts)
+        files = fmu_files(read, planned, timeline(read, planned), room, platforms, starts)
         for name, path in files.items():
             with atomic_file(folder / f"{name}.fmu") as unfinished:
                 shutil.copyfile(path, unfinished)

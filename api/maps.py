@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from hapticlink.analysis.maps import Map, made
+from hapticlink.analysis.maps import Map, compute_map
 from hapticlink.analysis.sweep.points import Vary, axes
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folders
@@ -47,6 +47,6 @@ def stability_map(
     processes = jobs or os.cpu_count() or 1
     tell = progress or (lambda done, of: None)
     given = overrides.written(options)
-    found = made(scene, given, axes(vary), folder, processes, check, seed, tell)
+    found = compute_map(scene, given, axes(vary), folder, processes, check, seed, tell)
     sweep_figure.save(drawing.draw(found), folder / "map.png")
     return found

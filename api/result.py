@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 from hapticlink.analysis.findings import summary
+from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import Tracking, pose_error, table_of
 from hapticlink.api.frame import frame
 from hapticlink.orchestrator.base.faults import unknown
@@ -57,8 +59,16 @@ class Run(Results):
     def fault(self) -> str | None:
         """The message of the fault that ended the run, such as an FMU's error or a crash; None if
         it ended regularly, also by `stop_when` or at the limit of the device's workspace."""
-        found = self.run.get("fault")
-        return found["message"] if found else None
+        return self.record.fault.message if self.record.fault else None
+
+    def measures(self, until: float = math.inf) -> Measures:
+        """The numbers of a run: `tracking`, largest and root mean square by user; `forces`, the
+        largest of each wrench (N); `motors`, the largest share of their torque limit; `closure_m`;
+        `constrained`, the numbers of constrained directions; `folded`, frames with a folded
+        graphics copy; `port`, the energy at the user's port (J); `held`, the energy of each hold
+        (J). Those of paths, forces and torques are until a time (s), the others of the whole run.
+        """
+        return Measures(self, until)
 
     def tracking(self) -> Tracking:
         """Tracking error `(time_s, distance_mm, angle_rad)`: |x_S - x_D| and |theta_S - theta_D|

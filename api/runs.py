@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.analysis.findings import summary
-from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.analysis.findings.measures import Measures
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
@@ -16,13 +16,13 @@ from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import folders, tables
+from hapticlink.orchestrator.results import folder_lock, folders, tables
+from hapticlink.orchestrator.results.record import content
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_axes
-from hapticlink.visualization.figures import figure_process
 
 MOST = 2**30
 """Bytes of tables that a run in a folder reads back; as numbers they take half of that."""
@@ -53,10 +53,10 @@ def run(
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
     (docs/real-time.md).
 
-    Raises InputFault for invalid input, before anything runs. A fault during the run raises no
-    exception: it is the `fault` of the returned Run, which has the results up to then. Ctrl-C
-    raises RunInterrupted, with the results so far as its `run`. Tables of more than 1 GiB in `out`
-    are not read back; use `load` for them.
+    Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
+    A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
+    results up to then. Ctrl-C raises RunInterrupted, with the results so far as its `run`. Tables
+    of more than 1 GiB in `out` are not read back; use `load` for them.
     """
     with interrupt.held():
         read = open_scene.load(scene, options)
@@ -81,7 +81,8 @@ def run_paced(
             told = ended.run | _told(found) if found else ended.run
             made = Run(None, told, found.tables if found else {})
         else:
-            made = _in_folder(scene, Path(out), progress, figures, real_time)
+            with folder_lock.held(Path(out)):
+                made = _in_folder(scene, Path(out), progress, figures, real_time)
         if interrupt.came() or made.run["end"]["reason"] == "interrupted":
             raise RunInterrupted(made)
     return made
@@ -89,8 +90,8 @@ def run_paced(
 
 def _told(results: Results) -> dict[str, Any]:
     """What run.json says of the results: warnings, and the energy at the user's port."""
-    port = user_port(results)
-    return {"user_port": port and port.told, "warnings": list(summary.lines(results))}
+    port = Measures(results).port
+    return {"user_port": port and content(port), "warnings": list(summary.lines(results))}
 
 
 def _in_folder(
@@ -136,7 +137,9 @@ def _explained(ended: Experiment) -> list[str]:
 
 def _drawn(ended: Experiment, found: Results) -> list[str]:
     """Writes the figures; returns their names. Raises Interrupted and OSError."""
-    return figure_axes.write(figure_process.pngs(found), ended.folder)
+    from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
+
+    return figure_axes.write(run_figures.pngs(found), ended.folder)
 
 
 def load(folder: str | Path) -> Run:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import thread_time
 
@@ -17,11 +16,16 @@ DURATIONS = (3, 15)
 COLUMNS = ("packaging", "loop", "round", "tick_us")
 
 
-def recorded(scene: str, out: Path, options: list[str]) -> float:
+def alone(options: list[str], folder: Path, seconds: int) -> float:
+    """Processor time (s) of the loop in C."""
+    return bare_scene.seconds(SCENE, options, RATE * seconds, folder)
+
+
+def recorded(options: list[str], folder: Path, seconds: int) -> float:
     """Processor time (s) of our loop."""
     event_loop.perf_counter, before = thread_time, event_loop.perf_counter
     try:
-        ended = simulate(scene, out, options).outcome
+        ended = simulate(SCENE, folder / "out", [*options, f"duration={seconds}"]).outcome
     finally:
         event_loop.perf_counter = before
     assert ended.fault is None
@@ -32,15 +36,10 @@ def measure(rows: Rows, rounds: int, folder: Path) -> None:
     """Add the microseconds of processor time per tick, of both loops by turns."""
     for packaging in ("native", "python"):
         fixed = [f"packaging={packaging}", "stop_when=''"]
-        loops: Mapping[str, Callable[[int], float]] = {
-            "C loop": lambda s, fixed=fixed: bare_scene.seconds(SCENE, fixed, RATE * s, folder),
-            "hapticlink": lambda s, fixed=fixed: recorded(
-                SCENE, folder / "out", [*fixed, f"duration={s}"]
-            ),
-        }
+        loops = {"C loop": alone, "hapticlink": recorded}
         for turn in range(rounds):
             for name, run in loops.items():
                 if (packaging, name, turn) not in rows:
-                    short, long = (min(run(s) for _ in range(3)) for s in DURATIONS)
+                    short, long = (min(run(fixed, folder, s) for _ in range(3)) for s in DURATIONS)
                     ticks = RATE * (DURATIONS[1] - DURATIONS[0])
                     rows.add(packaging, name, turn, 1e6 * (long - short) / ticks)

@@ -81,7 +81,8 @@ class Bodies:
     weight."""
 
     def __init__(self, linkage: Linkage) -> None:
-        if any(j.type != "revolute" for j in (*linkage.joint, *linkage.loop)) or linkage.spring:
+        kinds = {*(j.type for j in linkage.joint), *(loop.type for loop in linkage.loop)}
+        if kinds != {"revolute"} or linkage.spring:
             raise ValueError("the reference knows revolute joints, and no springs")
         self.linkage = linkage
         self._place = {b.name: i for i, b in enumerate(linkage.body)}
@@ -119,8 +120,8 @@ class Bodies:
             parent = frames[joint.parent]
             pivot, drift = moved(parent, joint.at_parent)
             angle, omega = parent[1] + value, parent[3] + rate
-            back = tuple(-c for c in joint.at_child or (0.0, 0.0))
-            origin, velocity = moved((pivot, angle, drift, omega), back)
+            x, y = joint.at_child or (0.0, 0.0)
+            origin, velocity = moved((pivot, angle, drift, omega), (-x, -y))
             frames[joint.child] = (origin, angle, velocity, omega)
         z, zd = [], []
         for b in self.linkage.body:

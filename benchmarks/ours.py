@@ -6,10 +6,11 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,6 +21,7 @@ from hapticlink.components.specs.linkage import Linkage, Mechanism
 from hapticlink.fmus.native import compile_library
 from hapticlink.fmus.native.source import functions
 
+Vector = np.ndarray
 _DRIVER = """
 FMI2_Export void run(long steps, double* x, double* y, const double* u, const double* p,
          const double* h, casadi_int* iw, double* w) {
@@ -74,11 +76,8 @@ class Ours:
     def virtual_machine(self) -> Callable[[int], tuple[float, float, float]]:
         def run(steps: int) -> tuple[float, float, float]:
             x = self.start.copy()
-            buffer, trigger = self.component.step.buffer()
             after, t, h = np.zeros_like(x), np.zeros(1), np.array([self.h])
-            for i, a in enumerate((x, self.u, self.p, t, h)):
-                buffer.set_arg(i, memoryview(a))
-            buffer.set_res(0, memoryview(after))
+            _buffer, trigger = in_place(self.component.step, (x, self.u, self.p, t, h), after)
             began = time.perf_counter()
             for k in range(steps):
                 t[0] = k * self.h
@@ -123,6 +122,20 @@ class Ours:
             return np.nan, np.nan
         found = self.outputs(x)["x"]
         return float(found[0]), float(found[1])
+
+
+def in_place(
+    step: ca.Function, arguments: Sequence[Vector], after: Vector
+) -> tuple[Any, Callable[[], None]]:
+    """A call that carries out a `step` on what the `arguments` (x, u, p, t, h) hold then, and
+    writes the state `after` it, without allocating memory. The arrays and the buffer, which is
+    returned first, have to be kept as long as it is called."""
+    buffer: Any
+    buffer, trigger = step.buffer()
+    for i, values in enumerate(arguments):
+        buffer.set_arg(i, values.data)
+    buffer.set_res(0, after.data)
+    return buffer, trigger
 
 
 def _compiled(step: ca.Function, folder: Path) -> Path:

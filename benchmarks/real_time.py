@@ -62,7 +62,7 @@ class EmptyLoop:
         return self.pace.report()
 
 
-def bench(folder: Path, quick: bool, told: Callable[[str, int, int], object], command: str) -> None:
+def bench(folder: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
     """Write the page and its figure to `folder`."""
     seconds = QUICK if quick else SECONDS
     empty = EmptyLoop(seconds)

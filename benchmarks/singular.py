@@ -76,7 +76,8 @@ def linkage() -> Linkage:
         for j in straight.joint
     )
     start = {
-        name: angle + TURN * name.startswith("pivot") for name, angle in straight.start.items()
+        name: float(angle) + TURN * name.startswith("pivot")  # type: ignore[arg-type]
+        for name, angle in straight.start.items()
     }
     gravity = turned(straight.gravity or (0.0, 0.0))
     return replace(straight, joint=joints, start=start, gravity=gravity)

@@ -19,6 +19,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -50,8 +51,10 @@ def nothing_skipped() -> Iterator[None]:
     fetched at each communication point, and every input is set."""
     build = blocks._loop
 
-    def always(*given: object) -> Setter:
-        return Setter(*given[:-1], 0)
+    def always(*given: Any) -> Setter:
+        setter = Setter(*given)
+        setter.key = 0
+        return setter
 
     with ExitStack() as stack:
         for module, name, instead in (
@@ -77,7 +80,7 @@ def run(scene: str, folder: Path, skipping: str, *options: str) -> Experiment:
 
 def counts(made: Experiment, skipping: str) -> tuple[int, int, int]:
     """Operations of the graphs of all steps, FMI calls, and values set or fetched by them."""
-    scene, system, calls = made.scene, made.system, made.outcome.calls
+    scene, system, calls = made.scene, made.system, made.outcome.details.calls
     found = costs.costs(scene, timeline(scene), skip=skipping == ON)
     operations = sum(c.cost.step * calls[c.name]["step"] for c in found)
     moved = 0

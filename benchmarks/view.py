@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import hapticlink as hl
+from hapticlink.orchestrator.live_run import LiveRun
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.live.link import Link
 from hapticlink.visualization.live.mouse_hand import viewed
@@ -53,7 +54,7 @@ class Measured(Session):
         with suppress(Done):
             self.run()
 
-    def _turn(self, live: hl.RealTime) -> None:
+    def _turn(self, live: LiveRun) -> None:
         pace = live._run.pace
         self.ahead.append((live.time, time.time() - 1e-9 * (pace.now() - pace.c.origin)))
         if not self.before and self.acted:
@@ -65,7 +66,7 @@ class Measured(Session):
             self.after = live.report()
             raise Done
 
-    def _note_pulls(self, live: hl.RealTime) -> None:
+    def _note_pulls(self, live: LiveRun) -> None:
         given = live.set
 
         def noted(name: str, value: ArrayLike) -> None:

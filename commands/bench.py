@@ -11,33 +11,24 @@ from hapticlink.commands.options import Out
 from hapticlink.commands.progress import timed
 from hapticlink.orchestrator.base import interrupt
 
-BENCHES = {
-    "mechanism": "benchmarks.run:mechanism_bench",
-    "singular": "benchmarks.singular:bench",
-    "local-model": "benchmarks.local_model:bench",
-    "master": "benchmarks.master:bench",
-    "cosimulation": "benchmarks.cosimulation:bench",
-    "skip": "benchmarks.skip:bench",
-    "real-time": "benchmarks.real_time:bench",
-    "stress": "benchmarks.stress:bench",
-    "view": "benchmarks.view:bench",
-}
+Benchmark = Literal[
+    "mechanism",
+    "singular",
+    "local-model",
+    "master",
+    "cosimulation",
+    "skip",
+    "real-time",
+    "stress",
+    "view",
+]
+"""The function `bench` of the module of this name in benchmarks/, dashes as underscores."""
 FOLDERS = {"stress": "stability"}
 """Folders in results/ that are not named like the benchmark."""
 
 
 def bench(
-    what: Literal[
-        "mechanism",
-        "singular",
-        "local-model",
-        "master",
-        "cosimulation",
-        "skip",
-        "real-time",
-        "stress",
-        "view",
-    ],
+    what: Benchmark,
     /,
     *,
     out: Out = None,
@@ -61,17 +52,17 @@ def bench(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    make = checkout.function("bench", BENCHES[what])
+    make = checkout.function("bench", f"benchmarks.{what.replace('-', '_')}:bench")
     folder = out or checkout.folder("bench") / "results" / FOLDERS.get(what, what)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     command = f"hapticlink bench {what}{' --quick' * quick}"
     with timed(command), Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(what)
 
-        def told(text: str, done: int, total: int) -> None:
+        def tell(text: str, done: int, total: int) -> None:
             interrupt.check()
             bar.update(task, description=text, completed=done, total=total)
 
-        page = make(folder, quick, told, command)
+        page = make(folder, quick, tell, command)
     print(page or folder / "README.md")
     return 0

@@ -16,9 +16,9 @@ def folder(command: str) -> Path:
     import hapticlink.components
 
     root = Path(next(iter(hapticlink.components.__path__))).resolve().parent
-    if not (root / "benchmarks" / "run.py").exists():
+    if not (root / "benchmarks" / "__init__.py").exists():
         raise InputFault(
-            f"`{command}`: benchmarks and studies are not part of the installed package; "
+            f"`hapticlink {command}`: benchmarks and studies are not in the installed package; "
             "clone the project and install it with `pip install -e .[peers]`"
         )
     if str(root) not in sys.path:

@@ -30,7 +30,7 @@ def compare(runs: Runs, /, *, out: Out = None, json: Json = False) -> int:
         hapticlink compare runs/on runs/off --json
     """
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.checked_run import named
+    from hapticlink.orchestrator.results.named_runs import named
     from hapticlink.visualization.compare import numbers, overlay, settings
     from hapticlink.visualization.figures import run_figures
 

@@ -81,7 +81,7 @@ def info(
         else:
             note = "at the start only"
         say(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
-    for line in summary.replaced({n: asdict(r) for n, r in made.replacements.items()}):
+    for line in summary.replaced(made.replacements):
         say(f"  {line}")
     if read.device:
         from hapticlink.analysis.findings import workspace

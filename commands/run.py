@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,7 +23,6 @@ from hapticlink.commands.options import (
 from hapticlink.commands.progress import progress
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.base.terminal_output import say
-from hapticlink.visualization.figures.figure_process import prepared
 
 if TYPE_CHECKING:
     from hapticlink.api.result import Run
@@ -67,48 +65,46 @@ def run(
         hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
         hapticlink run my-scene.toml --no-figures --json > result.json
     """
-    # Not beside the steps of a run in real time, which it would delay.
-    with prepared() if figures and not (explain or real_time) else nullcontext():
-        import hapticlink as hl
-        from hapticlink.analysis.findings import summary
+    import hapticlink as hl
+    from hapticlink.analysis.findings import summary
 
-        given = options(set, swap)
-        if explain:
-            say(*hl.explain(scene, given), sep="\n")
-            return 0
-        folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ())))
-        try:
-            read = hl.scene(scene, given)
-            with progress(read.title, read.duration, hidden=quiet) as told:
-                made = hl.run(read, out=folder, figures=figures, progress=told, real_time=real_time)
-        except hl.RunInterrupted as ended:
-            made = ended.run
-    if made.fault:
-        say(f"hapticlink: {made.fault}", file=sys.stderr)
-    warned = made.run.get("warnings")
-    if warned is None:  # no row is in the folder, or too many to be read back
-        warned = list(summary.lines(made))
+    overrides = options(set, swap)
+    if explain:
+        say(*hl.explain(scene, overrides), sep="\n")
+        return 0
+    folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ())))
+    try:
+        read = hl.scene(scene, overrides)
+        with progress(read.title, read.duration, hidden=quiet) as report:
+            result = hl.run(read, out=folder, figures=figures, progress=report, real_time=real_time)
+    except hl.RunInterrupted as ended:
+        result = ended.run
+    if result.fault:
+        say(f"hapticlink: {result.fault}", file=sys.stderr)
+    warnings = result.run.get("warnings")
+    if warnings is None:  # no row is in the folder, or too many to be read back
+        warnings = list(summary.lines(result))
     if quiet or json:
-        for line in warned:
+        for line in warnings:
             say(f"hapticlink: {line}", file=sys.stderr)
     name = default_folder("runs", scene).name
-    tell(_lines(made, warned, name, folder), made.run, quiet, json)
-    return Fault.exit_status if made.fault else 0
+    tell(_lines(result, warnings, name, folder), result.run, quiet, json)
+    return Fault.exit_status if result.fault else 0
 
 
-def _lines(made: Run, warned: Sequence[str], name: str, folder: Path) -> Iterator[str]:
+def _lines(result: Run, warnings: Sequence[str], name: str, folder: Path) -> Iterator[str]:
     from hapticlink.analysis.findings import summary
     from hapticlink.orchestrator.results.tables import TABLES
 
-    yield f"{name}: {summary.ending(made)}"
-    for line in (*summary.numbers(made), *warned):
+    yield f"{name}: {summary.ending(result)}"
+    for line in (*summary.numbers(result), *warnings):
         yield f"  {line}"
-    wall_time = made.run["timings"]["run"]
+    wall_time = result.run["timings"]["run"]
     if wall_time:  # none where a signal came before the first event
-        speed = made.run["end"]["time"] / wall_time
+        speed = result.run["end"]["time"] / wall_time
         yield f"  {wall_time:.2f} s of run time, {speed:.1f} times real time"
-    if made.folder:
-        names = sorted(made.run["files"], key=lambda name: not name.endswith(TABLES))
+    if result.folder:
+        names = sorted(result.run["files"], key=lambda name: not name.endswith(TABLES))
         yield f"  {folder}/: {', '.join(names)}"
     else:
-        yield f"  {folder}/ is unchanged: the run has no row"
+        yield f"  {folder}/: nothing written, the run failed before the first sample"

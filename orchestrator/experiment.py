@@ -14,7 +14,8 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.results import folder_lock
+from hapticlink.orchestrator.results.record import content
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Results, Table, load, size
 from hapticlink.orchestrator.run import crash_monitor
@@ -24,7 +25,7 @@ from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.open_fmus import isolated
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.run_json import _ending, _story
+from hapticlink.orchestrator.run_json import setup
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.built import built
@@ -51,27 +52,29 @@ class Experiment:
         """The results of the run, with empty tables if it had no row."""
         if self.outcome.published:
             return load(self.folder)
-        none: dict[str, Table] = {}
-        written = _columns(self.system)
-        for clock in self.run["rates"]:
-            columns = ("time", *written.get(clock, ()))
-            none[clock] = Table(columns, np.zeros((0, len(columns))), none)
-        return Results(self.folder, self.run, none)
+        empty: dict[str, Table] = {}
+        recorded = _columns(self.system)
+        for clock in self.system.timeline.clocks:
+            columns = ("time", *recorded.get(clock.name, ()))
+            empty[clock.name] = Table(columns, np.zeros((0, len(columns))), empty)
+        return Results(self.folder, self.run, empty)
 
 
 def _columns(system: System) -> dict[str, list[str]]:
     """The column names of each clock's table, if it has one."""
     signals = SignalVector(system)
-    found = {clock.name: signals.recorded(clock.name) for clock in system.timeline.clocks}
-    return {clock: [*columns] for clock, columns in found.items() if columns is not None}
+    recorded = {clock.name: signals.recorded(clock.name) for clock in system.timeline.clocks}
+    return {clock: [*columns] for clock, columns in recorded.items() if columns is not None}
 
 
 def _left_out(every: System, system: System) -> list[str]:
     """The outputs `fmu.port` of which an entry is not written."""
-    if system.recorded is None:
+    if system.recording.outputs is None:
         return []
     outputs = ((u.name, s) for u in every.fmus for s in u.description.outputs)
-    left_out = (f"{u}.{s.port}" for u, s in outputs if f"{u}.{s.name}" not in system.recorded)
+    left_out = (
+        f"{u}.{s.port}" for u, s in outputs if f"{u}.{s.name}" not in system.recording.outputs
+    )
     return [*dict.fromkeys(left_out)]
 
 
@@ -85,49 +88,52 @@ def simulate(
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
-    Raises InputFault before the run for invalid input, and Interrupted for a signal before the run.
-    A fault during the run is in the outcome, and its results up to then are kept. Results of an
-    earlier run in `folder` are removed once the first rows of this one are written. Without `csv`
-    the tables stay in the binary form in which a run writes them.
+    Raises InputFault before the run for invalid input and where another run writes to `folder`, and
+    Interrupted for a signal before the run. A fault during the run is in the outcome, and its
+    results up to then are kept. Results of an earlier run in `folder` are removed once the first
+    rows of this one are written. Without `csv` the tables stay in the binary form in which a run
+    writes them.
     """
     with interrupt.held():
-        return _simulated(scene, Path(folder), options, progress, csv, real_time)
+        begin = perf_counter()
+        read = open_scene.load(scene, options)
+        with folder_lock.held(Path(folder)):
+            return _simulated(read, Path(folder), progress, csv, real_time, begin)
 
 
 def _simulated(
-    scene: str | Path | Scene,
+    read: Scene,
     folder: Path,
-    options: Options,
     progress: Progress | None,
     csv: bool,
     real_time: RealTimeRun | None,
+    begin: float,
 ) -> Experiment:
-    begin = perf_counter()
-    read = open_scene.load(scene, options)
+    """begin: when the scene began to be read (s)."""
     with built(read) as every:
         system = with_fetched(every)
         plan = Plan(system)
         plan.check()
         build_time = perf_counter() - begin
-        tables = _columns(system)
-        story = _story(read, plan, tables) | {"not_recorded": _left_out(every, system)}
+        columns = _columns(system)
+        tables = list(columns)
         if real_time:
-            clocks = dict.fromkeys(beside(plan)[0].values())
-            story["files"] += [f"{clock}_{SAMPLES}.{read.record.format}" for clock in clocks]
+            sides = dict.fromkeys(beside(plan)[0].values())
+            tables += [f"{clock}_{SAMPLES}" for clock in sides]
+        before = setup(read, plan, tables, _left_out(every, system))
         alone = isolated(system.fmus)
         risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
         csv = csv and read.record.format == "csv"
-        with RunFolder(folders.ensure(folder), story, csv) as results:
+        with RunFolder(folder, before, csv) as results:
             with crash_monitor.watched(folder) if risky else nullcontext():
                 outcome = run(plan, results, progress, real_time)
-            ending = _ending(system, outcome, build_time)
             try:
-                results.end(ending, tables)
+                results.end(outcome.ending(build_time), columns)
             except OSError as error:
                 if outcome.fault is None:
                     outcome.fault = Fault(f"{folder}: {error.strerror or error}")
                     outcome.reason = "fault"
-                ending = _ending(system, outcome, build_time)
-                results.end_in_place(ending)
+                results.end_in_place(outcome.ending(build_time))
             outcome.published = results.published
-    return Experiment(read, system, outcome, folder, story | ending)
+    written = content(before) | content(outcome.ending(build_time))
+    return Experiment(read, system, outcome, folder, written)

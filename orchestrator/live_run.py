@@ -22,9 +22,9 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.run.energy.meter import Energy
+from hapticlink.orchestrator.results.record import Energy
+from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.make_holds import make_hold
-from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.overrides import Options
@@ -76,7 +76,7 @@ class LiveRun:
     def time(self) -> float:
         """The simulated time of the newest haptic event (s)."""
         haptics = self._simulation.system.timeline.clocks[0].name
-        return self._simulation.seconds(self._loop.previous(haptics))
+        return self._simulation.seconds(self._loop.events.previous(haptics))
 
     @property
     def system(self) -> System:
@@ -135,7 +135,7 @@ class LiveRun:
             self._loop.change_hold(connection.name, made)
             self._connections[connection.name] = connection
             sample = self._simulation.signals.values[self._simulation.signals.sources(connection)]
-            stamp = self._loop.previous(system.fmu[connection.source].clock)
+            stamp = self._loop.events.previous(system.fmu[connection.source].clock)
             self._simulation.holds[connection.name].push(stamp, sample, stamp)
         self._note(f"hold of {name}: {changed[0].hold}, delay {delay or 0.0:g} s")
 
@@ -177,7 +177,8 @@ class LiveRun:
         if period < haptics.longest:
             limits = f"from {SLOWEST:g} Hz up to that of the haptics"
             raise InputFault(f"rate of {clock} = {rate} Hz: give a rate {limits}")
-        first, begun, tick = self._loop.previous(clock), self._loop.current(clock), haptics.longest
+        events, tick = self._loop.events, haptics.longest
+        first, begun = events.previous(clock), events.current(clock)
         most = float(1 - tick / period)
         if not 0 <= jitter <= most:
             raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")
@@ -190,7 +191,7 @@ class LiveRun:
             return math.ceil((begun + (i - 1 + Fraction(jitter * drawn)) * period) / tick) * tick
 
         count = max(math.ceil((timeline.end - begun) / period), 0) + 4
-        self._loop.change_rate(clock, Frames(at, count, 1))
+        events.change_rate(clock, Frames(at, count, 1))
         drawn = f", jitter {jitter:g}, seed {seed}" if jitter else ""
         self._note(f"rate of {clock}: {rate:g} Hz{drawn}")
 
@@ -220,7 +221,7 @@ class LiveRun:
 
     # ------------------------------------------------------------------------------------------
 
-    def _turn(self, simulation: Simulation, loop: PythonLoop) -> None:
+    def _turn(self, simulation: Simulation, loop: CompiledLoop) -> None:
         self._simulation, self._loop = simulation, loop
         pace = self._run.pace
         begun, stepping = pace.now(), self._until is not None
@@ -232,7 +233,7 @@ class LiveRun:
             pace.wait(pace.now() + self._every)
             interrupt.check(self.time)
             self._called(self)
-        loop.patience(self._every if self._until is None else 0)
+        loop.events.patience(self._every if self._until is None else 0)
         if self.paused or stepping:
             pace.c.origin += pace.now() - begun
 
@@ -264,10 +265,10 @@ class LiveRun:
         """The connection with another hold or latency."""
         system = self._simulation.system
         new = held_by(c, hold, delay)
-        why = misfit(new.hold or "", new, system.fmu, system.power, False)
-        if system.coupling == "iterated" or system.step_control:
+        why = misfit(new.hold or "", new, system.fmu, system.energy.power, False)
+        if system.coupling.scheme == "iterated" or system.coupling.step_control:
             why = "steps are repeated"
-        spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.springs)
+        spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
         on_force = spring and any(
             HOLDS[d.hold].needs == "spring" for d in system.connections if d.hold
         )

@@ -120,14 +120,14 @@ def program_files(scene: Scene, identifier: str, without: str | None = None) -> 
 
 def _components(program: Resolved) -> dict[str, Component]:
     """The component of each member, with the step sizes of the scene."""
-    timeline, plans = program.system.timeline, {b.name: b for b in blocks(program.scene)}
+    timeline, plans = program.system.timeline, {b.name: b for b in blocks(program.scene).built}
     made = {}
     for name in program.members:
         plan = plans[name]
-        known = component(plan.made_by, plan.settings)
+        known = component(plan.block, plan.settings)
         steps = sizes(timeline.of[name], timeline)
         given = {v.name: (steps[v.name],) for v in known.parameters if v.name in steps}
-        made[name] = component(plan.made_by, plan.settings, given) if given else known
+        made[name] = component(plan.block, plan.settings, given) if given else known
     return made
 
 

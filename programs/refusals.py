@@ -41,7 +41,7 @@ def of_simulation(simulation: Simulation, title: str) -> None:
     reasons = [
         f"{fmu} runs in a process of its own: {why}" for fmu, why in simulation.isolated.items()
     ]
-    if why := too_long(simulation):
+    if why := too_long(simulation.system):
         reasons.append(why)
     for name, instance in simulation.instances.items():
         if name in simulation.isolated:

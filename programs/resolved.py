@@ -36,7 +36,7 @@ from hapticlink.orchestrator.run.metered_operations import Move, Sample
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.built import built
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import Recording, System
 from hapticlink.programs import refusals
 
 NO_END = 2**61
@@ -116,7 +116,7 @@ def resolved(scene: Scene, outside: str | None = None) -> Iterator[Resolved]:
     refusals.of_scene(scene)
     with built(scene) as every, ExitStack() as stack:
         fetched = with_fetched(every)
-        system = replace(fetched, recorded=())
+        system = replace(fetched, recording=Recording(outputs=()))
         refusals.of_system(system, outside, scene.title)
         plan = Plan(system)
         plan.check()
@@ -132,7 +132,7 @@ def resolved(scene: Scene, outside: str | None = None) -> Iterator[Resolved]:
 
 def _recorded(system: System) -> frozenset[str]:
     outputs = (f"{fmu.name}.{s.name}" for fmu in system.fmus for s in fmu.description.outputs)
-    return frozenset(outputs if system.recorded is None else system.recorded)
+    return frozenset(outputs if (chosen := system.recording.outputs) is None else chosen)
 
 
 def _rooms(plan: Plan, folder: Path, title: str) -> dict[str, int]:

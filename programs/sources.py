@@ -43,6 +43,7 @@ def sources(
 ) -> dict[str, str]:
     """All C files by name; scene.h lacks the GUID. components: by member."""
     files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in REPLACED}
+    files["hold_laws.h"] = loop.LAWS["text"]()
     files |= {name: (HERE / name).read_text() for name in OWN}
     headers = Path(fmpy.__file__).parent / "c-code"
     files |= {name: (headers / name).read_text(errors="replace") for name in HEADERS}

@@ -1,11 +1,13 @@
 # The public names of hapticlink and the modules that define them: the one list of them.
 
 from hapticlink.analysis.maps import Map as Map
-from hapticlink.analysis.stability.analysis import Stability as Stability
-from hapticlink.analysis.stability.analysis import stability as stability
-from hapticlink.analysis.stability.finite_time import finite_time_growth as finite_time_growth
+from hapticlink.analysis.stability.finite_time_growth import (
+    finite_time_growth as finite_time_growth,
+)
 from hapticlink.analysis.stability.passivity import Passivity as Passivity
 from hapticlink.analysis.stability.passivity import passivity as passivity
+from hapticlink.analysis.stability.scene_stability import Stability as Stability
+from hapticlink.analysis.stability.scene_stability import stability as stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability as VaryingStability
 from hapticlink.analysis.tune import Tuned as Tuned
 from hapticlink.analysis.tune import tune as tune

@@ -15,7 +15,7 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
 
 
@@ -48,6 +48,11 @@ try:
     LOOPS = ["python", "compiled"]
 except Unavailable:
     LOOPS = ["python"]
+
+
+needs_compiled_loop = pytest.mark.skipif(
+    "compiled" not in LOOPS, reason="there is no compiled loop here"
+)
 
 
 @pytest.fixture(params=LOOPS)
@@ -106,7 +111,7 @@ def stamped(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Timeline, str
             Fmu(n, d, timeline.of.get(n, "graphics" if n == "graphics" else "haptics"))
             for n, d in described.items()
         )
-        return System(units, connected(units, ROWS, timeline)[0], timeline, coupling)
+        return System(units, connected(units, ROWS, timeline)[0], timeline, Coupling(coupling))
 
     return make
 

@@ -7,88 +7,21 @@ a string.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+import re
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
-BUILDINGS = {
-    "components": (
-        ".",
-        "integrators",
-        "specs",
-        "paths",
-        "linkage",
-        "forces",
-        "dynamics",
-        "contact",
-        "control",
-        "device",
-        "blocks",
-    ),
-    "fmus": (".", "native"),
-    "orchestrator": (
-        "base",
-        "fmi",
-        "holds",
-        "scene",
-        "system",
-        "plan",
-        "results",
-        "run",
-        "ssp",
-        ".",
-    ),
-    "programs": (".",),
-    "analysis": ("findings", "stability", "sweep", "maps", "tune"),
-    "visualization": (".", "mechanism", "figures", "live", "replay", "compare"),
-    "api": (".",),
-    "commands": (".",),
-}
-"""Buildings in the order in which they may import each other, with their rooms, each of which may
-import those before it; "." are loose files."""
+from docs import draw_buildings
+from docs.draw_buildings import BUILDINGS, FILES, ROOT, Module, imports
+
 FREE = ("fmus",)
 """Buildings whose rooms may import each other both ways."""
 OUTSIDE = ("studies", "benchmarks", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
-Module = tuple[str, ...]
 BY_NAME = {("commands", "checkout"), ("orchestrator", "base", "plugins")}
 """Files that import by name: benchmarks and studies of a checkout, a user's own modules."""
-
-
-def _files() -> dict[Module, Path]:
-    found = {}
-    for package in BUILDINGS:
-        for path in (ROOT / package).rglob("*.py"):
-            module = path.relative_to(ROOT).with_suffix("").parts
-            found[module[:-1] if module[-1] == "__init__" else module] = path
-    return found
-
-
-FILES = _files()
-
-
-def _imports(path: Path) -> Iterator[Module]:
-    """The modules of the project that a file imports anywhere in it, by either statement, or names
-    in a string; () or a module of one name that is no package is the API."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            named = [tuple(name.name.split(".")) for name in node.names]
-            yield from (module[1:] for module in named if module[0] == "hapticlink")
-        elif isinstance(node, ast.ImportFrom):
-            assert not node.level, f"{path}: a relative import, which names no room"
-            module = tuple((node.module or "").split("."))
-            if module[0] == "hapticlink":
-                for name in node.names:
-                    inner = (*module[1:], name.name)
-                    yield inner if inner in FILES or len(inner) == 1 else module[1:]
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            named_in_text = tuple(node.value.split("."))
-            if named_in_text[0] == "hapticlink" and named_in_text[1:] in FILES:
-                yield named_in_text[1:]
 
 
 def _room(module: Module) -> str:
@@ -99,7 +32,7 @@ def _room(module: Module) -> str:
 def test_buildings_import_one_way() -> None:
     order = list(BUILDINGS)
     for module, path in FILES.items():
-        for imported in _imports(path):
+        for imported in imports(path):
             package = imported[0] if imported else ""
             if package == "scenes":  # which hold no code
                 continue
@@ -125,7 +58,7 @@ def test_rooms_import_those_before_them(package: str) -> None:
     against = [
         f"{'.'.join(module)} imports {'.'.join(imported)}"
         for module, path in FILES.items()
-        for imported in _imports(path)
+        for imported in imports(path)
         if module[0] == package and imported[:1] == (package,) != imported
         if order.index(_room(imported)) > order.index(_room(module))
     ]
@@ -133,7 +66,7 @@ def test_rooms_import_those_before_them(package: str) -> None:
 
 
 def test_files_import_each_other_in_no_ring() -> None:
-    graph = {m: {i for i in _imports(p) if i in FILES and i != m} for m, p in FILES.items()}
+    graph = {m: {i for i in imports(p) if i in FILES and i != m} for m, p in FILES.items()}
     try:
         list(TopologicalSorter(graph).static_order())
     except CycleError as ring:
@@ -149,3 +82,20 @@ def test_no_import_is_hidden_in_a_string() -> None:
             continue
         assert "import_module" not in text, path
         assert "__import__" not in text, path
+
+
+def test_the_drawing_of_the_buildings_is_current() -> None:
+    """The same buildings, rooms and arrows; lines of code within a sixth, or a hundred."""
+    drawn, current = draw_buildings.PATH.read_text(encoding="utf-8"), draw_buildings.drawing()
+    redraw = "run `python docs/draw_buildings.py`"
+    arrows = re.compile(r'id="(\w+ imports \w+)"')
+    assert arrows.findall(drawn) == arrows.findall(current), redraw
+    label = re.compile(r'<text id="(.+?)".*?>[^<]*? ([\d,]+)</text>')
+    lines, now = (
+        {name: int(count.replace(",", "")) for name, count in label.findall(text)}
+        for text in (drawn, current)
+    )
+    assert lines.keys() == now.keys() >= {*BUILDINGS}, redraw
+    assert lines == {n: pytest.approx(count, rel=1 / 6, abs=100) for n, count in now.items()}, (
+        redraw
+    )

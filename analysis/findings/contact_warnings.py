@@ -12,11 +12,11 @@ from hapticlink.components.contact.depth import depths, middle, overlaps
 from hapticlink.components.contact.stiffness import STABLE, poles, sticking_poles
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage, Mechanism
+from hapticlink.orchestrator.base.loop_names import CONTACT_GAP, JOINT_COORDINATES
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.scene_part import scene_part
 from hapticlink.orchestrator.results.tables import Results, Table
 
-GAP, COORDINATES = "virtual_mechanism.contact_gap", "virtual_mechanism.q"
 ROWS = 500
 """Largest number of rows whose depths are computed."""
 
@@ -24,27 +24,27 @@ ROWS = 500
 def lines(results: Results) -> Iterator[str]:
     """A line for the deepest contact beyond the middle of a shape, and for the stiffest
     pair that pushes or sticks."""
-    scene = results.run["scene"]
-    table = of_block(results, GAP)
+    record, scene = results.record, results.record.scene
+    table = of_block(results, CONTACT_GAP)
     if table is None or not len(table["time"]) or not scene["linkage"] or not scene["contacts"]:
         return
     linkage = scene_part(results, "linkage", Linkage)
     contacts = scene_part(results, "contacts", Contacts)
-    if COORDINATES in table:  # both are recorded
+    if JOINT_COORDINATES in table:  # both are recorded
         yield from _deep(linkage, contacts, table)
     mechanism = scene_part(results, "mechanism", Mechanism)
     if mechanism.integrator != "passive-midpoint" and len(table["time"]) > 1:
-        rate = results.run["fmus"][GAP.partition(".")[0]]["rate"]
-        step_s = results.run["clocks"][rate]["longest"] / mechanism.substeps
+        rate = record.fmus[CONTACT_GAP.partition(".")[0]].rate
+        step_s = record.clocks[rate].longest / mechanism.substeps
         implicit = mechanism.integrator == "linearly-implicit"
         yield from _stiff(linkage, contacts, step_s, implicit)
 
 
 def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
     most = {pair: middle(linkage, contacts, pair) for pair in near(linkage, contacts)}
-    time, q = table["time"], table[COORDINATES]
+    time, q = table["time"], table[JOINT_COORDINATES]
     found = [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
-    deep = np.flatnonzero(table[GAP] < -min(most.values()))
+    deep = np.flatnonzero(table[CONTACT_GAP] < -min(most.values()))
     if len(deep):
         chosen = deep[np.linspace(0, len(deep) - 1, min(len(deep), ROWS)).astype(int)]
         found += [(*item, time[chosen]) for item in depths(linkage, contacts, q[chosen])]

@@ -8,10 +8,10 @@ from typing import Any
 from hapticlink.orchestrator.results.numbers import short
 
 
-def finding(found: Mapping[str, Any]) -> str:
-    """What a run in real time shows, in a sentence."""
-    missed = f"{found['deadlines_missed'] or 'none'} of {found['ticks']} deadlines missed"
-    largest = (1e3 * found[name]["max"] for name in ("step_time", "lateness"))
+def finding(report: Mapping[str, Any]) -> str:
+    """A sentence of the report of a run in real time (`RealTimeRun.report`)."""
+    missed = f"{report['deadlines_missed'] or 'none'} of {report['ticks']} deadlines missed"
+    largest = (1e3 * report[name]["max"] for name in ("step_time", "lateness"))
     step, late = map(short, largest)
-    rate = short(1 / found["period"])
+    rate = short(1 / report["period"])
     return f"{rate} Hz in real time: {missed}; largest step time {step} ms, lateness {late} ms"

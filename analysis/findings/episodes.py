@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.forces import torques, touching
 from hapticlink.analysis.findings.limits import EPISODES, FELT, FULL
-from hapticlink.analysis.findings.tracking import BRANCH, constrained, of_block
+from hapticlink.analysis.findings.tracking import COPY_BRANCH_OK, constrained, of_block
 from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results, Vector
-
-MARGIN = "haptic_device.workspace_margin"
 
 
 class Episode(NamedTuple):
@@ -56,8 +55,8 @@ State = tuple[str, Vector, NDArray[np.bool_], str]
 
 
 def _states(results: Results) -> Iterator[State]:
-    if branch := of_block(results, BRANCH):
-        yield "folded", branch["time"], branch[BRANCH] == 0, ""
+    if branch := of_block(results, COPY_BRANCH_OK):
+        yield "folded", branch["time"], branch[COPY_BRANCH_OK] == 0, ""
     yield from _saturated(results)
     if port := user_port(results):
         yield "energy", port.time_s, port.generated_J > FELT, ""
@@ -70,8 +69,8 @@ def _states(results: Results) -> Iterator[State]:
             yield "constraints", table["time"], table[name] == value, said
     if contact := touching(results):
         yield "contacts", *contact, ""
-    if margin := of_block(results, MARGIN):
-        yield "outside", margin["time"], margin[MARGIN] < 0, ""
+    if margin := of_block(results, WORKSPACE_MARGIN):
+        yield "outside", margin["time"], margin[WORKSPACE_MARGIN] < 0, ""
 
 
 def _saturated(results: Results) -> Iterator[State]:

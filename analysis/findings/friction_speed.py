@@ -18,22 +18,22 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
+from hapticlink.orchestrator.base.loop_names import JOINT_RATES
 from hapticlink.orchestrator.results.tables import Results
 
-RATES = "virtual_mechanism.qd"
 BOUND = 0.1
 
 
 def coarse(results: Results) -> Iterator[str]:
     """A line for each joint whose friction errs by more than BOUND of its largest rate."""
-    linkage, speeds = results.run["scene"]["linkage"], results.run.get("friction_speeds", {})
+    linkage, speeds = results.record.scene["linkage"], results.record.friction_speeds
     if not linkage or not speeds:
         return
     units = [(j["name"], unit) for j in linkage["joint"] for unit in COORDINATE_UNITS[j["type"]]]
-    table = of_block(results, RATES, len(units))
+    table = of_block(results, JOINT_RATES, len(units))
     if not table or not len(table["time"]):
         return
-    for (name, unit), rate in zip(units, table[RATES].T, strict=True):
+    for (name, unit), rate in zip(units, table[JOINT_RATES].T, strict=True):
         speed = speeds.get(name, 0.0)
         if (error := _turns(rate, speed) * speed) > BOUND * (most := np.abs(rate).max()):
             yield (
@@ -43,7 +43,7 @@ def coarse(results: Results) -> Iterator[str]:
             )
 
 
-def _turns(rate: NDArray[np.float64], least: float) -> int:
-    """How often `rate` changes its sign, counted once it is beyond `least`."""
-    signs = np.sign(rate[np.abs(rate) > least])
+def _turns(rate: NDArray[np.float64], smallest: float) -> int:
+    """How often `rate` changes its sign, counted once it is beyond `smallest`."""
+    signs = np.sign(rate[np.abs(rate) > smallest])
     return int(np.count_nonzero(signs[1:] != signs[:-1]))

@@ -8,22 +8,27 @@ from itertools import groupby
 from typing import Any
 
 from hapticlink.analysis.findings.episodes import Episode, saturations
-from hapticlink.analysis.findings.port_blocks import meters
-from hapticlink.analysis.findings.tracking import of_block, of_user
+from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.control import Passivity
+from hapticlink.orchestrator.base.loop_names import (
+    CONTROLLER,
+    MEASURED_HANDLE_POSE,
+    PASSIVITY_DAMPING,
+    block_of_user,
+    signal_of_user,
+    user_of_block,
+)
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results
-
-HANDLE, DAMPING = "haptic_device.x", "controller.passivity_damping"
 
 
 def lines(results: Results) -> Iterator[str]:
     """A line for each late force and pose of a passivity controller or of `pspm`, for motors at
     their limit beside a passivity controller, and for one that damps counts of encoders."""
-    run = results.run
-    late = {name: age["max"] for name, age in run["delays"].items() if age["max"] > 0.0}
-    guarded = _guarded(run)
+    record = results.record
+    late = {name: age.max for name, age in record.delays.items() if age.max > 0.0}
+    guarded = _guarded(record.scene)
     for name, age in late.items():
         source, target = name.split(" -> ")
         if _is_one(source, guarded, ("F_motor", "F")):
@@ -36,7 +41,7 @@ def lines(results: Results) -> Iterator[str]:
                 f"warning: {name} is {short(1e3 * age)} ms old: the passivity controller pairs "
                 "its force with the motion of that time, and does not bound its energy"
             )
-    driven = [name for name in guarded if name.startswith("controller")]
+    driven = [name for name in guarded if user_of_block(name, CONTROLLER) is not None]
     for name, spans in groupby(saturations(results) if driven else (), key=_controller):
         if name in driven:
             seconds = sum(span.end - span.begin for span in spans)
@@ -45,24 +50,23 @@ def lines(results: Results) -> Iterator[str]:
                 "passivity controller counts forces that they do not reach, and does not bound "
                 "their energy"
             )
-    if run["scene"]["sensing"] == "encoders":
+    if record.scene["sensing"] == "encoders":
         yield from _counts(results)
     yield from _set_positions(results, late)
 
 
-def _guarded(run: Mapping[str, Any]) -> list[str]:
+def _guarded(scene: Mapping[str, Any]) -> list[str]:
     """The FMUs with a passivity controller."""
     walls = [
         fmu["name"]
-        for fmu in run["scene"].get("fmu", ())
+        for fmu in scene.get("fmu", ())
         if fmu.get("block") == "virtual_wall" and fmu.get("settings", {}).get("passivity")
     ]
-    return [*(f"controller_{user}" if user else "controller" for user in _laws(run)), *walls]
+    return [*(block_of_user(CONTROLLER, user) for user in _laws(scene)), *walls]
 
 
-def _laws(run: Mapping[str, Any]) -> dict[str, Passivity]:
+def _laws(scene: Mapping[str, Any]) -> dict[str, Passivity]:
     """The passivity controllers of the users who have one; the first one's name is empty."""
-    scene = run["scene"]
     own = scene["controller"] or {}
     laws = {"": own} | {name: scene["controllers"].get(name, own) for name in scene["devices"]}
     given = {user: law["passivity"] for user, law in laws.items() if law.get("passivity")}
@@ -73,16 +77,16 @@ def _counts(results: Results) -> Iterator[str]:
     """A line for each passivity controller that damps single counts of the encoders."""
     from hapticlink.components.device.encoder_count import count_energies  # casadi
 
-    run, devices = results.run, all_devices(results)
-    for user, law in _laws(run).items():
-        handle = of_user(HANDLE, user)
+    record, devices = results.record, all_devices(results)
+    for user, law in _laws(record.scene).items():
+        handle = signal_of_user(MEASURED_HANDLE_POSE, user)
         table, device = of_block(results, handle, 3), devices.get(user)
         if table is None or device is None or not len(table["time"]):
             continue
-        acted = of_block(results, damping := of_user(DAMPING, user))
+        acted = of_block(results, damping := signal_of_user(PASSIVITY_DAMPING, user))
         if acted and not acted[damping].any():
             continue
-        period = run["clocks"][run["fmus"][handle.partition(".")[0]]["rate"]]["longest"]
+        period = record.clocks[record.fmus[handle.partition(".")[0]].rate].longest
         count = float(count_energies(device, table[handle][0], period).max())
         if law.noise < count:
             key = f"controllers.{user}" if user else "controller"
@@ -96,7 +100,7 @@ def _counts(results: Results) -> Iterator[str]:
 def _controller(saturated: Episode) -> str:
     """The controller of the motors that were at their limit, by the user's name."""
     user = saturated.said.partition(": ")[2]
-    return f"controller_{user}" if user else "controller"
+    return block_of_user(CONTROLLER, user)
 
 
 def _is_one(port: str, fmus: Collection[str], names: tuple[str, ...]) -> bool:
@@ -106,13 +110,13 @@ def _is_one(port: str, fmus: Collection[str], names: tuple[str, ...]) -> bool:
 
 def _set_positions(results: Results, late: Mapping[str, float]) -> Iterator[str]:
     """A line for each late force from an FMU whose spring `pspm` sets to either end of it."""
-    run = results.run
-    feeds = {_fmus(name) for name in run["connections"]}
-    set_by = {_fmus(name)[::-1] for name, hold in run["holds"].items() if hold == "pspm"}
-    forces = {spring["force"] for spring in run["scene"]["spring"]}
+    record = results.record
+    feeds = {_fmus(name) for name in record.connections}
+    set_by = {_fmus(name)[::-1] for name, hold in record.holds.items() if hold == "pspm"}
+    forces = {spring["force"] for spring in record.scene["spring"]}
     for name, age in late.items():
         spring, end = _fmus(name)
-        works = name in meters(results) or name.partition(" -> ")[0] in forces
+        works = name in record.meters or name.partition(" -> ")[0] in forces
         if not works or spring not in {fmu for fmu, _ in set_by} or (end, spring) not in feeds:
             continue
         if (spring, end) not in set_by:
@@ -120,7 +124,7 @@ def _set_positions(results: Results, late: Mapping[str, float]) -> Iterator[str]
                 f"warning: {name} acts {short(1e3 * age)} ms late: pspm counts the force over the "
                 "motion since its sample, and does not bound its energy"
             )
-        elif name in run["latencies"] and run["holds"].get(name) in ("passive", "nepce"):
+        elif name in record.latencies and record.holds.get(name) in ("passive", "nepce"):
             yield (
                 f"pspm of {spring} does not count {name}, which has a latency: it bounds the "
                 "energy given to the near side alone, not to both"

@@ -34,10 +34,15 @@ import numpy as np
 
 from hapticlink.analysis.findings.sample_arrivals import known_from
 from hapticlink.analysis.findings.tracking import of_block, poses, table_of
+from hapticlink.orchestrator.base.loop_names import (
+    DRIFT_WRENCH,
+    ENVIRONMENT_WRENCH,
+    MECHANISM,
+    MOTOR_WRENCH,
+    TOPOLOGY_WRENCH,
+    signal_of_user,
+)
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-
-BLOCK, CONTROLLER, HAND = "virtual_mechanism", "controller", "hand.F"
-CONTACT = f"{BLOCK}.F_env"
 
 
 class User(NamedTuple):
@@ -55,17 +60,15 @@ class User(NamedTuple):
 
 def user(name: str = "") -> User:
     """The signals of the user at a further point; the first user's name is empty."""
-    controller = f"{CONTROLLER}_{name}" if name else CONTROLLER
-    inputs = f"{BLOCK}.{name}." if name else f"{BLOCK}."
     point, handle = poses(name)
     return User(
         point,
         handle,
-        drift=f"{controller}.F_drift",
-        topology=f"{controller}.F_constraint",
-        motors=f"{controller}.F_motor",
-        contact=f"{inputs}F_env",
-        inputs=inputs,
+        drift=signal_of_user(DRIFT_WRENCH, name),
+        topology=signal_of_user(TOPOLOGY_WRENCH, name),
+        motors=signal_of_user(MOTOR_WRENCH, name),
+        contact=signal_of_user(ENVIRONMENT_WRENCH, name),
+        inputs=signal_of_user(f"{MECHANISM}.", name),
     )
 
 
@@ -131,16 +134,10 @@ def _into_mechanism(results: Results, each: User, time: Vector) -> dict[str, tup
 
 def _sources(results: Results, each: User) -> Iterator[tuple[str, str]]:
     """Where F_hand and F_drift of the mechanism come from, and that input."""
-    for name in meters(results):
+    for name in results.record.meters:
         source, _, target = name.partition(" -> ")
         if target in (f"{each.inputs}F_hand", f"{each.inputs}F_drift"):
             yield source, target
-
-
-def meters(results: Results) -> dict[str, dict[str, float]]:
-    """The energy meters of a run, by connection."""
-    across = results.run.get("energies", "none")
-    return ({} if across == "none" else across) | results.run.get("energies_within_a_rate", {})
 
 
 def works(
@@ -157,7 +154,7 @@ def works(
     table, moved = table_of(results, signal), table_of(results, position)
     if not (table and moved):
         raise KeyError(f"work needs the signals {signal} and {position}")
-    force, stamps, booked = sign * table[signal], table["time"], meters(results)
+    force, stamps, booked = sign * table[signal], table["time"], results.record.meters
     start = f"{signal} -> {position.partition('.')[0]}."
     name = connection or next((n for n in booked if n.startswith(start)), None)
     if name is None:
@@ -167,13 +164,13 @@ def works(
         )
     known = known_from(results, name, stamps, table is moved)
     meter = booked[name]
-    until = meter["until"]
+    until = meter.until
     to = np.union1d(at, until)  # where the meter stops may be beside or after the times
     acts, source = (
-        _passing(series, to, until, meter[kind])[np.searchsorted(to, at)]
-        for kind, series in (
-            ("held", work(force, known, moved, position, to)),
-            ("ideal", ideal(force, stamps, moved, position, to)),
+        _passing(series, to, until, energy)[np.searchsorted(to, at)]
+        for energy, series in (
+            (meter.held, work(force, known, moved, position, to)),
+            (meter.ideal, ideal(force, stamps, moved, position, to)),
         )
     )
     return acts, source

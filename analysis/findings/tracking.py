@@ -7,11 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.orchestrator.base.loop_names import (
+    CONSTRAINT_COUNTS,
+    COPY_BRANCH_OK,
+    DEVICE,
+    HANDLE_POSE,
+    POINT_POSE,
+    signal_of_user,
+    user_of_block,
+)
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-
-MECHANISM, DEVICE = "virtual_mechanism.x", "haptic_device.x_true"
-BRANCH = "virtual_environment.branch_ok"
-COUNTS = ("virtual_environment.n_constraints", "virtual_mechanism.n_constraints")
 
 
 class Tracking(NamedTuple):
@@ -24,22 +29,13 @@ class Tracking(NamedTuple):
 
 def further_users(results: Results) -> list[str]:
     """The points at which users beside the first one hold a device."""
-    named = (n.partition("haptic_device_")[2] for n in results.run["fmus"])
-    return [n for n in named if n and all(of_block(results, signal, 3) for signal in poses(n))]
+    users = (user_of_block(name, DEVICE) for name in results.record.fmus)
+    return [u for u in users if u and all(of_block(results, signal, 3) for signal in poses(u))]
 
 
 def poses(user: str = "") -> tuple[str, str]:
     """The poses of a user's point and handle; the first user's name is empty."""
-    return of_user(MECHANISM, user), of_user(DEVICE, user)
-
-
-def of_user(signal: str, user: str) -> str:
-    """A first user's signal as that of another one, by the point's name: controller_left.F_drift,
-    virtual_mechanism.left.F_env."""
-    block, _, port = signal.partition(".")
-    if not user:
-        return signal
-    return f"{block}.{user}.{port}" if block == "virtual_mechanism" else f"{block}_{user}.{port}"
+    return signal_of_user(POINT_POSE, user), signal_of_user(HANDLE_POSE, user)
 
 
 def table_of(results: Results, signal: str) -> Table | None:
@@ -57,15 +53,14 @@ def of_any_shape(results: Results, signal: str) -> Table | None:
     """The table that contains a signal of a block of the haptic loop, or of the FMU in its place;
     None for an FMU of others that only has the same name, of whose ports nothing is known."""
     name = signal.partition(".")[0]
-    fmu = results.run["fmus"].get(name)
-    if fmu is None:
+    fmu = results.record.fmus.get(name)
+    if fmu is None or not (name == fmu.block or name.startswith(f"{fmu.block}_")):
         return None
-    block = fmu.get("block", name)
-    return table_of(results, signal) if name == block or name.startswith(f"{block}_") else None
+    return table_of(results, signal)
 
 
 def has_tracking(results: Results) -> bool:
-    return all(of_block(results, signal, 3) for signal in (MECHANISM, DEVICE))
+    return all(of_block(results, signal, 3) for signal in (POINT_POSE, HANDLE_POSE))
 
 
 def pose_error(results: Results, user: str = "") -> Tracking:
@@ -96,7 +91,7 @@ def tracking(results: Results) -> tuple[Vector, Vector]:
 def constrained(results: Results) -> tuple[Table, str] | None:
     """The table with the number of constrained directions, at the rate of the block that the
     controller gets it from, and the signal's name; None where there is none."""
-    for signal in COUNTS:
+    for signal in CONSTRAINT_COUNTS:
         if table := of_block(results, signal):
             return table, signal
     return None
@@ -105,7 +100,7 @@ def constrained(results: Results) -> tuple[Table, str] | None:
 def folded(results: Results) -> tuple[int, int]:
     """Number of frames in which the graphics copy is on another assembly of its loops than the
     mechanism, and number of all frames; (0, 0) if the run has no such output."""
-    table = of_block(results, BRANCH)
+    table = of_block(results, COPY_BRANCH_OK)
     if table is None:
         return 0, 0
-    return int((table[BRANCH] == 0).sum()), len(table[BRANCH])
+    return int((table[COPY_BRANCH_OK] == 0).sum()), len(table[COPY_BRANCH_OK])

@@ -19,14 +19,11 @@ mobility modulates power. It needs the mechanism's own (`mechanism.directions`) 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hapticlink.analysis.findings.port_blocks import (
-    BLOCK,
-    CONTACT,
-    HAND,
     by_block,
     ideal,
     needed,
@@ -34,17 +31,29 @@ from hapticlink.analysis.findings.port_blocks import (
     works,
 )
 from hapticlink.analysis.findings.tracking import (
-    DEVICE,
-    MECHANISM,
     further_users,
     of_block,
-    of_user,
     table_of,
 )
+from hapticlink.orchestrator.base.loop_names import (
+    CONTROLLER,
+    DEVICE,
+    DRIFT_WRENCH,
+    ENVIRONMENT_WRENCH,
+    HAND_WRENCH,
+    HANDLE_INERTIA,
+    HANDLE_POSE,
+    MECHANISM,
+    MECHANISM_ENERGY,
+    MOBILITIES,
+    MOTOR_WRENCH,
+    POINT_POSE,
+    TOPOLOGY_WRENCH,
+    block_of_user,
+    signal_of_user,
+)
+from hapticlink.orchestrator.results.record import BlockEnergy, PortEnergy
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
-
-MOBILITY = "Lambda_inv"
-ENERGY = f"{BLOCK}.energy"
 
 
 class UserPort(NamedTuple):
@@ -57,16 +66,19 @@ class UserPort(NamedTuple):
     works: dict[str, float]
 
     @property
-    def told(self) -> dict[str, Any]:
-        """For run.json."""
+    def measured(self) -> PortEnergy:
+        """What run.json says of it."""
         peak = int(np.argmax(self.generated_J))
-        found = {"generated": self.generated_J[-1], "peak": self.generated_J[peak]}
-        found |= {"time_of_peak": self.time_s[peak]}
-        blocks = {
-            name: {"generated": float(energy[-1]), "peak": float(energy.max())}
-            for name, energy in self.blocks_J.items()
-        }
-        return {k: float(v) for k, v in found.items()} | {"blocks": blocks, "works": self.works}
+        return PortEnergy(
+            generated=float(self.generated_J[-1]),
+            peak=float(self.generated_J[peak]),
+            time_of_peak=float(self.time_s[peak]),
+            blocks={
+                name: BlockEnergy(float(energy[-1]), float(energy.max()))
+                for name, energy in self.blocks_J.items()
+            },
+            works=self.works,
+        )
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
@@ -74,26 +86,26 @@ def user_port(results: Results) -> UserPort | None:
     """The energy at the user's port; None without hand, handle and mechanism, where something else
     than its hand pushes a handle, or where the work of another hand is not recorded. Without all
     signals that its blocks need there are none."""
-    mechanism, device = of_block(results, ENERGY), of_block(results, DEVICE, 3)
-    if mechanism is None or device is None or of_block(results, HAND, 3) is None:
+    mechanism, device = of_block(results, MECHANISM_ENERGY), of_block(results, HANDLE_POSE, 3)
+    if mechanism is None or device is None or of_block(results, HAND_WRENCH, 3) is None:
         return None
     if pushed_by_others(results) or not (len(device["time"]) and len(mechanism["time"])):
         return None
     time = mechanism["time"]
     time = time[time <= device["time"][-1]]
-    energy = mechanism[ENERGY][: len(time)]
+    energy = mechanism[MECHANISM_ENERGY][: len(time)]
     stored = energy - energy[0]
-    put_in = {"": works(results, HAND, DEVICE, time)[0]}
+    put_in = {"": works(results, HAND_WRENCH, HANDLE_POSE, time)[0]}
     further = np.zeros(len(time))
-    for name in results.run["connections"]:
+    for name in results.record.connections:
         hand, _, target = name.partition(" -> ")
-        point = target.removesuffix(".F_hand").removeprefix(f"{BLOCK}.")
-        if target != f"{BLOCK}.{point}.F_hand":
+        point = target.removesuffix(".F_hand").removeprefix(f"{MECHANISM}.")
+        if target != f"{MECHANISM}.{point}.F_hand":
             continue
-        if with_device := f"haptic_device_{point}" in results.run["fmus"]:
-            hand, position = of_user(HAND, point), of_user(DEVICE, point)
+        if with_device := block_of_user(DEVICE, point) in results.record.fmus:
+            hand, position = signal_of_user(HAND_WRENCH, point), signal_of_user(HANDLE_POSE, point)
         else:
-            position = f"{BLOCK}.{point}.x"
+            position = f"{MECHANISM}.{point}.x"
         moved, pushing = of_block(results, position, 3), table_of(results, hand)
         if moved is None or pushing is None or pushing[hand].shape[1:] != (3,):
             return None
@@ -103,7 +115,7 @@ def user_port(results: Results) -> UserPort | None:
         else:
             further += done
     generated = stored - further - sum(put_in.values())
-    lacks = needed(results, put_in) & {*results.run.get("not_recorded", ())}
+    lacks = needed(results, put_in) & {*results.record.not_recorded}
     blocks = {} if lacks else by_block(results, time, stored - further, put_in)
     return UserPort(time, generated, blocks, _works(results, device, time))
 
@@ -112,10 +124,10 @@ def pushed_by_others(results: Results) -> list[str]:
     """The connections to handles from other sources than the hands of their users."""
     return [
         name
-        for name in results.run["connections"]
+        for name in results.record.connections
         for user in ("", *further_users(results))
-        if name.endswith(f" -> {of_user(DEVICE, user).partition('.')[0]}.F_hand")
-        and not name.startswith(f"{of_user(HAND, user)} ")
+        if name.endswith(f" -> {signal_of_user(HANDLE_POSE, user).partition('.')[0]}.F_hand")
+        and not name.startswith(f"{signal_of_user(HAND_WRENCH, user)} ")
     ]
 
 
@@ -123,37 +135,37 @@ def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
     """The works (J) of single wrenches on the handles, those of further users named by their
     points, and of contacts on the mechanism."""
     signals = {
-        "hand": HAND,
-        "motors": "controller.F_motor",
-        "F_T": "controller.F_constraint",
-        "F_env": CONTACT,
+        "hand": HAND_WRENCH,
+        "motors": MOTOR_WRENCH,
+        "F_T": TOPOLOGY_WRENCH,
+        "F_env": ENVIRONMENT_WRENCH,
     }
     found = {
         f"{user}: {name}" if user else name: float(works(results, at, handle, time)[0][-1])
         for user in ("", *further_users(results))
         for name, signal in signals.items()
-        if of_block(results, at := of_user(signal, user), 3)
-        and of_block(results, handle := of_user(DEVICE, user), 3)
+        if of_block(results, at := signal_of_user(signal, user), 3)
+        and of_block(results, handle := signal_of_user(HANDLE_POSE, user), 3)
     }
-    if contact := of_block(results, CONTACT, 3):
-        on = ideal(contact[CONTACT], contact["time"], contact, MECHANISM, time)
+    if contact := of_block(results, ENVIRONMENT_WRENCH, 3):
+        on = ideal(contact[ENVIRONMENT_WRENCH], contact["time"], contact, POINT_POSE, time)
         found["F_env on the mechanism"] = float(on[-1])
     if (added := _held_mobility(results, device)) is not None:
-        found["held mobility"] = float(work(added, device["time"], device, DEVICE, time)[-1])
+        found["held mobility"] = float(work(added, device["time"], device, HANDLE_POSE, time)[-1])
     return found
 
 
 def _held_mobility(results: Results, device: Table) -> Vector | None:
     """What holding the mobility adds to the motors' wrench, (n, 3) at the device's samples; None
     where it is not held, or not by zoh, or the mechanism's own is not put out."""
-    held, own = (of_block(results, f"{b}.{MOBILITY}", 3, 3) for b in ("virtual_environment", BLOCK))
-    crossing = f"virtual_environment.{MOBILITY} -> controller.{MOBILITY}"
-    if not held or own is not device or results.run["holds"].get(crossing) != "zoh":
+    held, own = (of_block(results, signal, 3, 3) for signal in MOBILITIES)
+    crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
+    if not held or own is not device or results.record.holds.get(crossing) != "zoh":
         return None
     rows = np.searchsorted(held["time"], device["time"] + 1e-12, "right") - 1
-    change = held[f"virtual_environment.{MOBILITY}"][rows] - device[f"{BLOCK}.{MOBILITY}"]
-    wrench = device[HAND]
-    for signal in ("controller.F_drift", CONTACT):
+    change = held[MOBILITIES[0]][rows] - device[MOBILITIES[1]]
+    wrench = device[HAND_WRENCH]
+    for signal in (DRIFT_WRENCH, ENVIRONMENT_WRENCH):
         wrench = wrench + device[signal] if signal in device else wrench
-    added: Vector = np.einsum("kij,kjl,kl->ki", device["haptic_device.M"], change, wrench)
+    added: Vector = np.einsum("kij,kjl,kl->ki", device[HANDLE_INERTIA], change, wrench)
     return added

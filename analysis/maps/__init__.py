@@ -37,7 +37,7 @@ class Map:
         return [row for row in self.rows if row.get("at") == at]
 
 
-def made(
+def compute_map(
     scene: str | Path | Scene,
     options: Sequence[str],
     axes: Sequence[Axis],

@@ -8,17 +8,18 @@ from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.tracking import table_of
 from hapticlink.analysis.maps.lines import COLUMNS, DONE, Line, judged
-from hapticlink.analysis.stability.loaded_variants import Session
+from hapticlink.analysis.stability.loaded_variants import LoadedVariants
 from hapticlink.analysis.sweep.grid import Point
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins, temporary_folders
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.loop_names import JOINT_RATES, POINT_VELOCITY
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -28,7 +29,7 @@ SPANS = 8.0
 """Time constants of the leading mode over which the growth rate of a run is taken."""
 SHORTEST, LONGEST = 2.0, 30.0
 """Times (s) of a run, the longer one that of its verdict."""
-MOVING = ("virtual_mechanism.qd", "virtual_mechanism.v")
+MOVING = (JOINT_RATES, POINT_VELOCITY)
 GONE = 1e-9
 """Velocity, relative to the largest of the run, that is taken for rest."""
 
@@ -70,7 +71,7 @@ def work(each: Line) -> Row:
     """The row of a check: the map's verdict, and that of a run of the scene."""
     assert each.scene is not None
     plugins.load(each.plugins)
-    with Session(each.scene) as session:
+    with LoadedVariants(each.scene) as session:
         row = judged(session, "check", [])
     if "growth_rate" not in row:
         return {"end": DONE, "rows": [row]}
@@ -95,7 +96,7 @@ def of_run(scene: Scene, foretold: float) -> tuple[float, str]:
     return rate if abs(rate) * seconds >= 1.0 else at_last, verdict
 
 
-def growth(speed: NDArray[np.float64], seconds: float) -> float:
+def growth(speed: Vector, seconds: float) -> float:
     """The growth rate (1/s) of evenly spaced speeds within `seconds` between their second and last
     quarter, or their first and last if that is larger; that of rest minus infinite."""
     first, early, _, late = np.array_split(speed, 4)
@@ -108,7 +109,7 @@ def growth(speed: NDArray[np.float64], seconds: float) -> float:
     return float(max(rates))
 
 
-def _speeds(scene: Scene) -> tuple[NDArray[np.float64], int]:
+def _speeds(scene: Scene) -> tuple[Vector, int]:
     """The largest of the mechanism's velocities at each sample of a run of LONGEST, up to its end,
     and how many samples a whole one has."""
     with temporary_folders.room() as room:

@@ -1,5 +1,5 @@
-"""Absolute stability: the damping that a multiport lacks to be stable with any passive terminations
-that know nothing of each other.
+"""Absolute stability: the damping that a multiport is short of, to be stable with any passive
+terminations that know nothing of each other.
 
 A multiport with the impedance Z (F = Z v) at one frequency has its entries in blocks, one for each
 termination. Passive impedances Z_i that make it oscillate exist if and only if some flows v have
@@ -15,7 +15,7 @@ For two blocks of one entry each that is Llewellyn's condition (Proc. IRE 40 (19
 
 and for more than two blocks it is sufficient: the bound of the structured singular value of the
 scattering matrix by scales (Packard, Doyle, Automatica 29 (1993), 71). Dampers b on all entries add
-b I to Z, so that what is lacking is
+b I to Z, so that the damping shortage is
 
     b = -max over D of the least eigenvalue of (D Z D^-1 + (D Z D^-1)*)/2
 """
@@ -25,11 +25,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize, minimize_scalar
 
-Complex = NDArray[np.complex128]
-Vector = NDArray[np.float64]
+from hapticlink.orchestrator.base.arrays import Complex, Vector
+
 SPAN = 8.0
 """Of ln d to both sides of the scale that makes two blocks act equally on each other."""
 ITERATIONS = 30
@@ -41,29 +40,29 @@ def least(Z: Complex) -> float:
     return -float(np.linalg.eigvalsh((Z + Z.conj().T) / 2)[0])
 
 
-def lacking_of_two(Z: Complex, k: int) -> tuple[float, float]:
-    """The least b with which Z + b I is absolutely stable, the first k entries being one block and
-    the others the second, and ln d of the first."""
+def damping_shortage_of_two(Z: Complex, k: int) -> tuple[float, float]:
+    """The damping shortage: the least b with which Z + b I is absolutely stable, the first k
+    entries being one block and the others the second; and ln d of the first."""
     there, back = (max(float(np.linalg.norm(X)), 1e-300) for X in (Z[:k, k:], Z[k:, :k]))
     middle = (np.log(back) - np.log(there)) / 2
 
-    def lacks(s: float) -> float:
+    def shortage(s: float) -> float:
         scaled = Z.copy()
         scaled[:k, k:] *= np.exp(s)
         scaled[k:, :k] *= np.exp(-s)
         return least(scaled)
 
     bounds = middle - SPAN, middle + SPAN
-    found = minimize_scalar(lacks, bounds=bounds, method="bounded", options={"xatol": 1e-8})
-    return float(found.fun), float(found.x)
+    best = minimize_scalar(shortage, bounds=bounds, method="bounded", options={"xatol": 1e-8})
+    return float(best.fun), float(best.x)
 
 
-def lacking(Z: Complex, sizes: Sequence[int], start: Vector | None = None) -> float:
-    """A b with which Z + b I is absolutely stable, for blocks of `sizes`; the search for the least
-    one starts from ln d = `start`."""
+def damping_shortage(Z: Complex, sizes: Sequence[int], start: Vector | None = None) -> float:
+    """A b with which Z + b I is absolutely stable for blocks of `sizes`: an upper bound of the
+    damping shortage. The search for the least one starts from ln d = `start`."""
     block = np.repeat(np.arange(len(sizes)), sizes)
 
-    def lacks(s: Vector) -> tuple[float, Vector]:
+    def shortage(s: Vector) -> tuple[float, Vector]:
         d = np.exp(s)[block]
         scaled = d[:, None] * Z / d
         values, vectors = np.linalg.eigh((scaled + scaled.conj().T) / 2)
@@ -72,5 +71,5 @@ def lacking(Z: Complex, sizes: Sequence[int], start: Vector | None = None) -> fl
         return -float(values[0]), -np.bincount(block, slope).astype(float)
 
     s = np.zeros(len(sizes)) if start is None else start
-    found = minimize(lacks, s, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS})
-    return min(lacks(s)[0], float(found.fun))
+    best = minimize(shortage, s, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS})
+    return min(shortage(s)[0], float(best.fun))

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from hapticlink.analysis.stability.state_vector import Coordinate
-from hapticlink.components.dynamics.closure_jacobian import Matrix, closure_jacobian
+from hapticlink.components.dynamics.closure_jacobian import closure_jacobian
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.base.loop_names import SHARED
 from hapticlink.orchestrator.scene.scene import Scene
 
-Vector = NDArray[np.float64]
-BLOCKS = ("virtual_mechanism", "virtual_environment")
 RANK = 1e-6
 """Singular values of W, relative to the largest, that count as 0."""
 
@@ -37,7 +37,7 @@ class Closures:
     ) -> Iterator[Vector]:
         """Orthonormal directions (n,) that span the coordinates `free`, within the closures."""
         bound: set[int] = set()
-        for block in BLOCKS:
+        for block in SHARED:
             places = {
                 name: [
                     i

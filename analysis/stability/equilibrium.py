@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
-from hapticlink.analysis.stability.linearise import Linear, linearised
+from hapticlink.analysis.stability.forward_sensitivity import SAME
+from hapticlink.analysis.stability.lifted_map import LiftedMap
+from hapticlink.analysis.stability.linearisation import Linearisation, linearised
 from hapticlink.analysis.stability.modes import counted, modes
-from hapticlink.analysis.stability.tangent import SAME
 from hapticlink.analysis.stability.trajectory import (
     TOLERANCE,
     Trajectory,
@@ -23,6 +23,7 @@ from hapticlink.analysis.stability.trajectory import (
     require_constant,
     still,
 )
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 
 ITERATIONS = 20
@@ -38,7 +39,7 @@ NEUTRAL = 1e-7
 """Singular values of the balanced I - A, relative to the largest, that count as 0."""
 
 
-def equilibrium(map_: LiftedMap, run: Trajectory) -> Linear:
+def equilibrium(map_: LiftedMap, run: Trajectory) -> Linearisation:
     """The map linearised at its equilibrium: the one that Newton's method finds from the state of
     the `run` that is nearest to rest. Where it finds none, as from a state off the contact that is
     to be closed, or one that a scene leaves without oscillation, it begins at other states of the
@@ -46,107 +47,106 @@ def equilibrium(map_: LiftedMap, run: Trajectory) -> Linear:
 
     Raises InputFault where none is found, naming what does not come to rest.
     """
-    found: list[Linear] = []
+    equilibria: list[Linearisation] = []
     swings = False
-    nearest: Linear | None = None
+    nearest: Linearisation | None = None
     for state in run.begins():
         try:
-            at = _newton(map_, state)
-            resting = rests(at) and still(map_, at.image)
+            linear = _newton(map_, state)
+            resting = rests(linear) and still(map_, linear.image)
             if resting:
-                require_constant(map_, at.point, at.taken)
+                require_constant(map_, linear.point, linear.taken)
         except FmuFault:
             continue
         if resting:
-            found.append(at)
-            if not _leaves(at, map_.period):
+            equilibria.append(linear)
+            if not _leaves(linear, map_.period):
                 break
-        elif rests(at):
+        elif rests(linear):
             swings = True
-        elif nearest is None or _unrest(at).max() < _unrest(nearest).max():
-            nearest = at
-    if not found:
+        elif nearest is None or _unrest(linear).max() < _unrest(nearest).max():
+            nearest = linear
+    if not equilibria:
         raise InputFault(_why_none(map_, nearest, run, swings))
-    return min(found, key=lambda at: run.distances(at.point).min())
+    return min(equilibria, key=lambda linear: run.distances(linear.point).min())
 
 
-def nearby(map_: LiftedMap, state: Vector) -> Linear | None:
+def nearby(map_: LiftedMap, state: Vector) -> Linearisation | None:
     """The map linearised at the equilibrium that Newton's method finds from a `state`, such as that
     of another variant of the scene; None where there is none, or a scene leaves it without
     oscillation."""
     try:
-        at = _newton(map_, state)
-        if not rests(at) or _leaves(at, map_.period) or not still(map_, at.image):
+        linear = _newton(map_, state)
+        if not rests(linear) or _leaves(linear, map_.period) or not still(map_, linear.image):
             return None
     except FmuFault:
         return None
-    require_constant(map_, at.point, at.taken)
-    return at
+    require_constant(map_, linear.point, linear.taken)
+    return linear
 
 
-def _leaves(at: Linear, period: float) -> bool:
+def _leaves(linear: Linearisation, period: float) -> bool:
     """Whether a motion grows without oscillation, as from a standing pendulum."""
-    first = counted(modes(at, period))[:1]
+    first = counted(modes(linear, period))[:1]
     return any(not m.z.imag and m.z.real - 1.0 > m.uncertainty for m in first)
 
 
-def rests(at: Linear) -> bool:
+def rests(linear: Linearisation) -> bool:
     """Whether the state is the same after a period."""
-    return bool((_unrest(at) <= TOLERANCE).all())
+    return bool((_unrest(linear) <= TOLERANCE).all())
 
 
-def _unrest(at: Linear) -> Vector:
+def _unrest(linear: Linearisation) -> Vector:
     """Along each direction, the change over a period, relative."""
-    return relative(at.change, at.V.T @ at.point)
+    return relative(linear.change, linear.V.T @ linear.point)
 
 
-def newton_step(at: Linear) -> Vector:
+def newton_step(linear: Linearisation) -> Vector:
     """d along each direction, of least norm in balanced coordinates."""
-    d = at.scales
-    left = np.eye(len(d)) - at.A * d / d[:, None]
-    found: Vector = d * np.linalg.lstsq(left, at.change / d, rcond=NEUTRAL)[0]
-    return found
+    d = linear.scales
+    left = np.eye(len(d)) - linear.A * d / d[:, None]
+    return d * np.linalg.lstsq(left, linear.change / d, rcond=NEUTRAL)[0]
 
 
-def _newton(map_: LiftedMap, state: Vector) -> Linear:
+def _newton(map_: LiftedMap, state: Vector) -> Linearisation:
     """Newton's method from `state`: the last point where the FMUs can be evaluated. Slopes are
     shared by numbers as different as the residual, so that over most of a long period, and with
     an error of each step that is of second order all the same; by fewer where it does not shrink.
     """
-    at, least, idle = linearised(map_, state, COARSE), np.inf, 0
+    linear, least, idle = linearised(map_, state, COARSE), np.inf, 0
     for _ in range(ITERATIONS):
-        left = _unrest(at).max()
+        left = _unrest(linear).max()
         idle = idle + 1 if left > least / 2 else 0
         if left <= TOLERANCE or idle == PATIENCE:
             break
         least = min(least, left)
         same = max(SAME, min(COARSE, left) * FINER**idle)
         try:
-            at = linearised(map_, _nearer(map_, at, newton_step(at)), same)
+            linear = linearised(map_, _nearer(map_, linear, newton_step(linear)), same)
         except FmuFault:  # far from where it is linear
             break
-    return linearised(map_, at.point) if rests(at) else at
+    return linearised(map_, linear.point) if rests(linear) else linear
 
 
-def _nearer(map_: LiftedMap, at: Linear, step: Vector) -> Vector:
+def _nearer(map_: LiftedMap, linear: Linearisation, step: Vector) -> Vector:
     """The end of a step, or of the part of it that changes less over a period than where it begins:
     a step that begins off a contact would end deep in it, where there may be a rest of another
     kind."""
-    least = _unrest(at).max()
+    least = _unrest(linear).max()
     for part in 0.5 ** np.arange(HALVINGS):
-        there = at.moved(part * step)
+        there = linear.moved(part * step)
         try:
-            change = at.V.T @ (map_.image(there) - there)
+            change = linear.V.T @ (map_.image(there) - there)
         except FmuFault:
             continue
-        if relative(change, at.V.T @ there).max() < least:
+        if relative(change, linear.V.T @ there).max() < least:
             return there
-    return at.moved(step)
+    return linear.moved(step)
 
 
-def _why_none(map_: LiftedMap, nearest: Linear | None, run: Trajectory, swings: bool) -> str:
+def _why_none(map_: LiftedMap, nearest: Linearisation | None, run: Trajectory, swings: bool) -> str:
     remedy = (
-        "the map is linearised around a state of rest: take a hand that holds the mechanism, "
+        "the lifted map is linearised around an equilibrium: take a hand that holds the mechanism, "
         "such as an arm or a spring, gains with which it comes to rest, and no wrench, drive or "
         "target that changes with time"
     )

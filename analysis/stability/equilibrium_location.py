@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.lifted_map import LiftedMap
+from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.trajectory import TOLERANCE, Trajectory, relative
 from hapticlink.components.contact.depth import depths
+from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.loop_names import MECHANISM
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.haptic_loop import MECHANISM
 
 THERE = 1e-3
 """Distance of a state and input of an FMU, relative to max(1, |z|), within which a run is there."""
@@ -38,7 +39,7 @@ class Gap:
 
 
 @dataclass(frozen=True)
-class Whereabouts:
+class EquilibriumLocation:
     """Where an equilibrium is. pose: x, y (m) and theta (rad) of the operational point, () without
     one. from_start: how far that is from the start of the scene. contacts: depths (m) of what
     presses, by body and obstacle. run: what the run from the start does, "rests there",
@@ -102,9 +103,11 @@ class Whereabouts:
             )
 
 
-def whereabouts(scene: Scene, map_: LiftedMap, at: Linear, run: Trajectory) -> Whereabouts:
+def location(
+    scene: Scene, map_: LiftedMap, linear: Linearisation, run: Trajectory
+) -> EquilibriumLocation:
     """Where the equilibrium of the map is, and whether the run from the start comes there."""
-    away = run.distances(at.point)
+    away = run.distances(linear.point)
     there, nearest = away <= THERE, int(np.argmin(away))
     (first, last), (third, fourth) = _halves(away), _halves(away[len(away) // 2 :])
     if there[-1] and (run.rests or last <= max(first, TOLERANCE)):
@@ -115,21 +118,21 @@ def whereabouts(scene: Scene, map_: LiftedMap, at: Linear, run: Trajectory) -> W
         kind = "approaches" if last < first / 2 and fourth < FALLING * third else "passes"
     places = _places(map_, "x")[:3]
     if kind == "passes" and len(places) == 3:
-        nearest = int(np.argmin(np.hypot(*(run.states - at.image)[:, places[:2]].T)))
+        nearest = int(np.argmin(np.hypot(*(run.states - linear.image)[:, places[:2]].T)))
 
     def gap(state: Vector) -> Gap:  # FMUs come first in a state
         if len(places) == 3:
-            x, y, theta = (state[places] - at.image[places]).tolist()
+            x, y, theta = (state[places] - linear.image[places]).tolist()
             return Gap({"m": math.hypot(x, y), "rad": abs(theta)})
-        z = at.point[run.moving]
+        z = linear.point[run.moving]
         apart = relative(state[run.moving] - z, z)
         j = int(np.argmax(apart))
         return Gap({str(map_.coordinates[run.moving[j]]): float(apart[j])})
 
-    return Whereabouts(
-        pose=tuple(at.image[places].tolist()) if len(places) == 3 else (),
+    return EquilibriumLocation(
+        pose=tuple(linear.image[places].tolist()) if len(places) == 3 else (),
         from_start=gap(map_.initial),
-        contacts=_pressing(scene, at.image[_places(map_, "q")]),
+        contacts=_pressing(scene, linear.image[_places(map_, "q")]),
         run=kind,
         time=float(run.times[nearest]),
         nearest=gap(run.states[nearest]),

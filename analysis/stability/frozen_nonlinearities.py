@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from hapticlink.analysis.stability.state_vector import Coordinate
+from hapticlink.orchestrator.base.loop_names import CONTROLLER, DEVICE, MECHANISM
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.passive import Passive
@@ -63,13 +64,13 @@ def _removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:
     for scalar in fmu.description.scalars:
         if scalar.causality != "parameter":
             continue
-        if (block, scalar.name) == ("haptic_device", "encoder_resolution"):
+        if (block, scalar.name) == (DEVICE, "encoder_resolution"):
             yield scalar, 0.0, "quantisation of the encoders"
         elif (block, scalar.name) == ("virtual_wall", "quantum"):
             yield scalar, 0.0, "quantisation of the encoder"
-        elif block in ("controller", "virtual_wall") and scalar.name == "passivity_limit":
+        elif block in (CONTROLLER, "virtual_wall") and scalar.name == "passivity_limit":
             yield scalar, 0.0, "the passivity controller"
-        elif block == "virtual_mechanism" and scalar.name.endswith((".friction", "mu_contact")):
+        elif block == MECHANISM and scalar.name.endswith((".friction", "mu_contact")):
             yield scalar, NEXT_TO_NOTHING, "Coulomb friction"
 
 
@@ -78,7 +79,7 @@ def kept(system: System) -> list[str]:
     lines = []
     for fmu in system.fmus:
         block, description = system.block(fmu.name), fmu.description
-        if block == "haptic_device":
+        if block == DEVICE:
             lines.append(f"{fmu.name}: saturation of the motors, and the stops")
         if block == "virtual_wall":
             lines.append(f"{fmu.name}: contact, if the wall is unilateral")

@@ -19,16 +19,14 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.one_pass import one_pass
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 FUNCTIONS, ABOUT = "resources/functions.casadi.json", "resources/component.json"
 KEPT = 32
 """Graphs that a process keeps, as many as FMUs."""
@@ -41,10 +39,10 @@ def graph_slopes(found: Description, fmu: str, scene: Scene | None) -> GraphSlop
         return None
     if carried := _read(found.path, found.guid):
         return carried
-    block = next((b for b in blocks(scene) if b.name == fmu), None) if scene else None
+    block = next((b for b in blocks(scene).built if b.name == fmu), None) if scene else None
     if block is None:
         return None
-    made = component(block.made_by, block.settings)
+    made = component(block.block, block.settings)
     functions = {f.name(): f for f in one_pass(made).functions}
     return GraphSlopes(functions, made.timing == "sampled", made.substeps)
 

@@ -10,13 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigvals
 from scipy.optimize import minimize_scalar
 
-from hapticlink.analysis.stability.opened_ports import Complex, Response
+from hapticlink.analysis.stability.port_response import Response
+from hapticlink.orchestrator.base.arrays import Complex, Matrix
 
-Matrix = NDArray[np.float64]
 STILL = 1e-9
 """Mobility, relative to the largest, of a coordinate in which the device does not move."""
 RIGID = 1e-6
@@ -27,7 +26,7 @@ HELD = 1e-5
 SHARP = 0.1
 """Half width w P of a resonance that a grid of frequencies can miss."""
 SEARCH = 16
-"""Evaluations of the search for the angle at which most is lacking."""
+"""Evaluations of the search for the angle of the largest damping shortage."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +44,9 @@ class Hybrid:
     def impedance(self) -> Complex:
         """F = Z v of both ports."""
         Z = np.linalg.inv(self.Y)
-        found: Complex = np.block(
+        return np.block(
             [[Z, -Z @ self.there], [self.back @ Z, self.own - self.back @ Z @ self.there]]
         )
-        return found
 
     def harmonic(self, h: int) -> Hybrid:
         """That of one harmonic of the hand, and the one of the mechanism that it is seen as: with
@@ -136,15 +134,17 @@ class Scale:
         )
 
 
-def with_worst(angles: Matrix, lacks: Callable[[float], float]) -> Matrix:
-    """The angles, and beside the one at which `lacks` is largest the one where it peaks, unless it
-    is the last one."""
-    worst = int(np.argmax([lacks(angle) for angle in angles]))
+def with_worst(angles: Matrix, shortage: Callable[[float], float]) -> Matrix:
+    """The angles, and beside the one at which the `shortage` is largest the one where it peaks,
+    unless it is the last one."""
+    worst = int(np.argmax([shortage(angle) for angle in angles]))
     if worst == len(angles) - 1:
         return angles
     bounds = angles[max(worst - 1, 0)], angles[min(worst + 1, len(angles) - 1)]
     options = {"maxiter": SEARCH, "xatol": 1e-9}
-    found = minimize_scalar(lambda a: -lacks(a), bounds=bounds, method="bounded", options=options)
+    found = minimize_scalar(
+        lambda a: -shortage(a), bounds=bounds, method="bounded", options=options
+    )
     return np.union1d(angles, [float(found.x)])
 
 
@@ -157,14 +157,11 @@ def hertz(angle: float, h: int, N: int, period: float) -> float:
 def _waves(angle: float, count: int) -> Complex:
     """The harmonics of a signal of `count` samples in a period, as orthonormal columns."""
     k = np.arange(count)
-    found: Complex = np.exp(1j * np.outer(k, (angle + 2 * np.pi * k) / max(count, 1)))
-    return found / np.sqrt(max(count, 1))
+    waves = np.exp(1j * np.outer(k, (angle + 2 * np.pi * k) / max(count, 1)))
+    return waves / np.sqrt(max(count, 1))
 
 
 def _a_period(found: Response) -> Complex:
     """The displacement of the handle over a period by the force of that period, summed over all."""
     G, m = found.at(np.pi / 2), found.m
-    summed: Complex = np.add.reduce(
-        [G[i : i + m, i : i + m] for i in range(0, found.forces, m)], axis=0
-    )
-    return summed
+    return np.add.reduce([G[i : i + m, i : i + m] for i in range(0, found.forces, m)], axis=0)

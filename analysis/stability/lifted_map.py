@@ -13,10 +13,16 @@ from itertools import takewhile
 import numpy as np
 
 from hapticlink.analysis.stability.closure_directions import Closures
+from hapticlink.analysis.stability.forward_sensitivity import (
+    SAME,
+    Columns,
+    ForwardSensitivity,
+    Instruction,
+)
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
-from hapticlink.analysis.stability.state_vector import Coordinate, StateVector, Vector
-from hapticlink.analysis.stability.tangent import SAME, Columns, Instruction, Matrix, Tangent
+from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
 from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
@@ -38,10 +44,11 @@ CONVERGED = 1e-12
 def hyperperiod(time: Timeline) -> int:
     """The ticks after which the events of all clocks repeat. Raises InputFault for a clock whose
     period varies at random or follows a trace."""
-    return math.lcm(*(_round(clock) for clock in time.clocks))
+    return math.lcm(*(_repetition(clock) for clock in time.clocks))
 
 
-def _round(clock: Clock) -> int:
+def _repetition(clock: Clock) -> int:
+    """The ticks after which the events of a clock repeat."""
     starts = clock.starts
     if isinstance(starts, Frames):
         return starts.repeats
@@ -67,14 +74,14 @@ class LiftedMap:
         plan: Plan,
         simulation: Simulation,
         at: float,
-        tangent: Tangent,
+        sensitivity: ForwardSensitivity,
         window: tuple[int, int] | None = None,
     ) -> None:
         self._simulation, time = simulation, plan.system.timeline
         self._bound: dict[Event | Part, Bound] = {}
         self._plan, self.system = plan, plan.system
         self._binder = Binder(simulation, self._calls)
-        self._tangent = tangent
+        self._sensitivity = sensitivity
         self._state = StateVector(simulation)
         length = window[1] if window else hyperperiod(time)
         self.period, self.seconds = time.seconds(length), time.seconds
@@ -92,13 +99,13 @@ class LiftedMap:
         self.coordinates: Sequence[Coordinate] = self._state.coordinates(self._template)
         self.start = self._state.numbers(self._template)
         free = [i for i, c in enumerate(self.coordinates) if not discrete(c)]
-        self._free, self._closures = np.array(free, dtype=np.intp), tangent.closures
+        self._free, self._closures = np.array(free, dtype=np.intp), sensitivity.closures
 
     def over(self, system: System, window: tuple[int, int]) -> LiftedMap:
         """The map of the same FMUs on the timeline of another `system`, from the first tick of a
         `window` on and over its length."""
         self._state.restore(self._begin)
-        return LiftedMap(Plan(system), self._simulation, 0.0, self._tangent, window)
+        return LiftedMap(Plan(system), self._simulation, 0.0, self._sensitivity, window)
 
     def image(self, state: Vector, watch: Watch | None = None) -> Vector:
         """F(state). watch: called after each event with the numbers of the FMUs and signals, and
@@ -127,10 +134,10 @@ class LiftedMap:
         M = dict(zip(state.owners, np.split(V, ends), strict=True))
         D = {owner: np.zeros_like(rows) for owner, rows in M.items()}
         alive = np.arange(V.shape[1])
-        self._tangent.begin()
+        self._sensitivity.begin()
         for tick, event in self._moments:
             for instruction, call in self._instructions(event):
-                self._tangent.carry(tick, instruction, call, M, D, same)
+                self._sensitivity.carry(tick, instruction, call, M, D, same)
                 if after:
                     after(instruction, M)
             if not after:  # a column that is zero once remains so
@@ -147,7 +154,7 @@ class LiftedMap:
 
     def ways(self) -> dict[str, str]:
         """By FMU, how the slopes of the last linearisation were found."""
-        return self._tangent.ways()
+        return self._sensitivity.ways()
 
     def count(self, kind: type[Operation], fmu: str) -> int:
         """The number of operations of a kind on an FMU within a period."""
@@ -167,11 +174,11 @@ class LiftedMap:
         for fmu, scalar, value in values:
             self._simulation.instances[fmu].connect([scalar], [0])(np.array([float(value)]))
         self._template = self._state.save()
-        self._tangent.forget({fmu for fmu, _, _ in values})
+        self._sensitivity.forget({fmu for fmu, _, _ in values})
 
     def forget(self) -> None:
         """Slopes of FMUs that were found so far are not taken again."""
-        self._tangent.forget(self.system.fmu)
+        self._sensitivity.forget(self.system.fmu)
 
     def directions(self, point: Vector) -> Iterator[Vector]:
         """Orthonormal directions in which the state can be moved from `point`, that of the
@@ -235,16 +242,14 @@ def long_enough(scene: Scene, system: System, at: float = 0.0) -> System:
 
 
 @contextmanager
-def opened(
-    system: System, at: float = 0.0, closures: Closures | None = None
-) -> Iterator[LiftedMap]:
-    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; `closures` are
-    those of its mechanism.
+def lifted_map(system: System, at: float = 0.0, scene: Scene | None = None) -> Iterator[LiftedMap]:
+    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; the state is
+    perturbed within the loop closures of `scene`.
 
     Raises InputFault where there is none: adaptive step sizes, rates and latencies that vary, an
     FMU whose state cannot be read.
     """
-    if system.step_control:
+    if system.coupling.step_control:
         raise InputFault("step_control adapts the steps to the state: the map needs fixed ones")
     for c in system.connections:
         if c.latency and (c.latency.loss or c.latency.max not in (None, c.latency.min)):
@@ -252,9 +257,9 @@ def opened(
                 f"delays of {c.name}: latency and loss are random, so that no two periods are "
                 "alike; the map needs a constant latency"
             )
-    tolerance = min(system.iteration.tolerance, CONVERGED)
-    exactly = replace(system.iteration, method="newton", tolerance=tolerance)
-    system = replace(system, iteration=exactly)
+    tolerance = min(system.coupling.iteration.tolerance, CONVERGED)
+    exactly = replace(system.coupling.iteration, method="newton", tolerance=tolerance)
+    system = replace(system, coupling=replace(system.coupling, iteration=exactly))
     with (
         temporary_folders.room() as room,
         RunFolder(room) as results,
@@ -265,4 +270,5 @@ def opened(
         simulation.step_checks.clear()
         simulation.start()
         without_friction(simulation.holds.values())
-        yield LiftedMap(Plan(system), simulation, at, Tangent(simulation, closures))
+        closures = Closures(scene) if scene else None
+        yield LiftedMap(Plan(system), simulation, at, ForwardSensitivity(simulation, closures))

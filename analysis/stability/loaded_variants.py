@@ -12,20 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import equilibrium, nearby
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector, long_enough, opened
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
+from hapticlink.analysis.stability.linearisable_scene import linearisable
+from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.modes import counted, modes, verdict
 from hapticlink.analysis.stability.trajectory import trajectory
-from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 
 
@@ -47,7 +44,7 @@ class Verdict:
         return float(np.log(max(self.radius, 1e-300))) / self.period
 
 
-class Session:
+class LoadedVariants:
     """Judges variants of `scene`, one after the other; as a context manager it unloads the FMUs."""
 
     def __init__(self, scene: Scene) -> None:
@@ -55,12 +52,12 @@ class Session:
         self._open = ExitStack()
         self._map: LiftedMap | None = None
         self._kind: Hashable = None
-        self._rest: Vector | None = None
+        self._equilibrium: Vector | None = None
         self._set_anew = False
         self._starts: dict[tuple[str, str], tuple[Scalar, float]] = {}
         self.loads = 0
 
-    def __enter__(self) -> Session:
+    def __enter__(self) -> LoadedVariants:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -68,30 +65,28 @@ class Session:
 
     def judge(self, options: Options) -> Verdict:
         """The verdict on the scene with `options`. Raises InputFault as `stability` does."""
-        with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
-            read = open_scene.load(self._scene, options)
-            with built(read) as whole:
-                system = long_enough(read, frozen_nonlinearities.without(whole)[0])
-                map_ = self._prepared(read, system)
-                try:
-                    at = None if self._rest is None else nearby(map_, self._rest)
-                    if at is None:
-                        map_ = self._fresh(read, system)
-                        at = equilibrium(map_, trajectory(map_, read.duration))
-                except Fault:
-                    self._open.close()
-                    self._kind = None
-                    raise
-            self._rest = at.point
-            return _verdict(at, map_.period)
+        with linearisable(self._scene, options) as (read, system, _):
+            system = long_enough(read, system)
+            map_ = self._prepared(read, system)
+            try:
+                linear = None if self._equilibrium is None else nearby(map_, self._equilibrium)
+                if linear is None:
+                    map_ = self._fresh(read, system)
+                    linear = equilibrium(map_, trajectory(map_, read.duration))
+            except Fault:
+                self._open.close()
+                self._kind = None
+                raise
+            self._equilibrium = linear.point
+            return _verdict(linear, map_.period)
 
     def _prepared(self, read: Scene, system: System) -> LiftedMap:
         kind, starts = _kind(system), _starts(system)
         if kind == self._kind and self._map and self._set(self._map, starts):
             return self._map
         self._open.close()
-        self._map = self._open.enter_context(opened(system, 0.0, Closures(read)))
-        self._rest = None
+        self._map = self._open.enter_context(lifted_map(system, 0.0, read))
+        self._equilibrium = None
         self._kind, self._starts, self._set_anew = kind, starts, False
         self.loads += 1
         return self._map
@@ -115,11 +110,11 @@ class Session:
         return True
 
 
-def _verdict(at: Linear, period: float) -> Verdict:
-    found = counted(modes(at, period))
-    if not found:
+def _verdict(linear: Linearisation, period: float) -> Verdict:
+    judged = counted(modes(linear, period))
+    if not judged:
         return Verdict(0.0, 0.0, period)
-    return Verdict(abs(found[0].z), found[0].uncertainty, period)
+    return Verdict(abs(judged[0].z), judged[0].uncertainty, period)
 
 
 def _kind(system: System) -> Hashable:
@@ -127,7 +122,7 @@ def _kind(system: System) -> Hashable:
     time = system.timeline
     paces = tuple((c.name, c.first, c.longest, c.shortest, len(c.starts)) for c in time.clocks)
     fmus = tuple((f.name, f.description.guid, f.clock) for f in system.fmus)
-    return time.base, paces, fmus, tuple(map(repr, system.connections)), system.coupling
+    return time.base, paces, fmus, tuple(map(repr, system.connections)), system.coupling.scheme
 
 
 def _starts(system: System) -> dict[tuple[str, str], tuple[Scalar, float]]:

@@ -13,21 +13,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.forward_sensitivity import STEP
+from hapticlink.analysis.stability.lifted_map import LiftedMap
+from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.modes import Mode
-from hapticlink.analysis.stability.tangent import STEP
+from hapticlink.orchestrator.base.arrays import Vector
 
 
-def traced(map_: LiftedMap, at: Linear, mode: Mode) -> Mode:
+def traced(map_: LiftedMap, linear: Linearisation, mode: Mode) -> Mode:
     """The mode with its frequency beyond the argument of its eigenvalue."""
     if map_.events == 1:
         return mode
-    held = [map_.coordinates[i].kind == "hold" for i in at.taken]
-    j = int(at.taken[np.argmax(np.where(held, 0.0, mode.participation))])
-    v = mode.vector * (STEP / np.max(np.abs(mode.vector) / np.maximum(1.0, np.abs(at.point))))
-    rest = _followed(map_, at.point, j)
-    paths = [_followed(map_, at.point + part, j) - rest for part in (v.real, v.imag)]
+    held = [map_.coordinates[i].kind == "hold" for i in linear.taken]
+    j = int(linear.taken[np.argmax(np.where(held, 0.0, mode.participation))])
+    v = mode.vector * (STEP / np.max(np.abs(mode.vector) / np.maximum(1.0, np.abs(linear.point))))
+    unmoved = _followed(map_, linear.point, j)
+    paths = [_followed(map_, linear.point + part, j) - unmoved for part in (v.real, v.imag)]
     path = np.array([v[j], *(paths[0] + 1j * paths[1])])
     path = path[np.abs(path) > 0]
     if len(path) < 2:

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eig
 
-from hapticlink.analysis.stability.lifted_map import Vector
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.linearisation import Linearisation
+from hapticlink.orchestrator.base.arrays import Vector
 
 FLOOR = 1e-9
 """Relative error of the entries of A by rounding."""
@@ -57,15 +57,15 @@ def verdict(radius: float, uncertainty: float) -> str:
     return "unstable" if radius > 1.0 else "stable"
 
 
-def counted(found: Sequence[Mode]) -> Sequence[Mode]:
+def counted(modes: Sequence[Mode]) -> Sequence[Mode]:
     """The modes by which a scene is judged: neutral ones only where there are no others."""
-    return [mode for mode in found if not mode.neutral] or found
+    return [mode for mode in modes if not mode.neutral] or modes
 
 
-def modes(at: Linear, period: float) -> list[Mode]:
+def modes(linear: Linearisation, period: float) -> list[Mode]:
     """The modes, that of the largest |z| first; of a complex pair the one with omega > 0."""
-    scale = at.scales
-    A, E = at.A * scale / scale[:, None], np.abs(at.E * scale / scale[:, None])
+    scale = linear.scales
+    A, E = linear.A * scale / scale[:, None], np.abs(linear.E * scale / scale[:, None])
     E = np.maximum(E, FLOOR * np.abs(A))
     values, left, right = eig(A, left=True, right=True)
     found = []
@@ -74,7 +74,7 @@ def modes(at: Linear, period: float) -> list[Mode]:
             continue
         v, w = right[:, i], left[:, i].conj()
         overlap = abs(w @ v)
-        shares = np.abs((at.V @ (v * scale)) * (at.V @ (w / scale)))[at.taken]
+        shares = np.abs((linear.V @ (v * scale)) * (linear.V @ (w / scale)))[linear.taken]
         uncertainty = float(np.abs(w) @ E @ np.abs(v)) / overlap if overlap else np.inf
         s = np.log(z) / period if z else complex(-np.inf)
         found.append(
@@ -84,7 +84,7 @@ def modes(at: Linear, period: float) -> list[Mode]:
                 float(s.real),
                 float(s.imag),
                 shares / shares.sum() if shares.any() else shares,
-                at.V @ (v * scale),
+                linear.V @ (v * scale),
             )
         )
     return sorted(found, key=lambda mode: -abs(mode.z))

@@ -1,4 +1,4 @@
-"""The user's port of a scene: is what a hand feels passive, for any hand?
+"""The user's port of a scene: is what a hand feels passive?
 
 Around the equilibrium, with the hand cut off, a force u_k that is held over each haptic period T
 moves the handle by x_{k+1} - x_k. Over a hyperperiod of N periods, both stacked,
@@ -20,29 +20,30 @@ Between samples the velocity is taken for its mean: for a rendering of positions
 hand, as there; for one that reads velocities or forces it is the worst of the hands that hold their
 force. With several haptic periods in a hyperperiod the port mixes the frequencies w + 2 pi h/P: a
 hand that does not change with time answers to each alone, so that b is bounded from below by each
-harmonic with the others let go, and from above by scales for them (absolute.py).
+harmonic with the others let go, and from above by scales for them (absolute_stability.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hapticlink.analysis.stability import frozen_nonlinearities, two_port
-from hapticlink.analysis.stability.absolute_stability import lacking, least
-from hapticlink.analysis.stability.closure_directions import Closures
+from hapticlink.analysis.stability import two_port
+from hapticlink.analysis.stability.absolute_stability import damping_shortage, least
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.harmonics import Complex, Hybrid, Scale, hertz, with_worst
-from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, opened
-from hapticlink.analysis.stability.linearise import Linear
-from hapticlink.analysis.stability.opened_ports import (
+from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_worst
+from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
+from hapticlink.analysis.stability.linearisable_scene import linearisable
+from hapticlink.analysis.stability.linearisation import Linearisation
+from hapticlink.analysis.stability.port_response import (
     HandPort,
     MechanismPort,
+    Response,
     hand_port,
     mechanism_port,
     require_size,
@@ -50,33 +51,33 @@ from hapticlink.analysis.stability.opened_ports import (
 )
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
-from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Complex, Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
 
 FREQUENCIES = 32
 
 
 @dataclass(frozen=True)
 class Passivity:
-    """The user's port. needed: damping b of the device (N.s/m) that suffices for the rendering to
-    be stable with any passive hand, at_least: that which is necessary; they are the same where the
-    rendering mixes no frequencies. turning: `needed` for rotations (N.m.s/rad), 0 without any. own:
-    the damping that the device has, in the same scale. frequency: where `at_least` is needed (Hz).
-    curve: frequencies (Hz) and what is necessary there. two_port: the rendering between the hand
-    and a virtual mechanism, None without one behind the device."""
+    """The passivity of the user's port; dampings in N.s/m."""
 
     title: str
     needed: float
+    """The damping of the device that suffices for stability with any passive hand."""
     at_least: float
+    """The damping that is necessary: the same where the rendering mixes no frequencies."""
     turning: float
+    """`needed` for rotations (N.m.s/rad), 0 without any."""
     own: float
+    """The damping that the device has, in the same scale."""
     frequency: float
+    """The frequency (Hz) at which `at_least` is needed."""
     curve: tuple[tuple[float, float], ...]
+    """Frequencies (Hz) and the damping that is necessary there."""
     two_port: TwoPort | None
+    """The rendering between the hand and a virtual mechanism, None without one behind a device."""
 
     @property
     def passive(self) -> bool:
@@ -118,109 +119,131 @@ def passivity(scene: str | Path | Scene, options: Options = (), *, at: float = 0
     Raises InputFault as `stability` does, and for a scene whose hand pushes no device, or with a
     hyperperiod of more than 600 forces.
     """
-    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
-        read = open_scene.load(scene, options)
-        with built(read) as whole:
-            system, _ = frozen_nonlinearities.without(whole)
-            hand = hand_port(system)
-            with opened(long_enough(read, system, at), at, Closures(read)) as map_:
-                mechanism = mechanism_port(system, hand)
-                require_size(map_, hand, mechanism)
-                rest = equilibrium(map_, trajectory(map_, read.duration))
-                T = 1 / float(read.haptics.rate)
-                return of(read.title, map_, rest, hand, mechanism, T)
+    with linearisable(scene, options) as (read, system, _):
+        hand = hand_port(system)
+        with lifted_map(long_enough(read, system, at), at, read) as map_:
+            mechanism = mechanism_port(system, hand)
+            require_size(map_, hand, mechanism)
+            linear = equilibrium(map_, trajectory(map_, read.duration))
+            T = 1 / float(read.haptics.rate)
+            return of(read.title, map_, linear, hand, mechanism, T)
 
 
 def of(
     title: str,
     map_: LiftedMap,
-    at: Linear,
+    linear: Linearisation,
     hand: HandPort,
     mechanism: MechanismPort | None,
     T: float,
 ) -> Passivity:
-    """The passivity of a map linearised at its equilibrium; T (s) is the haptic period."""
-    whole, device = (response(map_, at, hand, alone=alone) for alone in (False, True))
+    """The passivity of a map linearised at its equilibrium; T (s) is the haptic period. Raises
+    InputFault where the handle does not take one force each haptic period."""
+    whole, device = (response(map_, linear, hand, alone=alone) for alone in (False, True))
     if whole.forces != whole.m * round(map_.period / T):
         raise InputFault(
             f"user's port: {hand.handle} takes {whole.forces // whole.m} forces in "
             f"{map_.period / T:.4g} haptic periods"
         )
-    scale, P = Scale(device, whole, T), map_.period
-    free = scale.free.T @ scale.moving
-    curve: list[tuple[float, float]] = []
-    needed, own = -np.inf, np.inf
-    N = whole.forces // whole.m
+    port = _UserPort(whole, device, T, map_.period)
+    angles = port.grid(np.union1d(_angles(port.N), port.scale.resonances(whole)))
+    angles = with_worst(angles, lambda angle: max(port.necessary(angle)))
+    curve = [pair for angle in angles for pair in port.curve(angle)]
+    frequency, at_least = max(curve, key=lambda pair: pair[1])
+    own, sufficient = zip(*map(port.own_and_sufficient, angles), strict=True)
+    needed = max(at_least, *sufficient)
+    return Passivity(
+        title=title,
+        needed=needed,
+        at_least=at_least,
+        turning=needed * port.scale.turns,
+        own=min(own),
+        frequency=frequency,
+        curve=tuple(sorted(curve)),
+        two_port=_between(map_, linear, hand, mechanism, port, angles) if mechanism else None,
+    )
 
-    def impedances(angle: float) -> tuple[Hybrid, Complex]:
+
+class _UserPort:
+    """The port of all that runs, `whole`, and of the device alone, at angles w P of the hyperperiod
+    P (s); N haptic periods T (s) in each."""
+
+    def __init__(self, whole: Response, device: Response, T: float, P: float) -> None:
+        self._whole, self._device, self._P = whole, device, P
+        self.N, self.scale = whole.forces // whole.m, Scale(device, whole, T)
+        self._moving_of_free = self.scale.free.T @ self.scale.moving
+
+    def _impedances(self, angle: float) -> tuple[Hybrid, Complex]:
         """The port, and the device alone in its directions."""
-        device_Z = scale.at(device, angle, 0.0, scale.free).impedance
-        along = np.kron(np.eye(N), free)
-        return scale.at(whole, angle, 0.0, scale.moving), along.T @ device_Z @ along
+        scale = self.scale
+        Z = scale.at(self._device, angle, 0.0, scale.free).impedance
+        along = np.kron(np.eye(self.N), self._moving_of_free)
+        return scale.at(self._whole, angle, 0.0, scale.moving), along.T @ Z @ along
 
-    def lacks(angle: float) -> list[float]:
+    @cache  # noqa: B019 (few numbers, and the port does not live long)
+    def necessary(self, angle: float) -> list[float]:
         """The damping that is necessary, by harmonic."""
-        port, alone = impedances(angle)
-        found = []
-        for h in range(N):
+        port, alone = self._impedances(angle)
+        shortages = []
+        for h in range(self.N):
             i = slice(h * port.r, (h + 1) * port.r)
             Z = port.harmonic(h).impedance
-            lacking_here = least(Z - alone[i, i])
+            shortage = least(Z - alone[i, i])
             none = ROUNDING * float(np.abs(Z).max())
-            found.append(lacking_here if abs(lacking_here) > none else 0.0)
-        return found
+            shortages.append(shortage if abs(shortage) > none else 0.0)
+        return shortages
 
-    angles = np.union1d(_angles(N), scale.resonances(whole))
-    # Next to half the haptic rate, which is at 0 or at pi, the device may seem to move by rounding.
-    still = np.array([angle for angle in angles if not scale.moved(device, angle)])
-    low = still[still < np.pi / 2].max(initial=0.0)
-    high = still[still >= np.pi / 2].min(initial=np.inf)
-    angles = angles[(low < angles) & (angles < high)]
-    angles = with_worst(angles, lambda angle: max(lacks(angle)))
-    for angle in angles:
-        port, alone = impedances(angle)
-        has = -least(alone)
-        own = min(own, has if abs(has) > ROUNDING * np.abs(alone).max() else 0.0)
-        curve += [(hertz(angle, h, N, P), found) for h, found in enumerate(lacks(angle))]
+    def curve(self, angle: float) -> list[tuple[float, float]]:
+        """The frequencies (Hz) of the harmonics, and the damping that is necessary at each."""
+        shortages = enumerate(self.necessary(angle))
+        return [(hertz(angle, h, self.N, self._P), shortage) for h, shortage in shortages]
+
+    def own_and_sufficient(self, angle: float) -> tuple[float, float]:
+        """The damping that the device has, and one that suffices although frequencies mix: -inf
+        where they do not, since there it is the necessary one."""
+        port, alone = self._impedances(angle)
+        own, sufficient = -least(alone), -np.inf
         if mixes(port):
-            most = lacking(port.impedance - alone, [port.r] * (len(port.Y) // port.r))
-            needed = max(needed, most)
-    frequency, at_least = max(curve, key=lambda pair: pair[1])
-    needed = max(needed, at_least)
-    both = None
-    if mechanism:
-        cut = response(map_, at, hand, mechanism)
-        H = P * len(mechanism.moved) / (len(cut.D) - cut.forces)
+            blocks = [port.r] * (len(port.Y) // port.r)
+            sufficient = damping_shortage(port.impedance - alone, blocks)
+        return own if abs(own) > ROUNDING * np.abs(alone).max() else 0.0, sufficient
 
-        def cut_at(angle: float) -> Hybrid:
-            return scale.at(cut, angle, H, scale.moving)
+    def grid(self, angles: Vector) -> Vector:
+        """The angles at which the device moves. Next to half the haptic rate, which is at 0 or at
+        pi, it may seem to move by rounding."""
+        still = np.array([a for a in angles if not self.scale.moved(self._device, a)])
+        self._low = still[still < np.pi / 2].max(initial=0.0)
+        self._high = still[still >= np.pi / 2].min(initial=np.inf)
+        return self.within(angles)
 
-        angles = np.union1d(angles, scale.resonances(cut))
-        angles = angles[(low < angles) & (angles < high)]
-        angles = with_worst(angles, lambda angle: two_port.most_lacking(cut_at(angle)))
-        both = two_port.judged(
-            [(angle, cut_at(angle)) for angle in angles],
-            P,
-            scale.turns,
-            cut.radius,
-            mechanism.kept,
-        )
-    return Passivity(
-        title,
-        needed,
-        at_least,
-        needed * scale.turns,
-        own,
-        frequency,
-        tuple(sorted(curve)),
-        both,
-    )
+    def within(self, angles: Vector) -> Vector:
+        """The angles within the limits of the `grid`."""
+        return angles[(self._low < angles) & (angles < self._high)]
 
 
-def _angles(N: int) -> NDArray[np.float64]:
+def _between(
+    map_: LiftedMap,
+    linear: Linearisation,
+    hand: HandPort,
+    mechanism: MechanismPort,
+    port: _UserPort,
+    angles: Vector,
+) -> TwoPort:
+    """The rendering between the hand and the mechanism, at `angles` and those of its resonances."""
+    cut, scale = response(map_, linear, hand, mechanism), port.scale
+    H = map_.period * len(mechanism.moved) / (len(cut.D) - cut.forces)
+
+    def two_port_at(angle: float) -> Hybrid:
+        return scale.at(cut, angle, H, scale.moving)
+
+    angles = port.within(np.union1d(angles, scale.resonances(cut)))
+    angles = with_worst(angles, lambda angle: two_port.largest_shortage(two_port_at(angle)))
+    ports = [(angle, two_port_at(angle)) for angle in angles]
+    return two_port.judged(ports, map_.period, scale.turns, cut.radius, mechanism.kept)
+
+
+def _angles(N: int) -> Vector:
     """Frequencies w P up to pi, as many as N harmonics of each leave to be taken."""
     count = max(6, FREQUENCIES // N)
-    found: NDArray[np.float64] = np.unique(
-        np.concatenate([np.geomspace(1e-2, np.pi, count), np.linspace(0.0, np.pi, count)[1:]])
-    )
-    return found
+    grids = np.geomspace(1e-2, np.pi, count), np.linspace(0.0, np.pi, count)[1:]
+    return np.unique(np.concatenate(grids))

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.holds import Hold
@@ -24,7 +25,6 @@ from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.latency import Link
 from hapticlink.orchestrator.system.system import Fmu, System
 
-Vector = NDArray[np.float64]
 Visit = Callable[[str, Vector], Vector]
 SIGNALS = "signals"
 

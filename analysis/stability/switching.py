@@ -16,12 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import matrix_balance, solve_triangular
 from scipy.sparse.linalg import LinearOperator, eigs
 from scipy.stats import t as student
 
-Matrix = NDArray[np.float64]
+from hapticlink.orchestrator.base.arrays import Matrix
+
 BATCHES = 40
 CONFIDENCE = 0.95
 ROUNDING = 1e-12

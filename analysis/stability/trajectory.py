@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
+from hapticlink.analysis.stability.lifted_map import LiftedMap
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 
 TOLERANCE = 1e-9
@@ -38,7 +39,7 @@ class Trajectory:
     rest."""
 
     times: Vector
-    states: NDArray[np.float64]
+    states: Matrix
     unrest: Vector
     moving: NDArray[np.intp]
     ended: str = ""
@@ -144,7 +145,6 @@ def require_constant(map_: LiftedMap, state: Vector, taken: NDArray[np.intp]) ->
         )
 
 
-def relative(change: NDArray[np.float64], z: Vector) -> NDArray[np.float64]:
+def relative(change: Matrix, z: Vector) -> Matrix:
     """|change| of coordinates z, relative to max(1, |z|)."""
-    found: NDArray[np.float64] = np.abs(change) / np.maximum(1.0, np.abs(z))
-    return found
+    return np.abs(change) / np.maximum(1.0, np.abs(z))

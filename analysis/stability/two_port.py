@@ -1,7 +1,7 @@
 """Absolute stability of the rendering between the hand and the virtual mechanism: is it stable with
 any passive hand and any passive mechanism? The method is that of Adams, Hannaford, IEEE Trans.
-Robotics and Automation 15 (1999), 465, with sampled ports (cut.py) of any number of degrees of
-freedom (absolute.py) and rates (harmonics.py).
+Robotics and Automation 15 (1999), 465, with sampled ports (port_response.py) of any number
+of degrees of freedom (absolute_stability.py) and rates (harmonics.py).
 """
 
 from __future__ import annotations
@@ -12,7 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.analysis.stability.absolute_stability import lacking, lacking_of_two, least
+from hapticlink.analysis.stability.absolute_stability import (
+    damping_shortage,
+    damping_shortage_of_two,
+    least,
+)
 from hapticlink.analysis.stability.harmonics import Hybrid, hertz
 
 ROUNDING = 1e-6
@@ -21,25 +25,29 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class TwoPort:
-    """The rendering between hand and mechanism. needed: damping (N.s/m) at both ports that suffices
-    for absolute stability, at_least: that which is necessary; they are the same where the
-    rendering mixes no frequencies. turning: `needed` for rotations (N.m.s/rad), 0 without any.
-    hand, mechanism: what each port needs by itself, whatever the other has. frequency: where
-    `at_least` is needed (Hz). below: the frequency (Hz) up to which nothing is. radius: spectral
-    radius with the hand gone and the mechanism held. kept: ports of the mechanism that others read
-    besides its pose and velocity, as at the equilibrium here. curve: frequencies (Hz) and the
-    damping that is necessary there."""
+    """The absolute stability of the rendering between hand and mechanism; dampings in N.s/m."""
 
     needed: float
+    """The damping at both ports that suffices for absolute stability."""
     at_least: float
+    """The damping that is necessary: the same where the rendering mixes no frequencies."""
     turning: float
+    """`needed` for rotations (N.m.s/rad), 0 without any."""
     hand: float
+    """The damping that the hand's port needs by itself, whatever the other has."""
     mechanism: float
+    """The damping that the mechanism's port needs by itself, whatever the other has."""
     frequency: float
+    """The frequency (Hz) at which `at_least` is needed."""
     below: float
+    """The frequency (Hz) up to which no damping is needed."""
     radius: float
+    """The spectral radius with the hand gone and the mechanism held."""
     kept: tuple[str, ...]
+    """Ports of the mechanism that others read besides its pose and velocity, which stay as at the
+    equilibrium here."""
     curve: tuple[tuple[float, float], ...]
+    """Frequencies (Hz) and the damping that is necessary there."""
 
     @property
     def verdict(self) -> str:
@@ -84,8 +92,9 @@ class TwoPort:
                 f"  it takes a damping of {between(self.at_least, self.needed)} N.s/m"
                 + (f" and {self.turning:.3g} N.m.s/rad" if self.turning else "")
                 + f" at both ports ({max(0.0, self.hand):.4g} at the hand's, "
-                f"{max(0.0, self.mechanism):.4g} at the mechanism's whatever the other has); least "
-                f"passive at {self.frequency:.4g} Hz, nothing lacks below {self.below:.3g} Hz"
+                f"{max(0.0, self.mechanism):.4g} at the mechanism's "
+                f"whatever the other has); least passive at {self.frequency:.4g} Hz, no damping "
+                f"needed below {self.below:.3g} Hz"
             )
 
 
@@ -107,38 +116,39 @@ def judged(
     hand, mechanism, needed = -np.inf, -np.inf, -np.inf
     for angle, port in ports:
         N, r = len(port.Y) // port.r, port.r
-        alone = [port.harmonic(h).impedance for h in range(N)]
         scales = []
-        for h, Z in enumerate(alone):
-            found, scale = lacking_of_two(Z, r)
-            none = ROUNDING * float(np.abs(Z).max())
-            curve.append((hertz(angle, h, N, period), found if found > none else min(found, 0.0)))
+        for h in range(N):
+            Z = port.harmonic(h).impedance
+            shortage, scale = damping_shortage_of_two(Z, r)
+            if shortage <= ROUNDING * float(np.abs(Z).max()):
+                shortage = min(shortage, 0.0)
+            curve.append((hertz(angle, h, N, period), shortage))
             scales.append(scale)
             hand, mechanism = max(hand, least(Z[:r, :r])), max(mechanism, least(Z[r:, r:]))
         if mixes(port):
             start = np.array([*scales, *np.zeros(len(port.own) // r)])
-            needed = max(needed, lacking(port.impedance, [r] * len(start), start))
+            needed = max(needed, damping_shortage(port.impedance, [r] * len(start), start))
     frequency, at_least = max(curve, key=lambda pair: pair[1])
     needed = max(needed, at_least)
-    lacks = [f for f, b in curve if b > 0.0]
+    short = [f for f, shortage in curve if shortage > 0.0]
     return TwoPort(
-        needed,
-        at_least,
-        needed * turns,
-        hand,
-        mechanism,
-        frequency,
-        min(lacks, default=max(f for f, _ in curve)),
-        radius,
-        kept,
-        tuple(sorted(curve)),
+        needed=needed,
+        at_least=at_least,
+        turning=needed * turns,
+        hand=hand,
+        mechanism=mechanism,
+        frequency=frequency,
+        below=min(short, default=max(f for f, _ in curve)),
+        radius=radius,
+        kept=kept,
+        curve=tuple(sorted(curve)),
     )
 
 
-def most_lacking(port: Hybrid) -> float:
-    """The damping that is necessary in the harmonic that lacks most."""
-    alone = (port.harmonic(h) for h in range(len(port.Y) // port.r))
-    return max(lacking_of_two(one.impedance, one.r)[0] for one in alone)
+def largest_shortage(port: Hybrid) -> float:
+    """The damping shortage of the harmonic in which it is largest."""
+    harmonics = (port.harmonic(h) for h in range(len(port.Y) // port.r))
+    return max(damping_shortage_of_two(one.impedance, one.r)[0] for one in harmonics)
 
 
 def mixes(port: Hybrid) -> bool:

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.lifted_map import behind_start, opened
-from hapticlink.analysis.stability.linearise import Matrix
+from hapticlink.analysis.stability.lifted_map import behind_start, lifted_map
+from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.switching import (
     Bounds,
     Edge,
@@ -27,15 +26,13 @@ from hapticlink.analysis.stability.switching import (
     mean_square,
 )
 from hapticlink.analysis.stability.trajectory import trajectory
-from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline, bounds, exact
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks
 
@@ -138,26 +135,22 @@ def varying_stability(
     Raises InputFault for a scene without an equilibrium, with further rates, and where holds reach
     back by more than two frames.
     """
-    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
-        read = open_scene.load(scene, options)
-        with built(read) as whole:
-            system, removed = frozen_nonlinearities.without(whole)
-            place = _clock(system)
-            rate = next(
-                p.rate for p in clocks(read).paces.values() if isinstance(p.rate, VariableRate)
-            )
-            # All that may be drawn, not only what this run draws.
-            low, high = bounds(exact(rate.min), exact(rate.max), system.timeline.base)
-            lengths, seed = range(low, high + 1), rate.seed
-            edges, names = edges_of(read, system, place, list(lengths))
-    found = joint_spectral_radius(edges, 1e-4, products)
+    with linearisable(scene, options) as (read, system, removed):
+        place = _clock(system)
+        rates = (pace.rate for pace in clocks(read).paces.values())
+        rate = next(rate for rate in rates if isinstance(rate, VariableRate))
+        # All that may be drawn, not only what this run draws.
+        low, high = bounds(exact(rate.min), exact(rate.max), system.timeline.base)
+        lengths, seed = range(low, high + 1), rate.seed
+        edges, names = edges_of(read, system, place, list(lengths))
+    growth = joint_spectral_radius(edges, 1e-4, products)
     exponent, width = lyapunov(edges, seed)
     return VaryingStability(
         title=read.title,
         frames=tuple(lengths),
         tick=float(system.timeline.base),
-        bounds=found,
-        worst=tuple(names[i] for i in found.worst),
+        bounds=growth,
+        worst=tuple(names[i] for i in growth.worst),
         second_moment=mean_square(edges),
         exponent=exponent,
         confidence=width,
@@ -187,17 +180,14 @@ def edges_of(
     length of each."""
     middle = lengths[len(lengths) // 2]
     seconds = system.timeline.seconds
-    with opened(
-        alternating(system, place, middle, middle), 0.0, Closures(scene) if scene else None
-    ) as map_:
+    with lifted_map(alternating(system, place, middle, middle), 0.0, scene) as map_:
         at = equilibrium(map_, trajectory(map_, 60.0))
         V = np.stack(list(map_.directions(at.point)), axis=1)
 
         def frame(before: int, length: int, further: int | None = None) -> Matrix:
             other = alternating(system, place, before, length, further)
             view = map_.over(other, window(other, place))
-            found: Matrix = V.T @ view.slopes(at.point, V)[1]
-            return found
+            return V.T @ view.slopes(at.point, V)[1]
 
         low, high = lengths[0], lengths[-1]
         remembers = not _close(frame(low, middle), frame(high, middle))
@@ -246,7 +236,8 @@ def alternating(
 
 def _settled(system: System) -> int:
     """Ticks after which frames are taken: so many that lengths, which holds keep beside stamps, are
-    far smaller than those, and slopes of one length are not taken for another (tangent.py)."""
+    far smaller than those, and slopes of one length are not taken for another
+    (forward_sensitivity.py)."""
     return 4 * behind_start(system)
 
 

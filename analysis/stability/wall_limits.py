@@ -13,10 +13,10 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-Matrix = NDArray[np.float64]
+from hapticlink.orchestrator.base.arrays import Matrix
+
 GRID = 4096
 SMALLEST = 1e-8
 """Smallest b T/m that a search for roots can tell from 0."""
@@ -112,8 +112,7 @@ def radius(m: float, b: float, T: float, periods: int, K: Matrix, B: Matrix) -> 
     for power, gain in ((0, K + B / T), (1, -B / T)):
         for i, g in enumerate(device):
             companion[..., 0, periods + power + i] -= gain * g
-    found: Matrix = np.abs(np.linalg.eigvals(companion)).max(axis=-1)
-    return found
+    return np.abs(np.linalg.eigvals(companion)).max(axis=-1)
 
 
 def stable(m: float, b: float, T: float, periods: int = 0, B: float = 0.0) -> float:

@@ -2,12 +2,13 @@
 
 **Margin.** The stability margin g is the factor on all stiffnesses together, dampings by its root,
 at which the linearised map of the co-simulation (stability/) becomes unstable, in the worst of the
-poses and hands that are judged (margin.py). The default of 2 (6 dB) is the least gain margin that
-textbooks of control ask for (Astrom, Murray, Feedback Systems, 2008, section 9.3).
+poses and hands that are judged (stability_limits.py). The default of 2 (6 dB) is the least gain
+margin that textbooks of control ask for (Astrom, Murray, Feedback Systems, 2008, section 9.3).
 
-**Felt stiffness** (feel.py) is that of the handle under a wrench at 2 Hz, in one of these poses.
+**Felt stiffness** (felt_stiffness.py) is that of the handle under a wrench at 2 Hz, in one of these
+poses.
 
-**Along the run** (along_the_run.py) the handle must stay near the operational point, too.
+**Along the run** (run_measures.py) the handle must stay near the operational point, too.
 
 **Search** (search.py). Frames are whole haptic periods on the way, whose map is short; the result
 is judged at the scene's own rates.
@@ -15,23 +16,26 @@ is judged at the scene's own rates.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.analysis.tune.felt_stiffness import Feel
-from hapticlink.analysis.tune.poses import at_rest, poses
+from hapticlink.analysis.tune.held_equilibria import Held
+from hapticlink.analysis.tune.poses import Pose, at_equilibrium, poses
 from hapticlink.analysis.tune.requirements import near_rates, required, whole_frames
-from hapticlink.analysis.tune.run_measures import TRACKED, motion, simulated
+from hapticlink.analysis.tune.run_measures import RunLimit, motion, simulated
 from hapticlink.analysis.tune.search import COARSE, search
 from hapticlink.analysis.tune.stability_limits import FINE, Judge
 from hapticlink.analysis.tune.tuning_result import Tuned as Tuned
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 
@@ -61,34 +65,60 @@ def tune(
     if not margin >= 1.0:
         raise InputFault(f"margin {margin:g}: give 1 or more, the factor up to instability")
     tell, keep = tell or (lambda text: None), keep or (lambda tuned: None)
-    given = overrides.written(options)
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
-        read = open_scene.load(scene, given)
-        linkage = required(read)
-        quick = whole_frames(read, given)
-        tell("the scene's own run, for its poses")
-        run = simulated(scene, given)
-        found = poses(run, linkage, POSES)
-        touched = any(any(pose.press) for pose in found)
-        with at_rest(scene, quick, found, tell) as (found, at):
-            pressed = [pose for pose in found if any(pose.press)]
-            if touched and not pressed:
-                raise InputFault(f"the run touches, but rests in no pose in contact; {STEADY}")
-            rests = {name: place.rest for name, place in at.items()}
-            felt_at = (pressed or found[:1])[-1].name
-            judge, feel = Judge(at), Feel.of(at[felt_at], linkage)
-            tell("the margin of the scene's own gains")
+        tuning = _Tuning(scene, overrides.written(options), margin, tell, keep)
+        scales = tuning.judge_at_own_rates(tuning.search())
+        tuning.judge_at_near_rates(scales)
+    return tuning.result
+
+
+class _Tuning:
+    """A tuning in progress, of a scene with the options `given`."""
+
+    result: Tuned
+    _resting: Sequence[Pose] = ()
+    """The poses in which the scene has an equilibrium, and its states there by the pose's name."""
+    _states: Mapping[str, Vector]
+
+    def __init__(
+        self,
+        scene: str | Path,
+        given: tuple[str, ...],
+        margin: float,
+        tell: Callable[[str], object],
+        keep: Callable[[Tuned], object],
+    ) -> None:
+        self._scene, self._given, self._margin = scene, given, margin
+        self._tell, self._keep = tell, keep
+        self._read = open_scene.load(scene, given)
+        self._linkage = required(self._read)
+
+    def search(self) -> dict[str, float]:
+        """The scales of the largest gains with which margin and run hold, with frames of whole
+        haptic periods."""
+        quick = whole_frames(self._read, self._given)
+        self._tell("the scene's own run, for its poses")
+        run = simulated(self._scene, self._given)
+        moments = poses(run, self._linkage, POSES)
+        with at_equilibrium(self._scene, quick, moments, self._tell) as (resting, held):
+            pressed = [pose for pose in resting if any(pose.press)]
+            if any(any(pose.press) for pose in moments) and not pressed:
+                raise InputFault(
+                    f"the run touches, but no pose in contact has an equilibrium; {STEADY}"
+                )
+            self._resting = resting
+            self._states = {name: place.equilibrium for name, place in held.items()}
+            felt_at = (pressed or resting[:1])[-1].name
+            judge, feel = Judge(held), Feel.of(held[felt_at], self._linkage)
+            self._tell("the margin of the scene's own gains")
             own = judge.margin({}, COARSE)
-            tell(f"  {own:.3g}")
-            start = dict.fromkeys(judge.laws, min(1.0, own / margin))
-            held_back = run if own >= margin else simulated(scene, given, feel.gains.options(start))
-            within, end = TRACKED * motion(held_back)["distance"], tracking(held_back)[0][-1]
-            if not np.isfinite(within):
-                raise InputFault(f"the scene's own run fails: {held_back.run['fault']}")
-            result = Tuned(
+            self._tell(f"  {own:.3g}")
+            start = dict.fromkeys(judge.laws, min(1.0, own / self._margin))
+            limit = RunLimit(run if own >= self._margin else self._run(feel, start))
+            self.result = Tuned(
                 run=replace(run, tables={}),
-                asked=margin,
-                poses=found,
+                asked=self._margin,
+                poses=resting,
                 felt_at=felt_at,
                 along=feel.along,
                 margins={"scene": own},
@@ -96,47 +126,60 @@ def tune(
                 motion={"scene": motion(run)},
             )
 
-            def take(feel: Feel, scales: dict[str, float]) -> None:
-                result.gains, X = feel.gains.options(scales), feel.compliance(scales)
-                result.compliance, result.felt["tuned"] = X, feel.felt(X)
-                felt = (f"{name} {value:.4g} N/m" for name, value in result.felt["tuned"].items())
-                times = (f"{scale:.3g} ({law})" for law, scale in scales.items())
-                tell(f"  {', '.join(felt)}: gains times {', '.join(times)}")
-                keep(result)
-
             def require(scales: dict[str, float]) -> None:
-                if why := judge.unstable(scales, margin):
+                if why := judge.unstable(scales, self._margin):
                     raise InputFault(why)
-                moved = motion(simulated(scene, given, feel.gains.options(scales)), end)
-                if not moved["distance"] <= within:
-                    raise InputFault(
-                        f"the run: the handle may leave its point by {1e3 * within:.3g} mm"
-                    )
-                result.motion["tuned"] = moved
-                take(feel, scales)
+                self.result.motion["tuned"] = limit.motion(self._run(feel, scales))
+                self._take(feel, scales)
 
-            tell("gains that keep the margin and the run")
+            self._tell("gains that keep the margin and the run")
             try:
-                scales, result.limited_by = search(start, feel, require)
+                scales, self.result.limited_by = search(start, feel, require)
             except InputFault as fault:
                 raise InputFault(f"{fault}; {REMEDY}") from None
-        tell("the margin at the scene's own rates")
-        with at_rest(scene, given, found, tell, rests) as (result.poses, at):
-            judge = Judge(at)
+        return scales
+
+    def judge_at_own_rates(self, scales: dict[str, float]) -> dict[str, float]:
+        """The scales, lowered where the margin at the scene's own rates asks for it."""
+        self._tell("the margin at the scene's own rates")
+        with self._at_equilibrium(self._given) as (self.result.poses, held):
+            judge = Judge(held)
             reached = judge.margin(scales)
-            if reached < margin * (1 - 2 * FINE):
-                scales = {law: s * reached / margin for law, s in scales.items()}
+            if reached < self._margin * (1 - 2 * FINE):
+                scales = {law: s * reached / self._margin for law, s in scales.items()}
                 reached = judge.margin(scales)
-            result.margins["tuned"] = reached
-            take(Feel(at[felt_at], feel.along), scales)
-        for rate in near_rates(read):
-            near = (*given, rate)
-            near = whole_frames(open_scene.load(scene, near), near)
+            self.result.margins["tuned"] = reached
+            self._take(Feel(held[self.result.felt_at], self.result.along), scales)
+        return scales
+
+    def judge_at_near_rates(self, scales: dict[str, float]) -> None:
+        """Adds the margins at neighbouring rates to the result, 0 where there is no equilibrium."""
+        margins = self.result.margins
+        for rate in near_rates(self._read):
+            near = (*self._given, rate)
+            near = whole_frames(open_scene.load(self._scene, near), near)
             try:
-                with at_rest(scene, near, found, tell, rests) as (_, at):
-                    result.margins[rate] = Judge(at).margin(scales, COARSE)
+                with self._at_equilibrium(near) as (_, held):
+                    margins[rate] = Judge(held).margin(scales, COARSE)
             except InputFault:
-                result.margins[rate] = 0.0
-            tell(f"margin at {rate}: {result.margins[rate]:.3g}")
-            keep(result)
-    return result
+                margins[rate] = 0.0
+            self._tell(f"margin at {rate}: {margins[rate]:.3g}")
+            self._keep(self.result)
+
+    def _take(self, feel: Feel, scales: dict[str, float]) -> None:
+        """These gains are the best so far."""
+        result = self.result
+        result.gains, X = feel.gains.options(scales), feel.compliance(scales)
+        result.compliance, result.felt["tuned"] = X, feel.felt(X)
+        felt = (f"{name} {value:.4g} N/m" for name, value in result.felt["tuned"].items())
+        times = (f"{scale:.3g} ({law})" for law, scale in scales.items())
+        self._tell(f"  {', '.join(felt)}: gains times {', '.join(times)}")
+        self._keep(result)
+
+    def _run(self, feel: Feel, scales: dict[str, float]) -> Results:
+        return simulated(self._scene, self._given, feel.gains.options(scales))
+
+    def _at_equilibrium(
+        self, options: tuple[str, ...]
+    ) -> AbstractContextManager[tuple[list[Pose], dict[str, Held]]]:
+        return at_equilibrium(self._scene, options, self._resting, self._tell, self._states)

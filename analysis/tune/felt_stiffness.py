@@ -13,13 +13,18 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hapticlink.analysis.tune.gains import Scales
-from hapticlink.analysis.tune.held_equilibria import Complex, Held, Matrix, Vector
+from hapticlink.analysis.tune.held_equilibria import Held
 from hapticlink.analysis.tune.largest_scale import DOUBLINGS
 from hapticlink.analysis.tune.spring_hand import FIRM
 from hapticlink.analysis.tune.stability_limits import FINE
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.loop_names import (
+    ENVIRONMENT_WRENCH,
+    MOBILITIES,
+)
 
 HERTZ = 2.0
 """Frequency of pressing: the slower, the stiffer a constraint feels, whatever its gains."""
@@ -39,8 +44,7 @@ class Feel:
     def of(cls, place: Held, linkage: Linkage) -> Feel:
         """Raises InputFault where no direction is constrained and nothing touches."""
         found = {}
-        blocks = ("virtual_environment", "virtual_mechanism")
-        mobilities = (place.signal(f"{block}.Lambda_inv") for block in blocks)
+        mobilities = (place.signal(signal) for signal in MOBILITIES)
         mobility = next(values for values in mobilities if len(values)).reshape(3, 3)
         S: Matrix = np.diag([1.0, 1.0, mean_link_length(linkage)])
         values, vectors = np.linalg.eigh(S @ mobility @ S)
@@ -48,7 +52,7 @@ class Feel:
         if null:
             n = max(null, key=lambda wrench: float(np.hypot(*wrench[:2])))
             found["constraint"] = n / np.hypot(*n[:2])
-        F = place.signal("virtual_mechanism.F_env")
+        F = place.signal(ENVIRONMENT_WRENCH)
         if len(F) and (size := float(np.hypot(*F[:2]))):
             found["contact"] = F / size
         if not found:

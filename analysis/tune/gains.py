@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from hapticlink.orchestrator.base.loop_names import CONTROLLER
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.system.system import Fmu, System
 
-FMU = "controller"
 LAWS = {
     "drift": ("controller.teleoperation", "K_pc", "B_pc"),
     "topology": ("controller.topology", "k_j", "b_j"),
 }
-"""By law: the table of a scene that has its `stiffness` and `damping`, and the FMU's parameters of
-both."""
+"""By law: the table of a scene that has its `stiffness` and `damping`, and the controller's
+parameters of both."""
 Scales = Mapping[str, float]
 """The scale s of each law, by name; 1 where it is missing."""
 
@@ -57,14 +57,14 @@ class Gains:
         """The parameters of the FMUs for the given scales."""
         for gain in self._gains:
             for (scalar, _), value in zip(gain.entries, gain.scaled(scales), strict=True):
-                yield FMU, scalar, value
+                yield CONTROLLER, scalar, value
 
     def applied(self, system: System, scales: Scales) -> System:
         """The system that starts with the given scales."""
         scaled = {scalar.name: (scalar, value) for _, scalar, value in self.parameters(scales)}
 
         def started(fmu: Fmu) -> Fmu:
-            if fmu.name != FMU:
+            if fmu.name != CONTROLLER:
                 return fmu
             others = (start for start in fmu.starts if start[0].name not in scaled)
             return replace(fmu, starts=(*others, *scaled.values()))
@@ -81,9 +81,9 @@ class Gains:
 
 
 def _entries(system: System, port: str) -> Iterator[tuple[Scalar, float]]:
-    if FMU not in system.fmu:
+    if CONTROLLER not in system.fmu:
         return
-    given = {scalar.name: value for scalar, value in system.fmu[FMU].starts}
-    for s in system.fmu[FMU].description.scalars:
+    given = {scalar.name: value for scalar, value in system.fmu[CONTROLLER].starts}
+    for s in system.fmu[CONTROLLER].description.scalars:
         if s.causality == "parameter" and s.port == port and s.variability == "tunable":
             yield s, float(given.get(s.name, s.start or 0.0))

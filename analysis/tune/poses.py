@@ -10,17 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import MECHANISM, table_of
-from hapticlink.analysis.tune.held_equilibria import CONTACT, Held, Vector, held
+from hapticlink.analysis.findings.tracking import table_of
+from hapticlink.analysis.tune.held_equilibria import Held, held
 from hapticlink.analysis.tune.spring_hand import FIRM, spring
 from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import (
+    ENVIRONMENT_WRENCH,
+    JOINT_COORDINATES,
+    POINT_POSE,
+)
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
 
-JOINTS = "virtual_mechanism.q"
 LIGHT = 0.25
 """The force (N) with which a hand presses where that of the run slides off, as from a corner or a
 disc along the spring that the coupling is."""
@@ -48,22 +52,24 @@ class Pose:
 
     def options(self, given: Sequence[str]) -> tuple[str, ...]:
         """The options of the scene at rest in this pose, in a spring hand."""
-        rest = {
+        start = {
             "hand": spring(self.point, self.press, FIRM),
             "linkage.start": self.joints,
             "linkage.start_velocity": {},
         }
-        return (*given, *overrides.written(rest))
+        return (*given, *overrides.written(start))
 
 
 def poses(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     """Of a run, `count` evenly spaced ones from its start on, and the one in contact as the last
     one if there was any. Raises InputFault where the poses are not recorded."""
-    table = table_of(run, MECHANISM)
-    if table is None or JOINTS not in table or not len(table["time"]):
-        raise InputFault(f"{MECHANISM} and {JOINTS} are not recorded: no poses of a run")
-    times, points, joints = table["time"], table[MECHANISM], table[JOINTS]
-    force = table[CONTACT] if CONTACT in table else np.zeros((len(times), 3))
+    table = table_of(run, POINT_POSE)
+    if table is None or JOINT_COORDINATES not in table or not len(table["time"]):
+        raise InputFault(
+            f"{POINT_POSE} and {JOINT_COORDINATES} are not recorded: no poses of a run"
+        )
+    times, points, joints = table["time"], table[POINT_POSE], table[JOINT_COORDINATES]
+    force = table[ENVIRONMENT_WRENCH] if ENVIRONMENT_WRENCH in table else np.zeros((len(times), 3))
     moments = [int(i * len(times) / count) for i in range(count)]
     size = np.hypot(force[:, 0], force[:, 1])
     touching = np.flatnonzero(size)
@@ -81,23 +87,24 @@ def poses(run: Results, linkage: Linkage, count: int) -> list[Pose]:
 
 
 @contextmanager
-def at_rest(
+def at_equilibrium(
     scene: str | Path,
     given: Sequence[str],
-    found: Sequence[Pose],
+    candidates: Sequence[Pose],
     tell: Callable[[str], object],
     starts: Mapping[str, Vector] = {},
 ) -> Iterator[tuple[list[Pose], dict[str, Held]]]:
-    """The poses in which the scene rests, and it there by name, looked for from `starts`. A hand
-    that slides off what it touches presses lightly; poses without rest are left out and told.
-    Raises InputFault where none has any."""
+    """The poses in which the scene has an equilibrium, and the scene there by the pose's name,
+    searched from `starts`. A hand that slides off what it touches presses lightly; poses without
+    equilibrium are reported and skipped. Raises InputFault where no pose has one."""
     with ExitStack() as stack:
-        rest, at = [], {}
-        for pose in found:
+        resting: list[Pose] = []
+        held_at: dict[str, Held] = {}
+        for pose in candidates:
             for pressed in (pose, pose.lighter) if any(pose.press) else (pose,):
                 try:
-                    read = open_scene.load(scene, pressed.options(given))
-                    place = stack.enter_context(held(read, starts.get(pose.name)))
+                    start = starts.get(pose.name)
+                    place = stack.enter_context(held(scene, pressed.options(given), start))
                     if any(pose.press) and not place.touches:
                         raise InputFault("it comes off what it touches")
                 except (InputFault, FmuFault) as fault:
@@ -105,15 +112,15 @@ def at_rest(
                 else:
                     if pressed is not pose:
                         tell(f"  pose at {pose.name}: the force slides off; {LIGHT:g} N are taken")
-                    rest.append(pressed)
-                    at[pose.name] = place
+                    resting.append(pressed)
+                    held_at[pose.name] = place
                     break
             else:
-                tell(f"  pose at {pose.name} is left out: {why}")
-        tell(f"  {len(at)} poses at rest")
-        if not at:
-            raise InputFault("the scene comes to no rest in any pose of its run, in a firm grip")
-        yield rest, at
+                tell(f"  pose at {pose.name} is skipped: {why}")
+        tell(f"  {len(held_at)} poses with an equilibrium")
+        if not held_at:
+            raise InputFault("the scene has no equilibrium in any pose of its run, in a firm grip")
+        yield resting, held_at
 
 
 def _by_joint(linkage: Linkage, q: Vector) -> dict[str, float | list[float]]:

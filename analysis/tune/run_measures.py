@@ -1,9 +1,9 @@
 """What gains do along the scene's own run.
 
-A projector on the constrained directions that is held is stale while the mechanism moves, which no
-map of a rest knows: gains that stiffen a constraint can throw the handle off. So the handle may
-leave the operational point by at most TRACKED times as far as with the scene's own gains, scaled to
-the margin where they lack it.
+A projector on the constrained directions that is held is stale while the mechanism moves, which a
+linearisation at rest cannot show: gains that stiffen a constraint can throw the handle off. So the
+handle may leave the operational point by at most TRACKED times as far as with the scene's own
+gains, scaled to the margin where they lack it.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import tracking
-from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.analysis.findings.measures import Measures
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
@@ -38,10 +37,31 @@ def simulated(
 def motion(run: Results, end: float = 0.0) -> dict[str, float]:
     """The largest distance (m) of handle and operational point, infinite where the run fails or
     ends before `end` (s), and the largest energy (J) that was generated at the user's port."""
-    times, distances = tracking(run)
-    fails = run.run["fault"] or times[-1] < end
-    port = user_port(run)
+    measures = Measures(run)
+    error, port = measures.tracking[""], measures.port
+    fails = run.record.fault or error.end_s < end
     return {
-        "distance": np.inf if fails else float(distances.max()) / 1e3,
-        "energy_peak": float(port.told["peak"]) if port else np.nan,
+        "distance": np.inf if fails else error.max_mm / 1e3,
+        "energy_peak": port.peak if port else np.nan,
     }
+
+
+class RunLimit:
+    """What runs with other gains have to keep, from a `run` with gains that hold. Raises InputFault
+    where that fails."""
+
+    def __init__(self, run: Results) -> None:
+        self._end = Measures(run).tracking[""].end_s
+        self._distance = TRACKED * motion(run)["distance"]
+        if not np.isfinite(self._distance):
+            raise InputFault(f"the scene's own run fails: {run.record.fault}")
+
+    def motion(self, run: Results) -> dict[str, float]:
+        """The `motion` of a run. Raises InputFault where it fails, ends early, or the handle leaves
+        the operational point further than it may."""
+        moved = motion(run, self._end)
+        if not moved["distance"] <= self._distance:
+            raise InputFault(
+                f"the run: the handle may leave its point by {1e3 * self._distance:.3g} mm"
+            )
+        return moved

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.tune.felt_stiffness import HERTZ
-from hapticlink.analysis.tune.held_equilibria import Complex, Vector
 from hapticlink.analysis.tune.poses import Pose
 from hapticlink.analysis.tune.spring_hand import HANDS
+from hapticlink.orchestrator.base.arrays import Complex, Vector
 from hapticlink.orchestrator.results.scene_file import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
@@ -45,7 +45,7 @@ class Tuned:
 
     @property
     def title(self) -> str:
-        return str(self.run.run["scene"]["title"])
+        return str(self.run.record.scene["title"])
 
     def record(self) -> dict[str, Any]:
         """The content of tune.json."""
@@ -68,7 +68,7 @@ class Tuned:
 
     def scene(self) -> str:
         """The scene with the tuned gains, as a file that stands alone."""
-        scene = deepcopy(self.run.run["scene"])
+        scene = deepcopy(self.run.record.scene)
         scene["title"] = f"{self.title}, gains tuned to a margin of {self.asked:g}"
         for key, value in self.gains.items():
             *names, last = key.split(".")

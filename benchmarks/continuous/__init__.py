@@ -56,6 +56,7 @@ def reference(name: str, end: float = 3.0, tolerance: float = 1e-12) -> Referenc
 
     found, grid = scene(name), np.arange(round(end * GRID) + 1) / GRID
     first = Relative(found)
+    assert found.linkage
     n = len(found.linkage.joint)
     second = Absolute(found, first.start[:n], first.start[n : 2 * n], first.first_mode)
     sizes = {"rtol": tolerance, "atol": tolerance / 100}

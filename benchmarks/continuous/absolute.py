@@ -34,10 +34,14 @@ class Absolute:
     first number of constrained directions. Raises ValueError for what it does not know."""
 
     def __init__(self, scene: Scene, q: np.ndarray, qd: np.ndarray, first_mode: int) -> None:
+        law, linkage = scene.controller, scene.linkage
+        assert law
+        assert linkage
+        assert scene.device
         self.hand, self.first_mode = Hand(scene.hand), first_mode
-        self._bodies, self._device = Bodies(scene.linkage), Pantograph(scene.device)
-        self._touching = Touching(scene.linkage, scene.contacts, self._bodies)
-        self._n, law = self._bodies.mechanism.n, scene.controller
+        self._bodies, self._device = Bodies(linkage), Pantograph(scene.device)
+        self._touching = Touching(linkage, scene.contacts, self._bodies)
+        self._n = self._bodies.mechanism.n
         self._K, self._B = (np.array(getattr(law.teleoperation, k)) for k in _GAINS)
         self._topology = Topology() if law.topology is True else law.topology
         self._felt, self._sent = law.contact, law.bias == "full"

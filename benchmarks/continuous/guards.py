@@ -19,6 +19,7 @@ class Guards:
 
     def __init__(self, scene: Scene, mobility: Callable[[np.ndarray], np.ndarray]) -> None:
         spec = scene.directions
+        assert scene.linkage
         length = spec.length_scale or mean_link_length(scene.linkage)
         self.scale = np.array([1.0, 1.0, length])
         self._mobility = mobility

@@ -20,7 +20,8 @@ class Loop(Protocol):
     handle: slice
     guards: Any
     hand: Any
-    rate: Callable[[float, np.ndarray, int], np.ndarray]
+
+    def rate(self, t: float, y: np.ndarray, mode: int) -> np.ndarray: ...
 
 
 @dataclass

@@ -32,9 +32,10 @@ class Relative:
     Raises ValueError for a hand that `Hand` does not know."""
 
     def __init__(self, scene: Scene) -> None:
-        made = {b.name: component(b.made_by, b.settings) for b in blocks(scene)}
+        made = {b.name: component(b.block, b.settings) for b in blocks(scene).built}
         mechanism, controller = made["virtual_mechanism"], made["controller"]
-        self.hand = Hand(scene.hand)
+        assert scene.device
+        self.hand, device = Hand(scene.hand), numbers(scene.device)
         n = sum(v.size for v in mechanism.states if v.name == "q")
         y, mode, t = ca.SX.sym("y", 2 * n + 6 + 6 * self.hand.moves), ca.SX.sym("mode"), ca.SX(0)
         motion, x_D, v_D = y[: 2 * n], y[2 * n : 2 * n + 3], y[2 * n + 3 : 2 * n + 6]
@@ -43,7 +44,7 @@ class Relative:
         F_hand, arm = self.hand.rates(y[2 * n + 6 :], x_D, v_D, target, ca.vertcat)
         state = ca.vertcat(motion, mode)
         free = _outputs(mechanism, state, {}, t)
-        M, c = pantograph.motion(x_D, v_D, numbers(scene.device))
+        M, c = pantograph.motion(x_D, v_D, device)
         seen = {
             "x_S": free["x"],
             "v_S": free["v"],
@@ -58,9 +59,9 @@ class Relative:
         forces = _outputs(controller, ca.SX(0, 1), seen, t)
         pushed = {"F_hand": F_hand, "F_drift": forces["F_drift"]}
         qdd = _outputs(mechanism, state, pushed, t)["qdd"]
-        tau = pantograph.motor_torques(forces["F_motor"], x_D, numbers(scene.device))
-        wrench = pantograph.jacobian(x_D, numbers(scene.device)).T @ tau + F_hand - c
-        wrench += pantograph.stop_wrench(x_D, v_D, numbers(scene.device))
+        tau = pantograph.motor_torques(forces["F_motor"], x_D, device)
+        wrench = pantograph.jacobian(x_D, device).T @ tau + F_hand - c
+        wrench += pantograph.stop_wrench(x_D, v_D, device)
         rate = ca.vertcat(motion[n:], qdd, v_D, ca.solve(M, wrench), *arm)
         cse = {"cse": True}
         self._rate = ca.Function("rate", [y, mode, target], [rate], cse)
@@ -91,7 +92,8 @@ def _outputs(block: Component, x: ca.SX, u: Mapping[str, ca.SX], t: ca.SX) -> di
     found, first = {}, 0
     for v in block.outputs:
         values = flat[first : first + v.size]
-        shape = (*v.shape, 1, 1)[:2]
-        found[v.name] = ca.reshape(values, shape[::-1]).T if len(v.shape) == 2 else values
+        if len(v.shape) == 2:
+            values = ca.reshape(values, v.shape[1], v.shape[0]).T
+        found[v.name] = values
         first += v.size
     return found

@@ -79,6 +79,7 @@ class Touching:
         arm = on - pose[:, None, :2]
         turning = arm[..., 0] * normal[..., 1] - arm[..., 1] * normal[..., 0]
         closing = np.einsum("kpi,ki->kp", normal, rate[:, :2]) + turning * rate[:, None, 2]
+        assert self._contacts
         k, b = self._contacts.stiffness, self._contacts.damping
         F = np.where(gap < 0, np.maximum(0.0, -k * gap - b * closing), 0.0)
         wrench = np.concatenate([F[..., None] * normal, (F * turning)[..., None]], axis=-1)

@@ -79,5 +79,5 @@ def _spread(
     times = [[1e3 * t / 3 for t in m.time] for m in points]
     middle = [t[1] for t in times]
     bars = [[t[1] - t[0] for t in times], [t[2] - t[1] for t in times]]
-    style = {"ms": 4, "lw": 0.8, "alpha": 0.7, "color": colour}
-    ax.errorbar(middle, height, xerr=bars if times else None, fmt=mark, **style)
+    xerr = bars if times else None
+    ax.errorbar(middle, height, xerr=xerr, fmt=mark, ms=4, lw=0.8, alpha=0.7, color=colour)

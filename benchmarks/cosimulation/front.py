@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 
 from benchmarks.cosimulation.measure import APART, SETTINGS
 from benchmarks.cosimulation.points import NONE, Point
@@ -58,11 +58,11 @@ def measured(rows: Rows, scene: str) -> list[Measured]:
 
 
 def _measured(key: Sequence[str], of: Sequence[dict[str, str]]) -> Measured:
-    kinds = {f.name: type(f.default) for f in fields(Point)}
+    kinds = {name: type(default) for name, default in asdict(Point()).items()}
     settings = {n: kinds[n](v) for n, v in zip(SETTINGS, key, strict=True)}
-    numbers = [float(of[0][name]) for name in ("first_mm", "max_mm", "rms_mm")]
+    first, most, rms = (float(of[0][name]) for name in ("first_mm", "max_mm", "rms_mm"))
     times = tuple(float(row["run_s"]) for row in of)
-    return Measured(Point(**settings), times, *numbers, of[0]["end"])
+    return Measured(Point(**settings), times, first, most, rms, of[0]["end"])
 
 
 def front(found: Iterable[Measured]) -> list[Measured]:

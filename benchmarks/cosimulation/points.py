@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from itertools import product
+from typing import Any
 
 from benchmarks.continuous import CONTINUOUS, DETECTED, GRID
 from hapticlink.components.integrators import METHODS
@@ -130,6 +131,6 @@ def _contact() -> Iterator[Point]:
     yield from _vary([replace(held, model="held")], rate=RATES[1:], frames=FRAMES[1:])
 
 
-def _vary(bases: Iterable[Point], **axes: Iterable[object]) -> Iterator[Point]:
+def _vary(bases: Iterable[Point], **axes: Iterable[Any]) -> Iterator[Point]:
     for base, values in product(bases, product(*axes.values())):
         yield replace(base, **dict(zip(axes, values, strict=True)))

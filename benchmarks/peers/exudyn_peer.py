@@ -17,7 +17,8 @@ import numpy as np
 from benchmarks.maximal import Bodies
 from hapticlink.components.specs.linkage import Linkage
 
-sys.exudynFast = True  # the build without range checks, as its documentation advises
+# The build without range checks, as its documentation advises.
+sys.exudynFast = True  # type: ignore[attr-defined]
 import exudyn as exu  # noqa: E402
 import exudyn.itemInterface as item  # noqa: E402
 
@@ -81,10 +82,10 @@ def _build(linkage: Linkage, wrench: np.ndarray, z: np.ndarray, zd: np.ndarray) 
             item.MarkerBodyRigid(bodyNumber=numbers[body], localPosition=[*local, 0.0])
         )
 
-    pins = [((j.parent, j.at_parent), (j.child, j.at_child)) for j in linkage.joint]
-    pins += [tuple(zip(loop.bodies, loop.at, strict=True)) for loop in linkage.loop]
+    pins = [(marker(j.parent, j.at_parent), marker(j.child, j.at_child)) for j in linkage.joint]
+    pins += [(a, b) for loop in linkage.loop for a, b in [map(marker, loop.bodies, loop.at)]]
     for ends in pins:
-        mbs.AddObject(item.ObjectJointRevolute2D(markerNumbers=[marker(*end) for end in ends]))
+        mbs.AddObject(item.ObjectJointRevolute2D(markerNumbers=list(ends)))
     op = linkage.operational_point
     hand = marker(op.body, op.at)
     if np.any(wrench):

@@ -28,7 +28,8 @@ def steps_of(run: Steps) -> int:
 def per_step(run: Steps, steps: int) -> float:
     """Seconds per macro step: (t(5 N) - t(N)) / 4 N, of the least of several, so that what each run
     costs once cancels."""
-    times, end = [], perf_counter() + ROOM
+    times: list[tuple[float, float]] = []
+    end = perf_counter() + ROOM
     while len(times) < 2 or perf_counter() < end:
         times.append((run(steps), run(5 * steps)))
     short, long = (min(found) for found in zip(*times, strict=True))

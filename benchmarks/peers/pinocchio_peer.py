@@ -114,7 +114,7 @@ class Terms:
     def _jacobian(self, frame: int, rows: list[int]) -> np.ndarray:
         # One column comes back flat.
         J = pin.getFrameJacobian(self.model, self.data, frame, WORLD).reshape(6, -1)
-        return J[np.ix_(rows, self.order)]
+        return J[np.array(rows)[:, None], self.order]
 
     def at(self, q: np.ndarray, qd: np.ndarray) -> dict[str, np.ndarray]:
         """D, nle = C qd + g, W, w = Wdot qd, h, J_h, Jdot_qd, x_h, in our order."""

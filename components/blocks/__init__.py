@@ -77,10 +77,10 @@ def _virtual_environment(
     )
 
 
-def _haptic_device(device: Device) -> Component:
+def _haptic_device(device: Device, encoders: bool = False) -> Component:
     from hapticlink.components.blocks.haptic_device import haptic_device
 
-    return haptic_device(device)
+    return haptic_device(device, encoders)
 
 
 def _controller(controller: Controller, linkage: Linkage, directions: Directions) -> Component:

@@ -21,7 +21,8 @@ from hapticlink.components.component import (
     Variability,
     Variable,
 )
-from hapticlink.components.device import observer, pantograph
+from hapticlink.components.device import pantograph
+from hapticlink.components.device.observer import Observer, State
 from hapticlink.components.ports import Power
 from hapticlink.components.quantisation import quantised
 from hapticlink.components.specs.device import Device
@@ -52,13 +53,54 @@ _TUNABLE = (
 )
 
 
-def _parameters(device: Device) -> list[Variable]:
+_INPUTS = [
+    Variable(name, (3,), WRENCH, description=text, power=Power("x_true"))
+    for name, text in (
+        ("F_motor", "desired wrench of the motors"),
+        ("F_hand", "wrench of the hand on the handle"),
+    )
+]
+_OUTPUTS = [
+    Variable("x", (3,), POSE, description="measured pose of the handle"),
+    Variable("v", (3,), TWIST, description="measured velocity of the handle", derivative_of="x"),
+    Variable("F_hand_observed", (3,), WRENCH, description="observed wrench of the hand"),
+    Variable(
+        "M",
+        (3, 3),
+        INERTIA,
+        description="inertia of the device at the handle",
+        kind="semidefinite",
+    ),
+    Variable("c", (3,), WRENCH, description="C_d v, Coriolis and centrifugal terms at the handle"),
+    Variable(
+        "workspace_margin",
+        (),
+        "m",
+        description="smallest distance of an arm to a stop, negative beyond it",
+    ),
+    Variable("x_true", (3,), POSE, description="true pose of the handle"),
+    Variable(
+        "v_true", (3,), TWIST, description="true velocity of the handle", derivative_of="x_true"
+    ),
+]
+_STATES = [
+    Variable("x_true", (3,), POSE, description="pose of the handle"),
+    Variable("v_true", (3,), TWIST, description="velocity of the handle"),
+]
+_SENSED_STATES = [
+    Variable("x_measured", (3,), POSE, description="pose from the encoders"),
+    Variable("x_observer", (3,), POSE, description="observer state x1"),
+    Variable("v_observer", (3,), TWIST, description="observer state x2"),
+]
+
+
+def _parameters(device: Device, sensed: bool) -> list[Variable]:
     def of(rows: tuple[tuple[str, str, str], ...], variability: Variability) -> list[Variable]:
         return [Variable(n, (), u, getattr(device, n), d, variability) for n, u, d in rows]
 
     start = Variable("x_start", (3,), POSE, 0.0, "pose of the handle at the start", "fixed")
     parameters = [start, *of(_FIXED, "fixed"), *of(_TUNABLE, "tunable")]
-    if device.sensing == "encoders":
+    if sensed:
         parameters += of((("encoder_resolution", "rad", "angle of one encoder count"),), "fixed")
         gains = device.observer
         parameters += [
@@ -79,139 +121,78 @@ def _plant(block: Block) -> ca.Function:
     return ca.Function("ode", [state, drive, block.p.vector, block.t], [derivative])
 
 
-def haptic_device(device: Device) -> Component:
+def _moved(block: Block, tau: ca.SX, substeps: int) -> ca.SX:
+    """[x_true, v_true] after h, with the torques tau and the hand's wrench held."""
+    plant, h, held = _plant(block), block.h / substeps, ca.vertcat(tau, block.u["F_hand"])
+    motion = ca.vertcat(block.x["x_true"], block.x["v_true"])
+    for i in range(substeps):
+        t = block.t + i * block.h / substeps
+        motion = integrators.step("heun", plant, motion, held, block.p.vector, t, h, [0, 1, 2])
+    return motion
+
+
+class _Encoders:
+    """Encoders and observer: the pose, velocity and wrench that they measure at t_k."""
+
+    def __init__(self, block: Block, rule: str) -> None:
+        self._p, self._h, x = block.p, block.h, block.x
+        self._observer = Observer(rule, block.p["omega_n"], block.p["k_D"])
+        self._state = State(x["x_observer"], x["v_observer"])
+        self.pose = x["x_measured"]
+        self._M, self._C = pantograph.dynamics(self.pose, self._state.x2, block.p)
+        self.velocity = self._observer.velocity(self._state, self.pose)
+        self.F_hand = self._observer.force(self._state, self.pose, self._M)
+
+    def _measure(self, true_pose: ca.SX, guess: ca.SX) -> ca.SX:
+        """The pose that belongs to the counted base angles."""
+        angles = pantograph.base_angles(true_pose, self._p)
+        counted = quantised(angles, self._p["encoder_resolution"], 0.5)
+        return pantograph.pose_from_angles(counted, guess, self._p)
+
+    def initial(self) -> dict[str, ca.SX]:
+        pose = self._measure(self._p["x_start"], self._p["x_start"])
+        return {"x_measured": pose, "x_observer": pose, "v_observer": ca.SX.zeros(3)}
+
+    def step(self, true_pose: ca.SX, tau: ca.SX) -> dict[str, ca.SX]:
+        """The states after h, at the end of which the handle is at true_pose."""
+        pose = self._measure(true_pose, self.pose)
+        F_motor = pantograph.jacobian(self.pose, self._p).T @ tau
+        after = self._observer.step(
+            self._state, self.pose, pose, F_motor, self._M, self._C, self._h
+        )
+        return {"x_measured": pose, "x_observer": after.x1, "v_observer": after.x2}
+
+
+def haptic_device(device: Device, encoders: bool = False) -> Component:
     """The FMU `haptic_device`, with the parameters of `device`.
 
-    sensing "ideal": x, v and F_hand_observed are the true values. "encoders": x is the pose that
+    Without `encoders`, x, v and F_hand_observed are the true values. With them, x is the pose that
     belongs to the quantised base angles, v and F_hand_observed come from the observer. M and
     c = C_d v are evaluated at the measured pose and velocity, workspace_margin at the true pose.
     All dimensions are assumed, since the report only gives the 0.09 degrees of an encoder count.
     At t = 0 the handle is at rest at x_start and the observed force is zero.
     """
-    encoders = device.sensing == "encoders"
-    states = [
-        Variable("x_true", (3,), POSE, description="pose of the handle"),
-        Variable("v_true", (3,), TWIST, description="velocity of the handle"),
-    ]
-    if encoders:
-        states += [
-            Variable("x_measured", (3,), POSE, description="pose from the encoders"),
-            Variable("x_observer", (3,), POSE, description="observer state x1"),
-            Variable("v_observer", (3,), TWIST, description="observer state x2"),
-        ]
     block = Block(
-        inputs=[
-            Variable(
-                "F_motor",
-                (3,),
-                WRENCH,
-                description="desired wrench of the motors",
-                power=Power("x_true"),
-            ),
-            Variable(
-                "F_hand",
-                (3,),
-                WRENCH,
-                description="wrench of the hand on the handle",
-                power=Power("x_true"),
-            ),
-        ],
-        parameters=_parameters(device),
-        states=states,
-        outputs=[
-            Variable("x", (3,), POSE, description="measured pose of the handle"),
-            Variable(
-                "v", (3,), TWIST, description="measured velocity of the handle", derivative_of="x"
-            ),
-            Variable("F_hand_observed", (3,), WRENCH, description="observed wrench of the hand"),
-            Variable(
-                "M",
-                (3, 3),
-                INERTIA,
-                description="inertia of the device at the handle",
-                kind="semidefinite",
-            ),
-            Variable(
-                "c", (3,), WRENCH, description="C_d v, Coriolis and centrifugal terms at the handle"
-            ),
-            Variable(
-                "workspace_margin",
-                (),
-                "m",
-                description="smallest distance of an arm to a stop, negative beyond it",
-            ),
-            Variable("x_true", (3,), POSE, description="true pose of the handle"),
-            Variable(
-                "v_true",
-                (3,),
-                TWIST,
-                description="true velocity of the handle",
-                derivative_of="x_true",
-            ),
-        ],
+        inputs=_INPUTS,
+        parameters=_parameters(device, encoders),
+        states=[*_STATES, *(_SENSED_STATES if encoders else [])],
+        outputs=_OUTPUTS,
     )
-    x, u, p, t, h = block.x, block.u, block.p, block.t, block.h
-    pose, velocity = x["x_true"], x["v_true"]
-
-    measured = x["x_measured"] if encoders else pose
-    tau = pantograph.motor_torques(u["F_motor"], measured, p)
-    plant, motion = _plant(block), ca.vertcat(pose, velocity)
-    for i in range(device.substeps):
-        motion = integrators.step(
-            "heun",
-            plant,
-            motion,
-            ca.vertcat(tau, u["F_hand"]),
-            p.vector,
-            t + i * h / device.substeps,
-            h / device.substeps,
-            [0, 1, 2],
-        )
-    step = {"x_true": motion[:3], "v_true": motion[3:]}
+    x, u, p = block.x, block.u, block.p
+    measured = _Encoders(block, device.observer.rule) if encoders else None
+    pose, v, F_hand = (
+        (measured.pose, measured.velocity, measured.F_hand)
+        if measured
+        else (x["x_true"], x["v_true"], u["F_hand"])
+    )
+    tau = pantograph.motor_torques(u["F_motor"], pose, p)
+    motion = _moved(block, tau, device.substeps)
     initial = {"x_true": p["x_start"], "v_true": ca.SX.zeros(3)}
-
-    if encoders:
-
-        def measure(true_pose: ca.SX, guess: ca.SX) -> ca.SX:
-            angles = pantograph.base_angles(true_pose, p)
-            counted = quantised(angles, p["encoder_resolution"], 0.5)
-            return pantograph.pose_from_angles(counted, guess, p)
-
-        x1, x2 = x["x_observer"], x["v_observer"]
-        M, C = pantograph.dynamics(measured, x2, p)
-        at_start, at_end = measure(p["x_start"], p["x_start"]), measure(motion[:3], measured)
-        F_motor = pantograph.jacobian(measured, p).T @ tau
-        after = observer.step(
-            device.observer.rule,
-            x1=x1,
-            x2=x2,
-            pose=measured,
-            pose_next=at_end,
-            F_motor=F_motor,
-            M=M,
-            C=C,
-            omega_n=p["omega_n"],
-            k_D=p["k_D"],
-            period=h,
-        )
-        step |= {"x_measured": at_end, "x_observer": after.x1, "v_observer": after.x2}
-        initial |= {"x_measured": at_start, "x_observer": at_start, "v_observer": ca.SX.zeros(3)}
-        v = observer.velocity(x1=x1, x2=x2, pose=measured, k_D=p["k_D"])
-        F_hand = observer.force(x1=x1, pose=measured, M=M, omega_n=p["omega_n"])
-    else:
-        v, F_hand = velocity, u["F_hand"]
-
-    M, c = pantograph.motion(measured, v, p)
-    output = {
-        "x": measured,
-        "v": v,
-        "F_hand_observed": F_hand,
-        "M": M,
-        "c": c,
-        "workspace_margin": ca.mmin(pantograph.margins(pose, p)),
-        "x_true": pose,
-        "v_true": velocity,
-    }
+    step = {"x_true": motion[:3], "v_true": motion[3:]}
+    if measured:
+        initial |= measured.initial()
+        step |= measured.step(motion[:3], tau)
+    M, c = pantograph.motion(pose, v, p)
     return block.component(
         "haptic_device",
         "Twin-pantograph haptic device with motors"
@@ -219,6 +200,15 @@ def haptic_device(device: Device) -> Component:
         "continuous",
         initial=initial,
         step=step,
-        output=output,
+        output={
+            "x": pose,
+            "v": v,
+            "F_hand_observed": F_hand,
+            "M": M,
+            "c": c,
+            "workspace_margin": ca.mmin(pantograph.margins(x["x_true"], p)),
+            "x_true": x["x_true"],
+            "v_true": x["v_true"],
+        },
         documentation=haptic_device.__doc__ or "",
     )

@@ -1,8 +1,8 @@
-"""The step of the virtual mechanism: (q, qd, deflections) after h."""
+"""The step of the virtual mechanism, as integration methods see it (`MechanicalSystem`)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
@@ -13,106 +13,162 @@ from hapticlink.components.contact.located_events import LocatedEvents
 from hapticlink.components.contact.unilateral import OneSidedForces
 from hapticlink.components.dynamics import further_points, joint_ports
 from hapticlink.components.dynamics.articulated_body import TreeInertia
+from hapticlink.components.dynamics.closed_loop_solver import (
+    ClosedLoopSolver,
+    Inertia,
+    MatrixInertia,
+)
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.passive_midpoint import Applied, PassiveStep
 from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.forces import friction, gravity
-from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.integrators.base import Integrator, MechanicalSystem
+from hapticlink.components.linkage.closures import rows
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.components.time_signals import TimeSignal
 
 DEFLECTIONS = ("deflection", "contact_deflection")
 """The states of friction: of joints, and of contacts."""
 
+_ONCE = {"cse": True}
 
-@dataclass(frozen=True)
-class MechanismSteps:
-    """applied: generalised forces (n x 1) of hands, couplings and motors outside; touching: the
-    contacts and joint limits, if there are any; signals: those of drives over time."""
 
-    block: Block
-    model: LinkageModel
-    mechanism: Mechanism
-    applied: ca.SX
-    touching: OneSidedForces | None
-    signals: list[TimeSignal]
+class MechanismSteps(MechanicalSystem):
+    """The mechanism in the symbols of its block.
 
-    @property
-    def _state(self) -> ca.SX:
-        further = [self.block.x[name] for name in DEFLECTIONS if name in self.block.x]
-        return ca.vertcat(self.model.q, self.model.qd, *further)
+    applied: generalised forces (n x 1) of hands, couplings and motors outside; touching: the
+    contacts and joint limits, if there are any; energy: kinetic and potential (J); signals: those
+    of drives over time, which are known within a step.
+    """
 
-    def _over(self, found: list[ca.SX]) -> tuple[list[ca.SX], ca.SX, ca.SX]:
-        """`found` as functions of inputs u that are constant over the step, these u, and what they
-        are in it: the block's own inputs, and what is known of the signals."""
-        block, u = self.block, self.block.u.vector
-        if not self.signals:
-            return found, u, u
-        over = ca.SX.sym("over", time_signals.size_over(self.signals))
-        now = time_signals.within(self.signals, over, block.t)
-        found = [ca.substitute(each, self.model.tabled, now) for each in found]
-        known = time_signals.over(self.signals, block.t, block.h)
-        return found, ca.vertcat(u, over), ca.vertcat(u, known)
+    def __init__(
+        self,
+        block: Block,
+        mechanism: Mechanism,
+        space: OperationalSpace,
+        applied: ca.SX,
+        touching: OneSidedForces | None,
+        energy: ca.SX,
+        signals: list[TimeSignal],
+    ) -> None:
+        self._block, self._mechanism, self._space = block, mechanism, space
+        self._applied, self._touching, self._energy = applied, touching, energy
+        self._model = space.model
+        further = [block.x[name] for name in DEFLECTIONS if name in block.x]
+        self.x = ca.vertcat(self._model.q, self._model.qd, *further)
+        self.p, self.t, self.h, self.n = block.p.vector, block.t, block.h, self._model.q.numel()
+        self._symbols = self.u = block.u.vector
+        if signals:
+            over = ca.SX.sym("over", time_signals.size_over(signals))
+            self._now = time_signals.within(signals, over, block.t)
+            self._symbols = ca.vertcat(self.u, over)
+            self.u = ca.vertcat(self.u, time_signals.over(signals, block.t, block.h))
 
-    def integrated(self, space: OperationalSpace) -> ca.SX:
-        """By integration of the stabilised equations, followed by projection if chosen."""
-        block, model, mechanism, touching = self.block, self.model, self.mechanism, self.touching
-        n, x, p, t = model.q.numel(), self._state, block.p.vector, block.t
-        (efforts,), u, given = self._over([space.terms.efforts + self.applied])
-        integrator = integrators.METHODS[mechanism.integrator]
+    def _known(self, expression: ca.SX) -> ca.SX:
+        """An expression of the signals' values at an instant in terms of what is known of them
+        within the step, a part of the inputs."""
+        if self._symbols is self._block.u.vector:
+            return expression
+        return ca.substitute(expression, self._model.tabled, self._now)
+
+    # --- the equations of motion ----------------------------------------------------------
+
+    def integrated(self, method: Integrator) -> ca.SX:
+        model, touching, terms = self._model, self._touching, self._space.terms
+        x, u, p, t = self.x, self._symbols, self.p, self.t
+        efforts = self._known(terms.efforts + self._applied)
         rates = friction.deflection_rates(model)
         if touching:
             laws = None
-            if mechanism.events and integrator.order > 1:
+            if self._mechanism.events and method.order > 1:
                 laws = ca.SX.sym("laws", len(touching.sides))
                 located = located_events.functions(touching.sides, x, u, p)
-                integrator = LocatedEvents(integrator, mechanism.events, located)
+                method = LocatedEvents(method, self._mechanism.events, located)
                 u = ca.vertcat(laws, u)
             efforts += touching.efforts(laws)
             rates = ca.vertcat(rates, touching.state_rates(laws))
-        closing = -space.terms.w
-        if model.linkage.closed and mechanism.stabilization == "baumgarte":
-            alpha, beta = block.p["alpha"], block.p["beta"]
+        closing = -terms.w
+        if model.linkage.closed and self._mechanism.stabilization == "baumgarte":
+            alpha, beta = self._block.p["alpha"], self._block.p["beta"]
             closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
-        qdd = space.solver.follow(efforts, closing, refined=integrator.extrapolates)
-        ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], {"cse": True})
-        after = integrators.step(integrator, ode, x, given, p, t, block.h, range(n))
-        inertia = space.terms.inertia
-        own = inertia if isinstance(inertia, TreeInertia) else TreeInertia(model)
-        return self._projected(after, own)
+        qdd = self._space.solver.follow(efforts, closing, refined=method.extrapolates)
+        ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], _ONCE)
+        return self.projected(integrators.step(method, ode, x, self.u, p, t, self.h, range(self.n)))
 
-    def passive(self, energy: ca.SX) -> ca.SX:
-        """By the passive midpoint method, with the number of stops; energy (J)."""
-        block, model, touching = self.block, self.model, self.touching
-        x, p, t = self._state, block.p.vector, block.t
-        points = further_points.pushed(model, block.u)
-        places = ca.vertcat(model.x_h, *(point.x for point in points), model.q)
-        drawn = block.u["F_hand"] - block.u["F_drift"]
-        pushes = [drawn, *(point.wrench for point in points), joint_ports.efforts(model, block.u)]
-        rates = friction.deflection_rates(model)
-        weight = gravity.efforts(model)
-        soft = forces.efforts(model, weight=False) + (touching.efforts() if touching else 0)
-        found = [
-            soft,
-            self.applied if weight is None else self.applied + weight,
-            ca.vertcat(rates, touching.state_rates()) if touching else rates,
-            energy,
-            places,
-            ca.vertcat(*pushes),
-            forces.sources(model),
-        ]
-        found, u, given = self._over(found)
-        step = PassiveStep(model, Applied(*found), x, u, p, t)
-        after, moved = step(x, given, p, t, block.h)
-        after = self._projected(after, TreeInertia(model))
-        after, stops = step.within(x, after, moved, given, p, t, block.h)
-        return ca.vertcat(after, block.x["stops"] + stops)
+    def projected(self, x: ca.SX) -> ca.SX:
+        if self._mechanism.stabilization != "projection":
+            return x
+        n, inertia = self.n, self._space.terms.inertia
+        own = inertia if isinstance(inertia, TreeInertia) else TreeInertia(self._model)
+        q, qd = projection(self._model, own)(x[:n], x[n : 2 * n], self.p)
+        return ca.vertcat(q, qd, x[2 * n :])
 
-    def _projected(self, after: ca.SX, inertia: TreeInertia) -> ca.SX:
-        """`after` on the closures, if the scene chooses projection; inertia: the model's own."""
-        n = self.model.q.numel()
-        if self.mechanism.stabilization == "projection":
-            project = projection(self.model, inertia)
-            q, qd = project(after[:n], after[n : 2 * n], self.block.p.vector)
-            after[: 2 * n] = ca.vertcat(q, qd)
-        return after
+    # --- the terms of (B.6), for methods that use more than the equations of motion -------
+
+    def _function(self, name: str, *results: ca.SX) -> ca.Function:
+        """(x, u, p, t) -> results."""
+        return ca.Function(name, [self.x, self._symbols, self.p, self.t], [*results], _ONCE)
+
+    @cached_property
+    def _further_points(self) -> list[further_points.Pushed]:
+        return further_points.pushed(self._model, self._block.u)
+
+    @cached_property
+    def _displacements(self) -> ca.SX:
+        model = self._model
+        return ca.vertcat(model.x_h, *(point.x for point in self._further_points), model.q)
+
+    @cached_property
+    def rates(self) -> ca.Function:
+        rates = friction.deflection_rates(self._model)
+        if self._touching:
+            rates = ca.vertcat(rates, self._touching.state_rates())
+        return self._function("rates", rates)
+
+    @cached_property
+    def forces(self) -> ca.Function:
+        weight = gravity.efforts(self._model)
+        soft = forces.efforts(self._model, weight=False)
+        if self._touching:
+            soft += self._touching.efforts()
+        rigid = self._applied if weight is None else self._applied + weight
+        drives = forces.sources(self._model)
+        return self._function("forces", *map(self._known, (soft, rigid, drives)))
+
+    @cached_property
+    def energies(self) -> ca.Function:
+        results = self._known(self._energy), self._model.kinetic_energy, self._displacements
+        return self._function("energies", *results)
+
+    @cached_property
+    def input_efforts(self) -> ca.Function:
+        u = self._block.u
+        wrenches = [u["F_hand"] - u["F_drift"], *(point.wrench for point in self._further_points)]
+        efforts = ca.vertcat(*wrenches, joint_ports.efforts(self._model, u))
+        return ca.Function("input_efforts", [self._symbols], [efforts])
+
+    def _kinematics(self, name: str, result: ca.SX) -> ca.Function:
+        """(q, qd, p) -> result."""
+        return ca.Function(name, [self._model.q, self._model.qd, self.p], [result], _ONCE)
+
+    @cached_property
+    def displacement_rates(self) -> ca.Function:
+        return self._kinematics("displacement_rates", self._model.rate(self._displacements))
+
+    @cached_property
+    def velocities(self) -> ca.Function:
+        return self._kinematics("velocities", self._model.velocities)
+
+    def constrained_solver(self, *, softened: bool) -> ca.Function:
+        model, n = self._model, self.n
+        V, b, s = (
+            ca.SX.sym(name, size)
+            for name, size in (("V", model.velocities.numel()), ("b", n), ("s", n))
+        )
+        A = ca.SX.sym("A", n * softened, n * softened)
+        tree = TreeInertia(model)
+        inertia: Inertia = tree
+        if softened:
+            inertia = MatrixInertia(model.D + A, tree.k, model.leaf_to_root, tree.d)
+        solver = ClosedLoopSolver(inertia, model.W, rows(model.linkage))
+        a = solver.follow(model.momentum(V) + b, -model.W @ s)
+        return ca.Function("solved", [model.q, V, b, A, s, self.p], [a], _ONCE)

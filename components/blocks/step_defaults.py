@@ -9,6 +9,7 @@ import math
 from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Signals, Variable
 from hapticlink.components.contact import contact_forces
 from hapticlink.components.dynamics import friction_scale, stabilization
+from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 
@@ -32,14 +33,14 @@ class StepDefaults:
     ) -> None:
         self._contacts, self._substeps = contacts, mechanism.substeps
         self._scales, longest = friction_scale.scales(linkage), math.inf
-        if mechanism.integrator != "linearly-implicit":
+        method = METHODS[mechanism.integrator]
+        if not method.l_stable:
             if step_s is not None:
                 friction_scale.require_slow(self._scales, step_s / mechanism.substeps)
             longest = friction_scale.longest_step(self._scales) * mechanism.substeps
         start = min(NOMINAL, longest) if step_s is None else step_s
         bound = longest if math.isfinite(longest) else None
-        own = stabilization.gains(mechanism.integrator)
-        self.baumgarte = stabilization.HELD if frame_s else own
+        self.baumgarte = stabilization.HELD if frame_s else method.baumgarte
         stabilised = mechanism.stabilization == "baumgarte" and linkage.closed
         self._alpha = stabilised and mechanism.alpha is None
         self._held = bool(self._alpha and frame_s)

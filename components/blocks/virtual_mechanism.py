@@ -11,20 +11,15 @@ step. The start pose is assembled in initialisation mode.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
 from hapticlink.components import forces, integrators, time_signals
 from hapticlink.components.blocks.mechanism_steps import DEFLECTIONS, MechanismSteps
 from hapticlink.components.blocks.step_defaults import StepDefaults
-from hapticlink.components.component import (
-    WRENCH,
-    Block,
-    Component,
-    Variable,
-)
+from hapticlink.components.component import WRENCH, Block, Component, Variable
 from hapticlink.components.contact import contact_forces, joint_limits
 from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
@@ -38,13 +33,10 @@ from hapticlink.components.dynamics import (
     starting_friction,
 )
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
+from hapticlink.components.dynamics.constrained_directions import ConstrainedDirections
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
 from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.passive_midpoint import (
-    require_fitting,
-    stops_output,
-)
 from hapticlink.components.dynamics.variables import (
     direction_outputs,
     direction_parameters,
@@ -55,12 +47,11 @@ from hapticlink.components.dynamics.variables import (
     states,
 )
 from hapticlink.components.forces import drives, friction
-from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
+from hapticlink.components.integrators.base import Integrator
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
-from hapticlink.components.time_signals import TimeSignal
 
 
 def virtual_mechanism(
@@ -86,95 +77,40 @@ def virtual_mechanism(
     ValueError for an unknown method, for settings that do not fit it and for friction too stiff for
     step_s.
     """
-    require_fitting(mechanism, linkage, held=frame_s is not None)
+    method = integrators.METHODS[mechanism.integrator]
+    baumgarte = linkage.closed and mechanism.stabilization == "baumgarte"
+    if reason := method.misfit(baumgarte=baumgarte, held=frame_s is not None):
+        raise ValueError(f'`mechanism.integrator` = "{mechanism.integrator}": {reason}')
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     felt = felt and bool(linkage.point or joint_ports.inputs(linkage))
-    parts = _Parts(linkage, mechanism, directions, contacts, frame_s, felt, users)
+    parts = _Parts(linkage, mechanism, directions, contacts, frame_s, felt, users, method)
     defaults = StepDefaults(linkage, mechanism, contacts, step_s, frame_s)
     block = _block(parts, defaults, length_scale)
     defaults.define(block.p)
-    signals = drives.signals(linkage)
-    tabled = ca.SX.sym("tabled", 2 * len(signals))
-    at = block.x["q"], block.x["qd"]
-    model = LinkageModel(linkage, block.p, *at, tabled, block.t, block.x.get("deflection"))
-    space = OperationalSpace(model, local_model.held(model, block.u) if frame_s else None)
-    applied = space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
-    others = further_points.efforts(model, block.u) + joint_ports.efforts(model, block.u)
-    applied += others
-    energy = model.kinetic_energy + forces.energy(model)
-    output: dict[str, ca.SX] = {}
-    touching = _touching(parts, block, space, output)
-    pushed = touching.efforts() if touching else ca.SX(model.q.numel(), 1)
-    energy += touching.energy if touching else 0
-    if touching or felt:
-        J_h = space.terms.J_h
-        acceleration = J_h @ space.response(pushed + (others if felt else 0))[0]
-        output["F_env"] = equivalent_wrench(
-            space.Lambda_inv, space.open_mobility(J_h), acceleration, block.p["length_scale"]
-        )
-    qdd, multipliers = space.motion(applied + pushed)
-    output |= {
-        "x": model.x_h,
-        "v": model.v_h,
-        "q": model.q,
-        "qd": model.qd,
-        "qdd": qdd,
-        "a_bias": space.a_bias,
-        "energy": energy,
-    }
-    if linkage.closed:
-        output |= {"lambda": multipliers, "closure_error": model.closure_error}
-        output |= closure_diagnostics.values(space.solver) if mechanism.diagnostics else {}
-    output |= further_points.values(
-        space, block, users, applied + pushed, mobility=directions is not None
-    )
-    output |= joint_ports.values(model)
-
-    q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
-    initial = {"q": q0, "qd": qd0}
-    initial |= _deflections(block, space, applied + pushed, initial, signals)
-    steps = MechanismSteps(block, model, mechanism, applied, touching, signals)
-    if parts.passive:
-        initial["stops"], output["stops"] = ca.SX(0), block.x["stops"]
-        after = steps.passive(energy)
-    else:
-        after = steps.integrated(space)
-    n = model.q.numel()
-    q1, qd1 = after[:n], after[n : 2 * n]
-    if k := model.deflection.numel():
-        after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
-    stepped = ca.vertcat(carried(model, q1, qd1, block.h), after[n:])
-    if directions:
-        output["Lambda_inv"] = space.Lambda_inv
-        for name, found in further_points.directions(block, space, users, q0, q1).items():
-            initial[name], stepped = found.first, ca.vertcat(stepped, found.after)
-            output |= found.output
-    if signals:
-        now = ca.densify(time_signals.at(signals, block.t))
-        output = {name: ca.substitute(value, tabled, now) for name, value in output.items()}
+    equations = _Equations(parts, block)
     component = block.component(
         "virtual_mechanism",
         "Dynamics of the linkage under the wrenches of the hand and of the virtual coupling",
         "continuous",
-        initial=initial,
-        step=stepped,
-        output=output,
+        initial=equations.initial(),
+        step=equations.step(),
+        output=equations.output(),
         substeps=mechanism.substeps,
         memory=further_points.counts(users),
-        state_notes=notes(model),
+        state_notes=notes(equations.model),
         documentation=__doc__ or "",
-        shared=not frame_s and not touching,
-        signals=signals,
+        shared=not frame_s and not equations.touching,
+        signals=equations.signals,
     )
-    require_assembled(component, model)
-    require_inertia(component, model)
+    require_assembled(component, equations.model)
+    require_inertia(component, equations.model)
     return component
 
 
 @dataclass(frozen=True)
 class _Parts:
-    """The parts of the mechanism."""
+    """The parts of the mechanism, and the method that takes its steps."""
 
     linkage: Linkage
     mechanism: Mechanism
@@ -183,11 +119,7 @@ class _Parts:
     frame_s: float | None
     felt: bool
     users: further_points.Users
-
-    @property
-    def passive(self) -> bool:
-        """Whether the passive midpoint method takes the steps."""
-        return isinstance(integrators.METHODS[self.mechanism.integrator], PassiveMidpoint)
+    method: Integrator
 
     @property
     def touches(self) -> bool:
@@ -198,15 +130,10 @@ class _Parts:
 def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) -> Block:
     """The variables of the parts."""
     linkage, directions, contacts = parts.linkage, parts.directions, parts.contacts
+    drift = "virtual coupling, acts with - on the mechanism"
     inputs = [
         Variable("F_hand", (3,), WRENCH, description="wrench of the hand", power=Power("x")),
-        Variable(
-            "F_drift",
-            (3,),
-            WRENCH,
-            description="virtual coupling, acts with - on the mechanism",
-            power=Power("x", sign=-1.0),
-        ),
+        Variable("F_drift", (3,), WRENCH, description=drift, power=Power("x", sign=-1.0)),
     ]
     parameters = mechanism_parameters(linkage, parts.mechanism, defaults.baumgarte.beta)
     parameters += defaults.parameters
@@ -232,9 +159,9 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
         memory += contact_forces.states(linkage, contacts)
         if contacts.detection == "graphics":
             inputs.append(contact_forces.contact_port(linkage, contacts))
-    if parts.passive:
-        memory.append(Variable("stops"))
-        outputs.append(stops_output())
+    for name, text in parts.method.counters.items():
+        memory.append(Variable(name))
+        outputs.append(Variable(name, (), "1", description=text))
     if directions:
         memory += [Variable(name) for name in further_points.counts(parts.users)]
         parameters += direction_parameters(directions)
@@ -243,42 +170,156 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
     return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
 
 
-def _deflections(
-    block: Block,
-    space: OperationalSpace,
-    Q: ca.SX,
-    start: Mapping[str, ca.SX],
-    signals: list[TimeSignal],
-) -> dict[str, ca.SX]:
-    """The deflections of friction at the start pose and rates: contacts have none."""
-    joints, contacts = DEFLECTIONS
-    found = {name: ca.SX(*block.x[name].shape) for name in DEFLECTIONS if name in block.x}
-    if joints in found:
-        z = starting_friction.start(space, Q, start["q"], start["qd"], block.t)
-        none = block.x.get(contacts, ca.SX(0, 1))
-        symbols = ca.vertcat(space.model.tabled, none)
-        known = ca.vertcat(time_signals.at(signals, ca.SX(0)), ca.SX(*none.shape))
-        found[joints] = ca.substitute(z, symbols, ca.densify(known))
-    return found
+class _Equations:
+    """The expressions of the block in its symbols."""
 
+    def __init__(self, parts: _Parts, block: Block) -> None:
+        self._parts, self._block = parts, block
+        self.signals = drives.signals(parts.linkage)
+        tabled = ca.SX.sym("tabled", 2 * len(self.signals))
+        pose = block.x["q"], block.x["qd"]
+        deflection = block.x.get("deflection")
+        self.model = LinkageModel(parts.linkage, block.p, *pose, tabled, block.t, deflection)
+        held = local_model.held(self.model, block.u) if parts.frame_s else None
+        self._space = OperationalSpace(self.model, held)
+        drawn = self._space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
+        self._others = further_points.efforts(self.model, block.u)
+        self._others += joint_ports.efforts(self.model, block.u)
+        self._applied = drawn + self._others
+        self._pushed = ca.SX(self.model.q.numel(), 1)
+        self._energy = self.model.kinetic_energy + forces.energy(self.model)
+        if self.touching:
+            self._pushed = self.touching.efforts()
+            self._energy += self.touching.energy
 
-def _touching(
-    parts: _Parts, block: Block, space: OperationalSpace, output: dict[str, ca.SX]
-) -> OneSidedForces | None:
-    """Contacts and joint limits, None where there are neither, and their outputs."""
-    model, contacts, found = space.model, parts.contacts, list[OneSidedForces]()
-    if contacts:
+    @cached_property
+    def _contact(self) -> ContactForces | None:
+        model, contacts, block = self.model, self._parts.contacts, self._block
+        if not contacts:
+            return None
         places = (
             touches(model, contacts, block.p)
             if contacts.detection == "haptics"
             else contact_forces.held(model, contacts, block.u["contacts"])
         )
-        deflection = block.x.get("contact_deflection")
-        contact = ContactForces(model, contacts, block.p, places, deflection)
-        output["contact_gap"] = contact.gap
-        found.append(contact)
-    if parts.linkage.limited:
-        found.append(JointLimits(space))
-    if not found:
-        return None
-    return AllOneSidedForces(found)
+        return ContactForces(model, contacts, block.p, places, block.x.get("contact_deflection"))
+
+    @cached_property
+    def touching(self) -> OneSidedForces | None:
+        """Contacts and joint limits, None where there are neither."""
+        contact: list[OneSidedForces] = [self._contact] if self._contact else []
+        limits = [JointLimits(self._space)] if self._parts.linkage.limited else []
+        return AllOneSidedForces([*contact, *limits]) if contact or limits else None
+
+    @cached_property
+    def _start(self) -> tuple[ca.SX, ca.SX]:
+        """The assembled q and qd at t = 0."""
+        p = self._block.p
+        return assemble(LinkageModel(self._parts.linkage, p, p["q_start"], p["qd_start"]))
+
+    @cached_property
+    def _after(self) -> ca.SX:
+        """q, qd and deflections after a step, and by how much the method's counters grow."""
+        parts, model, n = self._parts, self.model, self.model.q.numel()
+        steps = MechanismSteps(
+            self._block,
+            parts.mechanism,
+            self._space,
+            self._applied,
+            self.touching,
+            self._energy,
+            self.signals,
+        )
+        after = integrators.mechanism_step(parts.method, steps)
+        if k := model.deflection.numel():
+            after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
+        return after
+
+    @cached_property
+    def _directions(self) -> dict[str, ConstrainedDirections]:
+        """The constrained directions of operational points by state, if there are any."""
+        if not self._parts.directions:
+            return {}
+        q0, q1 = self._start[0], self._after[: self.model.q.numel()]
+        return further_points.directions(self._block, self._space, self._parts.users, q0, q1)
+
+    def initial(self) -> dict[str, ca.SX]:
+        """All states at t = 0."""
+        initial = dict(zip(("q", "qd"), self._start, strict=True)) | self._initial_deflections()
+        initial |= dict.fromkeys(self._parts.method.counters, ca.SX(0))
+        return initial | {name: found.first for name, found in self._directions.items()}
+
+    def _initial_deflections(self) -> dict[str, ca.SX]:
+        """The deflections of friction at the start pose and rates: contacts have none."""
+        x, (joints, contacts) = self._block.x, DEFLECTIONS
+        initial = {name: ca.SX(*x[name].shape) for name in DEFLECTIONS if name in x}
+        if joints in initial:
+            Q = self._applied + self._pushed
+            z = starting_friction.start(self._space, Q, *self._start, self._block.t)
+            none = x.get(contacts, ca.SX(0, 1))
+            symbols = ca.vertcat(self.model.tabled, none)
+            known = ca.vertcat(time_signals.at(self.signals, ca.SX(0)), ca.SX(*none.shape))
+            initial[joints] = ca.substitute(z, symbols, ca.densify(known))
+        return initial
+
+    def step(self) -> ca.SX:
+        """All states after h."""
+        x, method, n = self._block.x, self._parts.method, self.model.q.numel()
+        moved, growth = ca.vertsplit(
+            self._after, [0, self._after.numel() - len(method.counters), self._after.numel()]
+        )
+        counted = (x[name] for name in method.counters)
+        return ca.vertcat(
+            carried(self.model, moved[:n], moved[n : 2 * n], self._block.h),
+            moved[n:],
+            ca.vertcat(ca.SX(0, 1), *counted) + growth,
+            *(found.after for found in self._directions.values()),
+        )
+
+    def output(self) -> dict[str, ca.SX]:
+        """All outputs."""
+        parts, block, model, space = self._parts, self._block, self.model, self._space
+        qdd, multipliers = space.motion(self._applied + self._pushed)
+        output = {
+            "x": model.x_h,
+            "v": model.v_h,
+            "q": model.q,
+            "qd": model.qd,
+            "qdd": qdd,
+            "a_bias": space.a_bias,
+            "energy": self._energy,
+        }
+        if self._contact:
+            output["contact_gap"] = self._contact.gap
+        if self.touching or parts.felt:
+            output["F_env"] = self._environment_wrench()
+        if parts.linkage.closed:
+            output |= {"lambda": multipliers, "closure_error": model.closure_error}
+            output |= (
+                closure_diagnostics.values(space.solver) if parts.mechanism.diagnostics else {}
+            )
+        output |= further_points.values(
+            space,
+            block,
+            parts.users,
+            self._applied + self._pushed,
+            mobility=parts.directions is not None,
+        )
+        output |= joint_ports.values(model)
+        output |= {name: block.x[name] for name in parts.method.counters}
+        if parts.directions:
+            output["Lambda_inv"] = space.Lambda_inv
+        for found in self._directions.values():
+            output |= found.output
+        if not self.signals:
+            return output
+        now = ca.densify(time_signals.at(self.signals, block.t))
+        return {name: ca.substitute(value, model.tabled, now) for name, value in output.items()}
+
+    def _environment_wrench(self) -> ca.SX:
+        """F_env, 3 x 1, of contacts, joint limits and others if they are felt."""
+        space, J_h = self._space, self._space.terms.J_h
+        efforts = self._pushed + (self._others if self._parts.felt else 0)
+        acceleration = J_h @ space.response(efforts)[0]
+        L = self._block.p["length_scale"]
+        return equivalent_wrench(space.Lambda_inv, space.open_mobility(J_h), acceleration, L)

@@ -26,7 +26,7 @@ import casadi as ca
 
 from hapticlink.components import integrators
 from hapticlink.components.contact.unilateral import BEGUN, BY_STATE, Unilateral
-from hapticlink.components.integrators.base import Integrator
+from hapticlink.components.integrators.base import Integrator, Ode
 
 STEEP = 1 / 3  # of the mean slope of e, at either end: inverse interpolation is monotonic
 TOGETHER = 1e-9  # of a step: events that are not further apart happen at once
@@ -44,21 +44,13 @@ class LocatedEvents(Integrator):
         self.method, self.events, self.functions = method, events, functions
         self.order, self.extrapolates = method.order, method.extrapolates
 
-    def step(
-        self,
-        ode: ca.Function,
-        x: ca.SX,
-        u: ca.SX,
-        p: ca.SX,
-        t: ca.SX,
-        h: ca.SX,
-        positions: Sequence[int],
-    ) -> ca.SX:
+    def step(self, ode: Ode, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX, h: ca.SX) -> ca.SX:
         """x(t + h)."""
 
         def stepped(x: ca.SX, laws: ca.SX, t: ca.SX, h: ca.SX) -> ca.SX:
             given = ca.vertcat(laws, u)
-            return integrators.step(self.method, ode, x, given, p, t, h, positions)
+            rate, q = ode.rate, ode.positions
+            return integrators.step(self.method, rate, x, given, p, t, h, q)
 
         def at(x: ca.SX, pushing: ca.SX, t: ca.SX) -> tuple[ca.SX, _Contacts]:
             rate = ode(x, ca.vertcat(pushing, u), p, t)

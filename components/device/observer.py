@@ -15,6 +15,7 @@ At t = 0 x1 is the measured pose and x2 zero: no velocity, no force.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
@@ -29,50 +30,46 @@ class State(NamedTuple):
     x2: ca.SX
 
 
-def step(
-    rule: str,
-    *,
-    x1: ca.SX,
-    x2: ca.SX,
-    pose: ca.SX,
-    pose_next: ca.SX,
-    F_motor: ca.SX,
-    M: ca.SX,
-    C: ca.SX,
-    omega_n: ca.SX,
-    k_D: ca.SX,
-    period: ca.SX,
-) -> State:
-    """The state at the end of a `period` (s), with the pose measured at both ends.
+@dataclass(frozen=True)
+class Observer:
+    """The observer with gains omega_n (rad/s) and k_D (1/s), stepped by a rule of
+    `discretisation`."""
 
-    F_motor is the wrench held over the period; M and C are (n, n), the others (n,) or scalar.
-    Raises ValueError for an unknown rule.
-    """
-    n = x1.numel()
-    identity, zero = ca.SX.eye(n), ca.SX(n, n)
-    A = ca.blockcat([[-k_D * identity, identity], [-(omega_n**2) * identity, -ca.solve(M, C)]])
-    B = ca.blockcat([[k_D * identity, zero], [omega_n**2 * identity, identity]])
-    push = ca.solve(M, F_motor)
-    x = discretisation.step(
-        rule,
-        A,
-        B,
-        ca.vertcat(x1, x2),
-        ca.vertcat(pose, push),
-        ca.vertcat(pose_next, push),
-        period,
-    )
-    return State(x[:n], x[n:])
+    rule: str
+    omega_n: ca.SX
+    k_D: ca.SX
 
+    def step(
+        self,
+        state: State,
+        pose: ca.SX,
+        pose_next: ca.SX,
+        F_motor: ca.SX,
+        M: ca.SX,
+        C: ca.SX,
+        period: ca.SX,
+    ) -> State:
+        """The state at the end of a `period` (s), with the pose measured at both ends.
 
-def force(*, x1: ca.SX, pose: ca.SX, M: ca.SX, omega_n: ca.SX) -> ca.SX:
-    """Observed hand wrench K_p e (N, N, N.m)."""
-    return omega_n**2 * (M @ (pose - x1))
+        F_motor is the wrench held over the period; M and C are (n, n), the others (n,). Raises
+        ValueError for an unknown rule.
+        """
+        n = pose.numel()
+        identity, zero, K = ca.SX.eye(n), ca.SX(n, n), self.omega_n**2
+        A = ca.blockcat([[-self.k_D * identity, identity], [-K * identity, -ca.solve(M, C)]])
+        B = ca.blockcat([[self.k_D * identity, zero], [K * identity, identity]])
+        push = ca.solve(M, F_motor)
+        u, u_next = ca.vertcat(pose, push), ca.vertcat(pose_next, push)
+        x = discretisation.step(self.rule, A, B, ca.vertcat(*state), u, u_next, period)
+        return State(x[:n], x[n:])
 
+    def force(self, state: State, pose: ca.SX, M: ca.SX) -> ca.SX:
+        """Observed hand wrench K_p e (N, N, N.m)."""
+        return self.omega_n**2 * (M @ (pose - state.x1))
 
-def velocity(*, x1: ca.SX, x2: ca.SX, pose: ca.SX, k_D: ca.SX) -> ca.SX:
-    """Observed velocity x1' = x2 + k_D e (m/s, m/s, rad/s).
+    def velocity(self, state: State, pose: ca.SX) -> ca.SX:
+        """Observed velocity x1' = x2 + k_D e (m/s, m/s, rad/s).
 
-    x2 itself is biased by k_D K_p^-1 F, with F the hand's wrench, which is no input.
-    """
-    return x2 + k_D * (pose - x1)
+        x2 itself is biased by k_D K_p^-1 F, with F the hand's wrench, which is no input.
+        """
+        return state.x2 + self.k_D * (pose - state.x1)

@@ -1,4 +1,5 @@
-"""Baumgarte's stabilisation of (3.3), hddot + 2 alpha beta hdot + alpha^2 h = 0: default gains.
+"""Baumgarte's stabilisation of (3.3), hddot + 2 alpha beta hdot + alpha^2 h = 0: the gains of
+`Integrator.baumgarte`.
 
 The roots of the closure error times the step T are z = alpha T (-beta +- sqrt(beta^2 - 1)). A
 Runge-Kutta method multiplies its modes by the stability polynomial R(z) in each step, so alpha T
@@ -22,32 +23,8 @@ Gap of the five-bar at 512 Hz, in m, by alpha T at beta = 1 (0 is unstabilised):
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True)
-class Baumgarte:
-    """Gains for steps of T: alpha = alpha_T / T (1/s), and beta."""
-
-    alpha_T: float
-    beta: float
-
-
-GAINS = {
-    "semi-implicit-euler": Baumgarte(1.0, 0.5),
-    "heun": Baumgarte(math.sqrt(2), math.sqrt(0.5)),
-    "dormand-prince-8": Baumgarte(0.1, 1.0),
-}
-"""Gains of the integrators for which better ones than `ANY` are known."""
-
-ANY = Baumgarte(0.05, 1.0)
+from hapticlink.components.integrators.base import Baumgarte
 
 HELD = Baumgarte(0.4, 1.0)
 """Gains of the local model, with T the frame period: W is up to a frame old, so that a faster
 correction overshoots. Projection with held matrices diverges for the same reason."""
-
-
-def gains(integrator: str) -> Baumgarte:
-    """The default gains for an integrator."""
-    return GAINS.get(integrator, ANY)

@@ -1,8 +1,5 @@
 """Fixed-step integration methods for plants, one a file; `METHODS` holds them by the names that a
 scene uses.
-
-A method advances x' = f(x, u, p, t) by h with constant u. `positions` lists the entries of x that
-are positions, for methods that treat positions and velocities differently.
 """
 
 from __future__ import annotations
@@ -11,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hapticlink.components.integrators import dormand_prince_8, heun, rk4
-from hapticlink.components.integrators.base import Integrator
+from hapticlink.components.integrators.base import Integrator, MechanicalSystem, Ode
 from hapticlink.components.integrators.linearly_implicit import LinearlyImplicit
 from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
 from hapticlink.components.integrators.semi_implicit_euler import SemiImplicitEuler
@@ -44,12 +41,24 @@ def step(
     h: ca.SX,
     positions: Sequence[int],
 ) -> ca.SX:
-    """x(t + h) by a method, or by the one of that name. Raises ValueError for an unknown name, and
-    for a method that gives no expression of x's size."""
+    """x(t + h) by a method, or by the one of that name, with ode: (x, u, p, t) -> x', constant u,
+    and the entries of x that are positions (`Ode`). Raises ValueError for an unknown name, and for
+    a method that gives no expression of x's size."""
     integrator = METHODS[method] if isinstance(method, str) else method
-    after = integrator.step(ode, x, u, p, t, h, positions)
+    after = integrator.step(Ode(ode, positions), x, u, p, t, h)
+    return _of_size(after, x.numel(), integrator)
+
+
+def mechanism_step(method: Integrator, mechanism: MechanicalSystem) -> ca.SX:
+    """x(t + h) of a mechanism by a method, and below it by how much each of the method's counters
+    grows. Raises ValueError for a method that gives no expression of that size."""
+    size = mechanism.x.numel() + len(method.counters)
+    return _of_size(method.mechanism_step(mechanism), size, method)
+
+
+def _of_size(after: ca.SX, size: int, method: Integrator) -> ca.SX:
     shape = getattr(after, "shape", type(after).__name__)
-    if shape != x.shape:
-        name = type(integrator).__name__
-        raise ValueError(f"integrator {name}: its step gives {shape}, not {x.shape}")
+    if shape != (size, 1):
+        name = type(method).__name__
+        raise ValueError(f"integrator {name}: its step gives {shape}, not {(size, 1)}")
     return after

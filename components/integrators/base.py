@@ -1,33 +1,138 @@
-"""The base class of integration methods."""
+"""The contract of integration methods: a method is a class derived from `Integrator`.
+
+`step` takes any plant x' = f(x, u, p, t). `mechanism_step` takes a mechanism, of which a method may
+know more than its equations of motion (`MechanicalSystem`); by default it applies `step` to these.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # a scene is checked against the names of methods, and that needs no equations
     import casadi as ca
 
 
-class Integrator(ABC):
-    """An integration method; a step is a pure expression in x, u, p, t, h.
+@dataclass(frozen=True)
+class Ode:
+    """The equations x' = f(x, u, p, t) of a plant, called as a function of columns."""
 
-    order: order of the global error. extrapolates: whether coefficients of earlier stages are much
-    larger than 1, so that their rounding errors are amplified."""
+    rate: ca.Function
+    """(x, u, p, t) -> x'."""
+    positions: Sequence[int] = ()
+    """The entries of x that are positions. The entries that are none begin with the velocities, as
+    many as positions and in their order: q' = v."""
 
-    order: int
-    extrapolates: bool = False
+    def __call__(self, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX) -> ca.SX:
+        return self.rate(x, u, p, t)
+
+
+class MechanicalSystem(ABC):
+    """A mechanism within one step, with x = (q, qd, z), z further states such as deflections of
+    friction:
+
+        D qdd + C qd = Q + W' lambda,   W qdd + w = 0   (B.6)
+
+    Bodies have the velocities V = J(q) qd, a constant inertia M, and D = J' M J. Q depends on the
+    motion or is rigid (`forces`). Inputs u are constant over the step.
+    """
+
+    x: ca.SX
+    """q, qd (n x 1 each) and z at the beginning of the step."""
+    u: ca.SX
+    p: ca.SX
+    t: ca.SX
+    """The beginning of the step (s)."""
+    h: ca.SX
+    """Its size (s)."""
+    n: int
+    """Number of coordinates."""
 
     @abstractmethod
-    def step(
-        self,
-        ode: ca.Function,
-        x: ca.SX,
-        u: ca.SX,
-        p: ca.SX,
-        t: ca.SX,
-        h: ca.SX,
-        positions: Sequence[int],
-    ) -> ca.SX:
-        """x(t + h) from x(t), with ode: (x, u, p, t) -> x'."""
+    def integrated(self, method: Integrator) -> ca.SX:
+        """x(t + h) by `method.step`, with begins and ends of contacts located and with the closures
+        stabilised, as the scene chooses."""
+
+    @abstractmethod
+    def projected(self, x: ca.SX) -> ca.SX:
+        """x with q and qd on the closures, if the scene chooses projection."""
+
+    @property
+    @abstractmethod
+    def rates(self) -> ca.Function:
+        """(x, u, p, t) -> z'."""
+
+    @property
+    @abstractmethod
+    def forces(self) -> ca.Function:
+        """(x, u, p, t) -> generalised forces, n x 1 each: those that depend on the motion, all
+        others, and those of drives, which are a part of the first."""
+
+    @property
+    @abstractmethod
+    def energies(self) -> ca.Function:
+        """(x, u, p, t) -> the whole and the kinetic energy (J), and the displacements r (k x 1) in
+        which inputs do work, of which the last n are q."""
+
+    @property
+    @abstractmethod
+    def input_efforts(self) -> ca.Function:
+        """u -> the efforts of inputs (k x 1), whose power is efforts . r'."""
+
+    @property
+    @abstractmethod
+    def displacement_rates(self) -> ca.Function:
+        """(q, qd, p) -> r', k x 1."""
+
+    @property
+    @abstractmethod
+    def velocities(self) -> ca.Function:
+        """(q, qd, p) -> V = J(q) qd of all bodies."""
+
+    @abstractmethod
+    def constrained_solver(self, *, softened: bool) -> ca.Function:
+        """(q, V, b, A, s, p) -> a with (D + A) a = J' M V + b + W' lambda and W (s + a) = 0 at q.
+        A is n x n if `softened`, else empty and left out."""
+
+
+@dataclass(frozen=True)
+class Baumgarte:
+    """Gains of Baumgarte's stabilisation (3.3) for steps of T: alpha = alpha_T / T (1/s), and
+    beta."""
+
+    alpha_T: float = 0.05
+    beta: float = 1.0
+
+
+class Integrator(ABC):
+    """An integration method; a step is a pure expression."""
+
+    order: int
+    """Order of the global error."""
+    extrapolates: bool = False
+    """Whether coefficients of earlier stages are much larger than 1, so that their rounding errors
+    are amplified."""
+    l_stable: bool = False
+    """Whether modes of any stiffness die out, so that friction does not bound the step."""
+    baumgarte: Baumgarte = Baumgarte()
+    """Default gains of Baumgarte's stabilisation, by default those that suit any method
+    (dynamics/stabilization.py)."""
+    counters: Mapping[str, str] = MappingProxyType({})
+    """What the method counts over the steps of a mechanism, by name with a description: further
+    states and outputs of the mechanism, which start at 0."""
+
+    @abstractmethod
+    def step(self, ode: Ode, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX, h: ca.SX) -> ca.SX:
+        """x(t + h) from x(t) by x' = ode(x, u, p, t) with constant u."""
+
+    def mechanism_step(self, mechanism: MechanicalSystem) -> ca.SX:
+        """x(t + h) of a mechanism, and below it by how much each of `counters` grows."""
+        return mechanism.integrated(self)
+
+    def misfit(self, *, baumgarte: bool, held: bool) -> str:
+        """Why the method cannot take steps of a mechanism, "" if it can. baumgarte: its closures
+        are stabilised by Baumgarte's method; held: its matrices are inputs (local_model)."""
+        return ""

@@ -4,6 +4,7 @@ Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (1993), secti
 appendix's code DOP853, whose coefficients these are; without its error estimate and dense output.
 """
 
+from hapticlink.components.integrators.base import Baumgarte
 from hapticlink.components.integrators.runge_kutta import RungeKutta, Tableau
 
 # fmt: off
@@ -38,4 +39,4 @@ DORMAND_PRINCE_8 = Tableau(
 )
 # fmt: on
 
-METHOD = RungeKutta(DORMAND_PRINCE_8)
+METHOD = RungeKutta(DORMAND_PRINCE_8, Baumgarte(alpha_T=0.1))

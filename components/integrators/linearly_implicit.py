@@ -14,10 +14,9 @@ y = (v, further states) and v = P y:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hapticlink.components.integrators.base import Integrator
+from hapticlink.components.integrators.base import Integrator, Ode
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -27,22 +26,13 @@ GAMMA = 1 - 1 / math.sqrt(2)
 
 class LinearlyImplicit(Integrator):
     order = 2
+    l_stable = True
 
-    def step(
-        self,
-        ode: ca.Function,
-        x: ca.SX,
-        u: ca.SX,
-        p: ca.SX,
-        t: ca.SX,
-        h: ca.SX,
-        positions: Sequence[int],
-    ) -> ca.SX:
-        """x(t + h). The first entries of x that are no positions are velocities; raises ValueError
-        unless there are as many as positions."""
+    def step(self, ode: Ode, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX, h: ca.SX) -> ca.SX:
+        """x(t + h). Raises ValueError for more positions than velocities."""
         import casadi as ca  # here, as a scene is checked against the registry without equations
 
-        q = list(positions)
+        q = list(ode.positions)
         y = [i for i in range(x.numel()) if i not in set(q)]
         if len(q) > len(y):
             raise ValueError(

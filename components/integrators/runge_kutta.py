@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hapticlink.components.integrators.base import Integrator
+from hapticlink.components.integrators.base import Baumgarte, Integrator, Ode
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -56,21 +56,15 @@ def _require(terms: Sequence[float], total: float, what: str) -> None:
 
 
 class RungeKutta(Integrator):
-    def __init__(self, tableau: Tableau) -> None:
-        self.tableau = tableau
+    """The explicit method of a tableau; baumgarte: its default gains, if better ones are known than
+    those that suit any method."""
+
+    def __init__(self, tableau: Tableau, baumgarte: Baumgarte | None = None) -> None:
+        self.tableau, self.baumgarte = tableau, baumgarte or Baumgarte()
         self.order = tableau.order
         self.extrapolates = any(abs(a) > 10 for row in tableau.a for a in row)
 
-    def step(
-        self,
-        ode: ca.Function,
-        x: ca.SX,
-        u: ca.SX,
-        p: ca.SX,
-        t: ca.SX,
-        h: ca.SX,
-        positions: Sequence[int],
-    ) -> ca.SX:
+    def step(self, ode: Ode, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX, h: ca.SX) -> ca.SX:
         slopes: list[ca.SX] = []
         for row, c in zip(self.tableau.a, self.tableau.c, strict=True):
             stage = sum((h * a * k for a, k in zip(row, slopes, strict=True) if a), start=x)

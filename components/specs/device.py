@@ -82,7 +82,5 @@ class Device:
     """Damping of the stops."""
     substeps: Annotated[int, Quantity("1", ge=1, le=100)] = 1
     """Integration steps per communication step; the size of the FMU's equations grows with them."""
-    sensing: Literal["ideal", "encoders"] = "ideal"
-    """Set by the scene's own `sensing`; not to be written here."""
     observer: Observer = field(default_factory=Observer)
     """The observer, used with sensing = "encoders"."""

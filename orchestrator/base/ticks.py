@@ -38,6 +38,8 @@ class Clock:
 
     name: str
     starts: Sequence[int]
+    key: tuple[str | int, ...] = field(default=(), compare=False)
+    """The scene's key that sets the rate, for messages."""
 
     @property
     def first(self) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.status import WARNING
+from hapticlink.orchestrator.fmi.status import succeeded
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 Matrix = NDArray[np.float64]
@@ -40,7 +40,7 @@ def derivatives(
             arguments.append(ctypes.c_void_p(values.ctypes.data))
             if description.fmi == "3":
                 arguments.append(ctypes.c_size_t(len(values)))
-        if call(*arguments) > WARNING:
+        if not succeeded(call(*arguments)):
             return None
         columns.append(found[rows])
     return np.stack(columns, axis=1)

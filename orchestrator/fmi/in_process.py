@@ -30,7 +30,15 @@ from hapticlink.orchestrator.fmi.retry import Retry
 from hapticlink.orchestrator.fmi.setter import Places, Setter
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
 from hapticlink.orchestrator.fmi.states import WithStates
-from hapticlink.orchestrator.fmi.status import DISCARD, ERROR, FATAL, STATUS, WARNING
+from hapticlink.orchestrator.fmi.status import (
+    DISCARD,
+    ERROR,
+    FATAL,
+    STATUS,
+    require_success,
+    succeeded,
+    worse,
+)
 from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
@@ -90,7 +98,9 @@ class InProcess(WithStates):
             modelIdentifier=self.description.identifier,
             unzipDirectory=self._folder,
             instanceName=self.name,
+            libraryPath=python_libraries.shared(self._folder, self.description.identifier),
         )
+        require_success(slave)
         self.holds_python = python_libraries.prepare(slave.dll, self._folder)
         slave.instantiate(loggingOn=True, **self._logging())
         return slave
@@ -159,7 +169,7 @@ class InProcess(WithStates):
         try:
             for transfer in transfers:
                 setattr(self.place, counted, getattr(self.place, counted) + 1)
-                if (status := transfer.call()) > WARNING:
+                if not succeeded(status := transfer.call()):
                     raise self.failed(transfer.name, status)
         except SystemError as error:
             raise self.raised(transfer.name, error) from error
@@ -175,7 +185,7 @@ class InProcess(WithStates):
 
         def set_from(board: Vector) -> None:
             self.place.setter = 0  # the inputs move on from what was set
-            if not self.ended and (status := varying.set(board)) > WARNING:
+            if not self.ended and not succeeded(status := varying.set(board)):
                 raise self.failed(varying.name, status)
 
         return set_from
@@ -250,7 +260,7 @@ class InProcess(WithStates):
 
     def stepped(self, status: int) -> None:
         """Ends a step that returned `status`."""
-        if status > WARNING:
+        if not succeeded(status):
             raise self.failed(self.do_step, status, passing=status in (DISCARD, ERROR))
         self.place.time = self.place.end
 
@@ -269,7 +279,7 @@ class InProcess(WithStates):
     # --- ends -----------------------------------------------------------------------------
 
     def failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
-        self._status = max(self._status, status)
+        self._status = worse(self._status, status)
         named = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
         if status == DISCARD and self.policy.discard == "retry":
             why = "in steps of 1/1024 too" if self.retry else Retry.why_not(self.description)
@@ -280,7 +290,7 @@ class InProcess(WithStates):
     def raised(self, call: str, error: SystemError) -> FmuFault:
         """The fault of a Python FMU whose library went on after an exception, which ctypes finds
         when the call returns."""
-        self._status = max(self._status, ERROR)
+        self._status = worse(self._status, ERROR)
         cause = error.__cause__ or error
         what = f"{call} left {type(cause).__name__} behind: {cause}"
         return self._fault(what, self.time)
@@ -306,7 +316,7 @@ class InProcess(WithStates):
                 if self._status < ERROR and self._initialized:
                     terminate = f"fmi{self.description.fmi}Terminate"
                     status = slave.dll[terminate](ctypes.c_void_p(slave.component))
-                    fault = self.failed(terminate, status) if status > WARNING else None
+                    fault = None if succeeded(status) else self.failed(terminate, status)
                 if self._status < FATAL:
                     slave.freeInstance()
             return fault

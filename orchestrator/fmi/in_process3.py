@@ -17,7 +17,7 @@ from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.setter import Places
 from hapticlink.orchestrator.fmi.start_values import wide
-from hapticlink.orchestrator.fmi.status import WARNING
+from hapticlink.orchestrator.fmi.status import succeeded
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
@@ -48,7 +48,7 @@ class InProcess3(InProcess):
         return advance
 
     def _settled(self, status: int, time: float) -> int:
-        if self.told[1] and status <= WARNING:
+        if self.told[1] and succeeded(status):
             self._end(self.reached.value)
         return status
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.fmi.status import WARNING
+from hapticlink.orchestrator.fmi.status import succeeded
 from hapticlink.orchestrator.fmi.transfer import transfers
 from hapticlink.orchestrator.fmi.variables import Scalar
 
@@ -61,4 +61,4 @@ class Varying:
                 if same == reference and other >= order
             )
         status = self._set_values()
-        return status if status > WARNING else self._set_derivatives()
+        return self._set_derivatives() if succeeded(status) else status

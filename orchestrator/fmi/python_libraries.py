@@ -3,15 +3,28 @@
 They destroy the static that holds the interpreter and then, in the library's destructor, drop it
 once more: memory is corrupted as the process ends. Dropped while Python still runs, by the function
 that they export for it, it is null by then. An FMU without its Python module crashes them at once.
+
+Since they must stay loaded until then, FMUs whose libraries have the same bytes share one, under a
+path that does not change from run to run: each path of its own would cost 0.3 MB and 8 memory maps
+for the rest of the process.
 """
 
 from __future__ import annotations
 
 import atexit
 import ctypes
+import hashlib
 import os
+import shutil
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
+
+from fmpy import platform, platform_tuple, sharedLibraryExtension
+
+from hapticlink.fmus import cache as fmu_cache
+from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base import temporary_folders
 
 _kept: dict[int, ctypes.CDLL] = {}
 """By handle: a reference of our own, so that FMPy's unloading leaves the library in its place."""
@@ -34,3 +47,44 @@ def prepare(loaded: ctypes.CDLL, folder: str) -> bool:
         if (resources / f"{name}.py").is_file():
             return True
     raise ValueError("resources/slavemodule.txt names no module beside it; build the FMU again")
+
+
+def shared(folder: str, identifier: str) -> str | None:
+    """The path from which to load the library of the Python FMU that is unpacked in `folder`: the
+    same one for all libraries of the same bytes. None for other FMUs, and for a library that others
+    lie beside, which it may need."""
+    if not Path(folder, "resources", "slavemodule.txt").exists():
+        return None
+    for name in (platform, platform_tuple):
+        library = Path(folder, "binaries", name, f"{identifier}{sharedLibraryExtension}")
+        if library.is_file() and [*library.parent.iterdir()] == [library]:
+            content = library.read_bytes()
+            digest = hashlib.sha256(content).hexdigest()
+            return str(_stored(content, digest))
+    return None
+
+
+def _stored(content: bytes, digest: str) -> Path:
+    path = _libraries() / f"{digest}{sharedLibraryExtension}"
+    with suppress(OSError):
+        if hashlib.sha256(path.read_bytes()).hexdigest() == digest:
+            return path
+    path.parent.mkdir(parents=True, exist_ok=True)  # where the cache has been removed meanwhile
+    with atomic_file(path) as unfinished:
+        unfinished.write_bytes(content)
+    return path
+
+
+@cache
+def _libraries() -> Path:
+    """In the cache of built FMUs; a folder of this process where there is none."""
+    root = fmu_cache.folder()
+    if root is not None:
+        with suppress(OSError):
+            folder = root / "libraries"
+            folder.mkdir(parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK | os.X_OK):
+                return folder
+    folder = Path(temporary_folders.new())
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder

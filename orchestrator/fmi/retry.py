@@ -10,7 +10,7 @@ from typing import Any
 from hapticlink.orchestrator.fmi.capabilities import STATE, VARIABLE_STEP
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance_location import Place
-from hapticlink.orchestrator.fmi.status import DISCARD, WARNING
+from hapticlink.orchestrator.fmi.status import DISCARD, succeeded
 
 HALVINGS = 10
 
@@ -70,7 +70,7 @@ class Retry:
         saved = self.saved[depth]
         if depth == 0:
             self.begin = time
-        if (status := saved.save()) > WARNING:
+        if not succeeded(status := saved.save()):
             return status
         return self.after(self._advance(time, size), time, size, depth)
 
@@ -79,12 +79,12 @@ class Retry:
         if status != DISCARD or depth == HALVINGS:
             return status
         self.smaller += depth == 0
-        if (status := self.saved[depth].restore()) > WARNING:
+        if not succeeded(status := self.saved[depth].restore()):
             return status
         half = size / 2
-        if (status := self.step(time, half, depth + 1)) > WARNING:
+        if not succeeded(status := self.step(time, half, depth + 1)):
             return status
-        if (status := self.renew(time + half - self.begin)) > WARNING:
+        if not succeeded(status := self.renew(time + half - self.begin)):
             return status
         return self.step(time + half, half, depth + 1)
 

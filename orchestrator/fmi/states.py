@@ -8,7 +8,7 @@ from typing import Any
 from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.retry import Saved
-from hapticlink.orchestrator.fmi.status import ERROR, WARNING
+from hapticlink.orchestrator.fmi.status import ERROR, succeeded
 
 
 class WithStates(Instance):
@@ -26,7 +26,7 @@ class WithStates(Instance):
         """The fault of a call that returned `status`."""
 
     def save(self, slot: int = 0) -> None:
-        if (status := self.slot(slot).save()) > WARNING:
+        if not succeeded(status := self.slot(slot).save()):
             raise self.failed(f"fmi{self.description.fmi}GetFMUstate", status)
         self._saved_time[slot] = self.time
 
@@ -37,7 +37,7 @@ class WithStates(Instance):
         return self._saved[slot]
 
     def rollback(self, slot: int = 0) -> None:
-        if (status := self._saved[slot].restore()) > WARNING:
+        if not succeeded(status := self._saved[slot].restore()):
             raise self.failed(f"fmi{self.description.fmi}SetFMUstate", status)
         self.place.time, self.place.ended = self._saved_time[slot], 0
         self._status = 0

@@ -7,14 +7,11 @@ until the second sample.
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.hold import Vector
+from hapticlink.orchestrator.holds.laws import LAWS
 
 
 class FirstOrder(OfSamples):
+    laws = LAWS["FIRST_ORDER"]
     degree = 1
     order = 2
     interpolates = True
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        stamp, newest = self._samples[-1]
-        return newest + self._samples.slope() * (tick - stamp + ahead)

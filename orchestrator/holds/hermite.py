@@ -9,26 +9,12 @@ hold. With one sample it is the first-order hold from the derivative.
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.hold import Vector
+from hapticlink.orchestrator.holds.laws import LAWS
 
 
 class Hermite(OfSamples):
+    laws = LAWS["HERMITE"]
     needs = "derivative"
     degree = 3
     order = 4
     interpolates = True
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        n = self._size
-        stamp, newest = self._samples[-1]
-        if len(self._samples) < 2:
-            return newest[:n] + newest[n:] * self._seconds(tick - stamp + ahead)
-        before, first = self._samples[0]
-        s, width = (tick - before + ahead) / (stamp - before), self._seconds(stamp - before)
-        falling, rising = (1 - s) * (1 - s), s * s
-        return (
-            (1 + 2 * s) * falling * first[:n]
-            + s * falling * width * first[n:]
-            + (3 - 2 * s) * rising * newest[:n]
-            + (s - 1) * rising * width * newest[n:]
-        )

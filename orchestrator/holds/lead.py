@@ -7,12 +7,9 @@ constant over the period, and no delay at low frequency. Zero-order until the se
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.hold import Vector
+from hapticlink.orchestrator.holds.laws import LAWS
 
 
 class Lead(OfSamples):
+    laws = LAWS["LEAD"]
     order = 2
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        newest = self._samples[-1][1]
-        return newest + (newest - self._samples[0][1]) / 2

@@ -11,19 +11,20 @@ diagonal, so that the result does not depend on units.
 angle: an angle (rad, deg, ...) that its FMU wraps. Each sample is unwrapped by whole turns relative
 to the sample before.
 
-Matrices behind a hold that only returns samples (`gives_samples`) need none of this.
+Matrices behind a hold that only returns samples (`gives_samples`) need none of this. The compiled
+loop finds eigenvectors by Jacobi's method (run/compiled/manifolds.c), here LAPACK does: their
+matrices agree to rounding, all other holds to the last bit.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.holds.symmetric import eigen
 
 
 class Projector(Hold):
@@ -35,7 +36,7 @@ class Projector(Hold):
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         # Of what is no projector, too: no rank is negative or larger than the number of rows.
-        trace = max(0.0, _sum_in_order(sample[:: self.n + 1].tolist()))
+        trace = max(0.0, float(sample[:: self.n + 1].sum()))
         rank = round(min(trace, self.n))
         if rank != self._rank:
             self.hold, self._rank = self._make(), rank
@@ -43,12 +44,10 @@ class Projector(Hold):
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         x = self.hold.value(tick, ahead).reshape(self.n, self.n)
-        values, vectors = eigen(((x + x.T) / 2).tolist())
-        # By how many it is preceded: larger ones, and as large ones with a lower index.
-        places = [sum(_before(values, other, k) for other in range(self.n)) for k in range(self.n)]
-        return _squared(
-            [[r for r, at in zip(row, places, strict=True) if at < self._rank] for row in vectors]
-        )
+        _, vectors = _eigen((x + x.T) / 2)
+        largest = vectors[:, self.n - self._rank :]
+        projector: Vector = largest @ largest.T
+        return projector.ravel()
 
 
 class Semidefinite(Hold):
@@ -66,32 +65,19 @@ class Semidefinite(Hold):
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         x = self.hold.value(tick, ahead).reshape(self.n, self.n)
         outer = np.outer(self._scale, self._scale)
-        values, vectors = eigen(((x + x.T) / (2 * outer)).tolist())
-        roots = [math.sqrt(value if value > 0.0 else 0.0) for value in values]
-        return _squared(np.multiply(vectors, roots).tolist()) * outer.ravel()
+        values, vectors = _eigen((x + x.T) / (2 * outer))
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        matrix: Vector = (root @ root.T) * outer
+        return matrix.ravel()
 
 
-def _sum_in_order(values: Iterable[float]) -> float:
-    """The sum of values, one after the other; Python's `sum` compensates rounding errors since
-    3.12, and NumPy's takes another order."""
-    total = 0.0
-    for value in values:
-        total += value
-    return total
-
-
-def _before(values: Sequence[float], i: int, k: int) -> bool:
-    return values[i] > values[k] or (values[i] == values[k] and i < k)
-
-
-def _squared(root: Sequence[Sequence[float]]) -> Vector:
-    """root root^T, in one row."""
-    products = (
-        _sum_in_order(x * y for x, y in zip(one, other, strict=True))
-        for one in root
-        for other in root
-    )
-    return np.fromiter(products, np.float64, len(root) ** 2)
+def _eigen(matrix: Vector) -> tuple[Vector, Vector]:
+    """The eigenvalues of a symmetric matrix, increasing, and its eigenvectors as columns; NaN where
+    an entry is not finite, which LAPACK would not take."""
+    if not np.isfinite(matrix).all():
+        return np.full(len(matrix), np.nan), np.full_like(matrix, np.nan)
+    values, vectors = np.linalg.eigh(matrix)
+    return values, vectors
 
 
 class Unwrapped(Hold):

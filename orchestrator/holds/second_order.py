@@ -9,20 +9,12 @@ omega H = 2.61. With two samples it is the first-order hold, with one the zero-o
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.hold import Vector
+from hapticlink.orchestrator.holds.laws import LAWS
 
 
 class SecondOrder(OfSamples):
+    laws = LAWS["SECOND_ORDER"]
     depth = 3
     degree = 2
     order = 3
     interpolates = True
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        samples = self._samples
-        stamp, newest = samples[-1]
-        s, slope = tick - stamp + ahead, samples.slope()
-        if len(samples) < 3:
-            return newest + slope * s
-        curve = (slope - samples.slope(-2)) / (stamp - samples[0][0])
-        return newest + slope * s + curve * (s * (s + stamp - samples[-2][0]))

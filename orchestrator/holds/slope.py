@@ -8,17 +8,10 @@ pose as an output as well: a sample is the velocity followed by the pose (its un
 
 from __future__ import annotations
 
-import numpy as np
-
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.hold import Vector
+from hapticlink.orchestrator.holds.laws import LAWS
 
 
 class Slope(OfSamples):
+    laws = LAWS["SLOPE"]
     needs = "integral"
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        if len(self._samples) < 2:
-            return np.zeros(self._size)
-        (before, first), (stamp, newest) = self._samples[0], self._samples[1]
-        return (newest - first)[self._size :] / self._seconds(stamp - before)

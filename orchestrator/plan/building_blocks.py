@@ -59,7 +59,7 @@ def publish_ended(system: System, event: Event, continuous: list[Fmu]) -> Iterat
         for fmu in continuous:
             yield from publish(system, fmu)
         for fmu in continuous:
-            if fmu.name in system.get_after_set and system.into(fmu.name):
+            if fmu.name in system.coupling.get_after_set and system.into(fmu.name):
                 yield Set(fmu.name, now=True)
                 yield from publish(system, fmu)
 
@@ -74,7 +74,7 @@ def feed(system: System, event: Event, fmu: Fmu, part: int = 0) -> Iterator[Oper
     incoming = system.into(fmu.name)
     width = Fraction(0)
     if not fmu.sampled:
-        width = Fraction(dticks(event, fmu), system.substeps.get(fmu.name, 1))
+        width = Fraction(dticks(event, fmu), system.coupling.substeps.get(fmu.name, 1))
     orders = {c.name: held_polynomials.order(system, c) for c in incoming if c.hold}
     for name, order in orders.items():
         if order:
@@ -91,7 +91,7 @@ def dticks(event: Event, fmu: Fmu) -> int:
 
 def step(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
     """Step an FMU whose inputs are set; inputs of a plant are updated before each substep."""
-    parts = 1 if fmu.sampled else system.substeps.get(fmu.name, 1)
+    parts = 1 if fmu.sampled else system.coupling.substeps.get(fmu.name, 1)
     for part in range(parts):
         if part:
             yield from feed(system, event, fmu, part)

@@ -31,7 +31,7 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
     system, timeline = plan.system, plan.system.timeline
     base = timeline.base
     yield LEGEND
-    yield f"ticks of {base.numerator}/{base.denominator} s, {system.coupling}"
+    yield f"ticks of {base.numerator}/{base.denominator} s, {system.coupling.scheme}"
     for clock in timeline.clocks:
         units = ", ".join(
             u.name + (" (sampled)" if u.sampled else "")
@@ -80,8 +80,8 @@ def _steps(clock: Clock) -> str:
 
 def _fetched(system: System) -> Iterator[str]:
     """How many outputs of each FMU are fetched, and how many of these are written."""
-    written = system.recorded
-    rows = f" in every row of {system.every}" if system.every > 1 else ""
+    written = system.recording.outputs
+    rows = f" in every row of {system.recording.every}" if system.recording.every > 1 else ""
     for u in system.fmus:
         names = [s.name for s in u.description.outputs]
         many = len([n for n in names if written is None or f"{u.name}.{n}" in written])

@@ -54,17 +54,19 @@ class Plan:
     def _made(self, kind: Event | Part) -> Block:
         if isinstance(kind, Part):
             return step_control.part(self.system, kind, self._ordered)
-        if self.system.step_control:
+        if self.system.coupling.step_control:
             return step_control.block(self.system, kind, self._ordered)
         return self._ordered(self.system, kind)
 
     def _ordered(self, system: System, event: Event) -> Block:
         """The operations of `event` in the order of the coupling scheme. Raises InputFault for a
         scheme of a plugin that gives anything else."""
-        block = SCHEMES[system.coupling].block(system, event)
+        block = SCHEMES[system.coupling.scheme].block(system, event)
         if not isinstance(block, tuple) or not all(isinstance(op, Operation) for op in block):
             what = shortened(repr(block))
-            raise InputFault(f"coupling = {system.coupling!r}: {what} is no tuple of operations")
+            raise InputFault(
+                f"coupling = {system.coupling.scheme!r}: {what} is no tuple of operations"
+            )
         return block
 
     def check(self) -> None:
@@ -78,11 +80,13 @@ class Plan:
         left = [u.name for u in self.system.fmus if u.clock in going and u.name not in stepped]
         left += [f"the rows of {f.clock}" for f in event.firings if f.clock not in recorded]
         if left:
-            raise InputFault(f"coupling = {self.system.coupling!r} leaves out {', '.join(left)}")
+            raise InputFault(
+                f"coupling = {self.system.coupling.scheme!r} leaves out {', '.join(left)}"
+            )
 
     def loops(self) -> tuple[AlgebraicLoop, ...]:
         """The algebraic loops among FMUs that the scheme puts in an order, in that order."""
-        ordered = SCHEMES[self.system.coupling].ordered(self.system)
+        ordered = SCHEMES[self.system.coupling.scheme].ordered(self.system)
         return tuple(dependency_order.loops(self.system, ordered))
 
     def unrolled(self, event: Event) -> Iterator[Operation]:

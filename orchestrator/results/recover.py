@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.results import rows
+from hapticlink.orchestrator.results import folder_lock, rows
 from hapticlink.orchestrator.results.files import make_csv, write_json
 from hapticlink.orchestrator.results.run_folder import RUN
 from hapticlink.orchestrator.results.tables import load
@@ -30,13 +30,19 @@ def recover(
     folder: Path, kind: str = "Killed", message: str = KILLED, ended: bool = False
 ) -> dict[str, Recovered]:
     """What was recovered, by rate; run.json has it too, and a fault of this kind with this message
-    where it did not say how the run ended. Raises InputFault where there is no run, or where it
-    still goes on; `ended` where it is known not to."""
-    run = load(folder).run
-    end = run["end"]
+    where it did not say how the run ended. Raises InputFault where there is no run, where it still
+    goes on (`ended`: it is known not to), and where another one writes to the folder."""
+    end = load(folder).run["end"]
     process = None if ended or os.name != "posix" else end.get("process")
     if process and temporary_folders.lives(process):
         raise InputFault(f"{folder}: its run goes on, in process {process}")
+    with folder_lock.held(folder):
+        return _recovered(folder, kind, message)
+
+
+def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
+    run = load(folder).run
+    end = run["end"]
     found = {}
     for name in run["rates"]:
         table = folder / f"{name}.csv"

@@ -8,14 +8,14 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import Interrupted
 from hapticlink.orchestrator.results import rows
 from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
-from hapticlink.orchestrator.results.tables import Vector
+from hapticlink.orchestrator.results.record import End, RecordedFault, RunEnding, RunSetup, content
 
 ROOM = 1 << 14
 """Bytes reserved in run.json for how the run ends, in case the disk is full by then."""
@@ -23,16 +23,16 @@ RUN = "run.json"
 
 
 class RunFolder:
-    """The folder of a run. `story` is the content of run.json from the first row on; without it no
-    run.json is written.
+    """The folder of a run. `setup` is in run.json from the first row on; without it no run.json is
+    written.
 
     A context manager that records how the run ended in run.json even when an exception or a second
     signal, which ends the process at once, breaks it off. `published`: the folder has the results
     of this run. csv: whether its tables become CSVs.
     """
 
-    def __init__(self, folder: Path, story: dict[str, Any] | None = None, csv: bool = True) -> None:
-        self.folder, self.published, self._story, self._csv = folder, False, story, csv
+    def __init__(self, folder: Path, setup: RunSetup | None = None, csv: bool = True) -> None:
+        self.folder, self.published, self._setup, self._csv = folder, False, setup, csv
         self._recorders: list[Recorder] = []
 
     def __enter__(self) -> RunFolder:
@@ -82,9 +82,7 @@ class RunFolder:
         if any(recorder.last is None for recorder in self._recorders):
             return
         earlier = _listed(self.folder)
-        if self._story is not None:
-            end = {"reason": "running", "process": os.getpid()}
-            write_json(self.folder / RUN, self._story | {"end": end}, ROOM)
+        self._write(End(process=os.getpid()), room=ROOM)
         for recorder in self._recorders:
             recorder.publish()
         kept = {RUN, *(name for recorder in self._recorders for name in recorder.files)}
@@ -92,7 +90,7 @@ class RunFolder:
             (self.folder / name).unlink(missing_ok=True)
         self.published = True
 
-    def end(self, ending: dict[str, Any], columns: Mapping[str, Sequence[str]]) -> None:
+    def end(self, ending: RunEnding, columns: Mapping[str, Sequence[str]]) -> None:
         """Record how the run ended in run.json. A run without rows, for which empty tables with
         these `columns` by clock are written, does so only if no earlier run has rows there. Raises
         OSError if the disk is full."""
@@ -102,16 +100,17 @@ class RunFolder:
                 with atomic_file(self.folder / name) as empty:
                     empty.write_bytes(rows.header(("time", *names)))
             self.published = True
-        if self.published and self._story is not None:
-            write_json(self.folder / RUN, self._story | ending)
+        if self.published and self._setup is not None:
+            write_json(self.folder / RUN, content(self._setup) | content(ending))
 
-    def end_in_place(self, ending: dict[str, Any]) -> None:
+    def end_in_place(self, ending: RunEnding) -> None:
         """As `end`, on a full disk, in the bytes reserved: everything, or only how the run ended,
         or nothing if the disk cannot write in place."""
-        if self.published and self._story is not None:
-            least = {key: ending[key] for key in ("end", "fault")}
+        if self.published and self._setup is not None:
+            setup, whole = content(self._setup), content(ending)
+            least = {key: whole[key] for key in ("end", "fault")}
             with suppress(OSError):
-                write_over(self.folder / RUN, self._story | ending, self._story | least)
+                write_over(self.folder / RUN, setup | whole, setup | least)
 
     def _interrupted(self) -> None:
         for left in self.folder.glob(".run.*.json"):  # unfinished files
@@ -123,10 +122,17 @@ class RunFolder:
             recorder.__exit__()
 
     def _broken_off(self, reason: str, error: BaseException) -> None:
-        fault = {"kind": type(error).__name__, "time": self.last, "message": str(error)}
-        ending = {"end": {"reason": reason, "time": self.last}, "fault": fault}
-        if self.published and self._story is not None:
-            write_json(self.folder / RUN, self._story | ending)
+        if self.published:
+            fault = RecordedFault(type(error).__name__, self.last, str(error))
+            self._write(End(reason, self.last), fault)
+
+    def _write(self, end: End, fault: RecordedFault | None = None, room: int = 0) -> None:
+        """Write what is known of a run that has not ended regularly."""
+        if self._setup is not None:
+            ending = content(RunEnding(end, fault))
+            known = ("end", "fault") if fault else ("end",)
+            told = content(self._setup) | {key: ending[key] for key in known}
+            write_json(self.folder / RUN, told, room)
 
 
 def _has_rows(folder: Path) -> bool:

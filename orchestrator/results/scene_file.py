@@ -11,10 +11,7 @@ from hapticlink.orchestrator.scene.overrides import toml
 
 def scene_file(run: Results) -> str:
     """The text of a scene file that stands alone: what run.json has of the scene."""
-    scene = _without_none(run.run["scene"])
-    for device in (scene.get("device"), *scene.get("devices", {}).values()):
-        if device:
-            del device["sensing"]  # the scene's own
+    scene = _without_none(run.record.scene)
     tables = {key: value for key, value in scene.items() if isinstance(value, Mapping)}
     lines = [f"{key} = {_value(key, v)}" for key, v in scene.items() if key not in tables]
     for key, table in tables.items():

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.record import first_error
 from hapticlink.orchestrator.results.tables import Results
 
 
@@ -17,7 +18,7 @@ def scene_part(results: Results, name: str, kind: Any) -> Any:
     """The table `name` of a run's scene as a record of `kind`, None where the scene has none.
     Raises InputFault where it is not as this version writes it."""
     try:
-        given = results.run["scene"][name]
+        given = results.record.scene[name]
         return None if given is None else _adapter(kind).validate_python(given)
     except KeyError:
         why = "is missing"
@@ -40,11 +41,3 @@ def by_user(first: Device | None, others: Mapping[str, Device] | None) -> dict[s
 @cache  # which takes longer to make than most figures take to draw
 def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
-
-
-def first_error(error: ValidationError) -> str:
-    """The first of the findings, with the keys that lead to it."""
-    first = error.errors(include_url=False, include_input=False)[0]
-    table = first["type"] == "dataclass_type"
-    why = "input should be a valid dictionary" if table else first["msg"].lower()
-    return f"{'.'.join(map(str, first['loc'])) or 'its content'}: {why}"

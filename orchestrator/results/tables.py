@@ -18,7 +18,8 @@ import numpy as np
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.results import rows
+from hapticlink.orchestrator.results import record, rows
+from hapticlink.orchestrator.results.record import RunRecord
 
 TABLES = (".csv", rows.SUFFIX)
 """Endings of the names of tables."""
@@ -94,6 +95,12 @@ class Results:
     run: dict[str, Any]
     tables: dict[str, Table]
 
+    @cached_property
+    def record(self) -> RunRecord:
+        """The content of run.json as a record. Raises InputFault where it is of another version, or
+        was changed."""
+        return record.read(self.run, self.folder)
+
     @property
     def haptics(self) -> Table:
         """The Table of the haptic rate."""
@@ -117,20 +124,22 @@ def _place(path: Path) -> Path:
 
 
 def load(folder: Path | str) -> Results:
-    """Reads a run's folder. Raises InputFault if it contains no run, or one that was changed."""
+    """Reads a run's folder. Raises InputFault if it contains no run, one of another version, or one
+    that was changed."""
     folder = Path(folder)
     tables: dict[str, Table] = {}
     try:
         run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        for name in run["rates"]:
-            if any(name + suffix in run["files"] for suffix in TABLES):
-                tables[name] = read_table(folder / f"{name}.csv", tables)
-            else:  # nothing of it is recorded
-                tables[name] = Table(("time",), np.zeros((0, 1)), tables)
-    except (OSError, ValueError, TypeError, KeyError) as error:
+    except (OSError, ValueError) as error:
         why = f"{type(error).__name__}: {error}"
         raise InputFault(f"{folder}: not the folder of a run: {why}") from error
-    return Results(folder, run, tables)
+    results = Results(folder, run, tables)
+    for name in results.record.rates:
+        if any(name + suffix in results.record.files for suffix in TABLES):
+            tables[name] = read_table(folder / f"{name}.csv", tables)
+        else:  # nothing of it is recorded
+            tables[name] = Table(("time",), np.zeros((0, 1)), tables)
+    return results
 
 
 def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
@@ -144,7 +153,9 @@ def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
             first = file.readline()
             lines = chain([first], file)  # the text of all of them would take twice what they take
             found = np.loadtxt(lines, delimiter=",", ndmin=2) if first else None
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise InputFault(f"{path}: {error.strerror}: run the scene again") from error
+    except ValueError as error:
         raise InputFault(f"{path}: {_malformed(path) or error}: run the scene again") from error
     values = np.zeros((0, len(columns))) if found is None else found
     why = "" if values.shape[1] == len(columns) else _malformed(path)

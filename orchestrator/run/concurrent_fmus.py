@@ -1,11 +1,12 @@
-"""FMUs beside the haptic loop of a run in real time, as on the graphics computer of the report.
+"""FMUs that run beside the haptic loop in real time, as on the graphics computer of the report.
 
 The steps of plants at other rates than the haptic one are taken in a thread, one for each clock,
-while the haptic loop goes on. Their outputs are samples of the end t of the step. Those that are
-there when t comes act as without real time, to the bit. The others are late: the haptic loop reads
-and pushes them at its first event after they are done, with the stamp t and that arrival, and the
-next step begins there: with the inputs known by then, from t to the clock's first communication
-point that is not past, or for an FMU of fixed step size to the next one.
+while the haptic loop goes on. Their outputs are samples with the stamp t of the step's end. Samples
+that arrive in time act exactly as they would without real-time pacing. Others are late: the haptic
+loop reads them at its first event after the step has ended, and holds receive them with the stamp t
+and that arrival time. The next step begins at that event, with the inputs known by then, and takes
+the FMU from t to the clock's first communication point that is not past, or, if its step size is
+fixed, to the next one.
 """
 
 from __future__ import annotations
@@ -149,7 +150,7 @@ def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
         for fmu in (u for u in system.fmus if u.clock == clock.name):
             own = [op for op in block if getattr(op, "fmu", None) == fmu.name]
             steps = [op for op in own if isinstance(op, Step)]
-            if system.coupling == "iterated" or system.step_control:
+            if system.coupling.scheme == "iterated" or system.coupling.step_control:
                 unable[fmu.name] = "its steps may be repeated"
             elif fmu.sampled or own[-1:] != steps:
                 unable[fmu.name] = "its outputs are due within the instant"

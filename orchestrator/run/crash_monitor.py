@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.faults import InputFault
 
 
 @contextmanager
@@ -80,7 +81,8 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     sys.stdin.buffer.read()
-    with suppress(OSError):  # a full disk, or a folder that was removed
+    # A full disk, a folder that was removed, or one that another run writes to already.
+    with suppress(OSError, InputFault):
         record_crash(Path(sys.argv[1]), int(sys.argv[2]))
 
 

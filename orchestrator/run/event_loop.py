@@ -2,32 +2,31 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
 from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
+from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import Delay, delays
+from hapticlink.orchestrator.plan.sample_ages import causal, delays
+from hapticlink.orchestrator.results.record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.bind_operations import Stop
 from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.machine import too_long
 from hapticlink.orchestrator.run.energy.balance import unstable
-from hapticlink.orchestrator.run.energy.meter import Energy
-from hapticlink.orchestrator.run.fixed_point import Iterations
 from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, kinds
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.run.step_check import StepErrors
-from hapticlink.orchestrator.run.step_control import Steps
-from hapticlink.orchestrator.system.haptic_loop import WORKSPACE
+from hapticlink.orchestrator.system.ports import power_across_rates
+from hapticlink.orchestrator.system.system import System
 
 Progress = Callable[[float], None]
 PAUSE = 0.02
@@ -39,12 +38,8 @@ class Outcome:
     """How a run ended.
 
     end_time: time of the last row (s). fault: None for a regular end. asked: the FMU that requested
-    the end, and how. published: whether the folder has rows of this run. wall_time, table_time,
-    step_time (s): of the loop, of writing its tables as CSV, of doStep by FMU. calls: counts by FMU
-    and call. isolated: why an FMU ran in a process of its own. held: how often outputs of an FMU
-    were held since they were not finite. smaller_steps: number of steps repeated with smaller
-    ones. in_python: the operations that were carried out in Python rather than in C, "everything"
-    if there was no compiled loop, with the reason. real_time: what became of a run in real time.
+    the end, and how. published: whether the folder has rows of this run. wall_time, table_time (s):
+    of the loop, of writing its tables as CSV. details: what is recorded of it besides.
     """
 
     end_time: float = 0.0
@@ -54,19 +49,22 @@ class Outcome:
     published: bool = False
     wall_time: float = 0.0
     table_time: float = 0.0
-    step_time: dict[str, float] = field(default_factory=dict)
-    calls: dict[str, dict[str, int]] = field(default_factory=dict)
-    isolated: dict[str, str] = field(default_factory=dict)
-    held: dict[str, int] = field(default_factory=dict)
-    smaller_steps: dict[str, int] = field(default_factory=dict)
-    delays: dict[str, Delay] = field(default_factory=dict)
-    energies: dict[str, Energy] = field(default_factory=dict)
-    links: dict[str, dict[str, int]] = field(default_factory=dict)
-    iterations: Iterations | None = None
-    steps: dict[str, Steps] = field(default_factory=dict)
-    step_errors: dict[str, StepErrors] = field(default_factory=dict)
-    in_python: dict[str, str] = field(default_factory=dict)
-    real_time: dict[str, Any] | None = None
+    details: RunEnding = field(default_factory=RunEnding)
+
+    def ending(self, build_time: float) -> RunEnding:
+        """What run.json says of it; `build_time` (s) is that of the scene's FMUs."""
+        fault = None
+        if error := self.fault:
+            time = getattr(error, "time", None)
+            fault = RecordedFault(type(error).__name__, time, str(error))
+        return replace(
+            self.details,
+            end=End(self.reason, self.end_time, self.asked),
+            fault=fault,
+            timings=replace(
+                self.details.timings, build=build_time, run=self.wall_time, tables=self.table_time
+            ),
+        )
 
 
 def run(
@@ -85,13 +83,21 @@ def run(
         # Non-finite values are detected by 0 x NaN, for which numpy would warn.
         with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
             interrupt.check()
+            library, why = _library(plan.system)
+            if real_time and not library:
+                raise Fault(f"a run in real time needs the compiled loop: {why}")
             simulation = Simulation(plan.system, results, stack)
             if real_time:
                 stack.enter_context(real_time.of(plan, simulation))
-            loop = _loop(plan, simulation)
+            loop = (
+                CompiledLoop(plan, simulation, library)
+                if library
+                else PythonLoop(plan, simulation, {"everything": why})
+            )
             simulation.start()
             if real_time:
-                loop.prepare(kinds(plan))
+                assert isinstance(loop, CompiledLoop)
+                loop.events.prepare(kinds(plan))
                 stack.enter_context(real_time.pace.undisturbed())
             begin = shown = perf_counter()
 
@@ -99,7 +105,7 @@ def run(
                 nonlocal shown
                 time = plan.system.timeline.seconds(tick)
                 interrupt.check(time)
-                if real_time:
+                if real_time and isinstance(loop, CompiledLoop):
                     real_time.turn(loop)
                 if progress and perf_counter() - shown > PAUSE:
                     shown = perf_counter()
@@ -133,26 +139,40 @@ def run(
         outcome.published = results.published
         if simulation:
             outcome.end_time = results.last
-            outcome.step_time = {n: i.step_time for n, i in simulation.instances.items()}
-            outcome.isolated = simulation.isolated
-            outcome.held = {n: i.held for n, i in simulation.instances.items() if i.held}
-            smaller = {n: i.smaller_steps for n, i in simulation.instances.items()}
-            outcome.smaller_steps = {n: s for n, s in smaller.items() if s}
-            outcome.energies = simulation.meters.energies()
-            outcome.links = simulation.links()
-            found = {n: check.errors() for n, check in simulation.step_checks.items()}
-            outcome.step_errors = {n: errors for n, errors in found.items() if errors}
-            outcome.delays = delays(plan, loop.complete)
-            outcome.calls = {n: i.calls for n, i in simulation.instances.items()}
-            outcome.steps = loop.steps()
-            outcome.iterations = loop.iterations()
-            outcome.in_python = loop.in_python
-            outcome.real_time = real_time.report() if real_time else None
-            if outcome.fault is None and (why := _judged(outcome, simulation)):
-                outcome.reason, outcome.fault = "diverged", why
+            outcome.details = _details(plan, simulation, loop, real_time)
+            if outcome.fault is None and (diverged := _judged(outcome, simulation)):
+                outcome.reason, outcome.fault = "diverged", diverged
     if progress:
         progress(outcome.end_time)
     return outcome
+
+
+def _details(
+    plan: Plan, simulation: Simulation, loop: PythonLoop, real_time: RealTimeRun | None
+) -> RunEnding:
+    """What the objects of a run have counted and measured."""
+    system, instances = plan.system, simulation.instances
+    ages, energies = delays(plan, loop.complete), simulation.meters.energies()
+    errors = {name: check.errors() for name, check in simulation.step_checks.items()}
+    across = power_across_rates(system)
+    return RunEnding(
+        calls={name: i.calls for name, i in instances.items()},
+        delays=ages,
+        causal=causal(ages),
+        links=simulation.links(),
+        isolated=simulation.isolated,
+        held_outputs={name: i.held for name, i in instances.items() if i.held},
+        smaller_steps={name: i.smaller_steps for name, i in instances.items() if i.smaller_steps},
+        in_python=loop.in_python,
+        real_time=real_time.report() if real_time else None,
+        timings=Timings(steps={name: i.step_time for name, i in instances.items()}),
+        iterations=loop.iterations(),
+        unstable=unstable(system, energies),
+        step_errors={name: found for name, found in errors.items() if found},
+        controlled_steps=loop.steps(),
+        energies={name: e for name, e in energies.items() if name in across} or "none",
+        energies_within_a_rate={name: e for name, e in energies.items() if name not in across},
+    )
 
 
 def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
@@ -161,13 +181,13 @@ def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
     if (
         outcome.reason == "stop_when"
         and condition
-        and (system.block(condition.fmu), condition.variable) == WORKSPACE
-        and (why := unstable(system, outcome.energies))
+        and f"{system.block(condition.fmu)}.{condition.variable}" == WORKSPACE_MARGIN
+        and (why := outcome.details.unstable)
     ):
         what = f"left its workspace, and {why}: the loop is unstable"
         remedy = "take higher rates, weaker gains, another coupling or hold"
         return Diverged(condition.fmu, f"{what} ({remedy})", outcome.end_time, repeatable=True)
-    return simulation.balance.judge(outcome.energies, outcome.end_time)
+    return simulation.balance.judge(outcome.details.meters, outcome.end_time)
 
 
 def _reason(fault: Fault) -> str:
@@ -175,12 +195,11 @@ def _reason(fault: Fault) -> str:
     return next((reason for kind, reason in ends.items() if isinstance(fault, kind)), "fault")
 
 
-def _loop(plan: Plan, simulation: Simulation) -> PythonLoop:
-    """The compiled loop, or the one in Python where there is none."""
-    why = too_long(simulation)
-    if not why:
-        try:
-            return CompiledLoop(plan, simulation, load())
-        except Unavailable as reason:
-            why = str(reason)
-    return PythonLoop(plan, simulation, {"everything": why})
+def _library(system: System) -> tuple[ctypes.CDLL | None, str]:
+    """The compiled loop; None where it cannot run the system, with the reason."""
+    if why := too_long(system):
+        return None, why
+    try:
+        return load(), ""
+    except Unavailable as reason:
+        return None, str(reason)

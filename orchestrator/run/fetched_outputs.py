@@ -21,13 +21,16 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 def with_fetched(system: System) -> System:
     """The system with the outputs of each FMU that a run of it fetches."""
-    if system.recorded is None and system.every == 1:
+    recording = system.recording
+    if recording.outputs is None and recording.every == 1:
         return system
     every = tuple(f"{u.name}.{s.name}" for u in system.fmus for s in u.description.outputs)
-    written = every if system.recorded is None else system.recorded
+    written = every if recording.outputs is None else recording.outputs
     often, rows = {*_read(system)}, {*written}
-    fmus = tuple(_with(u, _ports(u, often), _ports(u, rows), system.every > 1) for u in system.fmus)
-    return replace(system, fmus=fmus, recorded=written)
+    fmus = tuple(
+        _with(u, _ports(u, often), _ports(u, rows), recording.every > 1) for u in system.fmus
+    )
+    return replace(system, fmus=fmus, recording=replace(recording, outputs=written))
 
 
 def _ports(fmu: Fmu, names: set[str]) -> set[str]:
@@ -64,7 +67,7 @@ def _read(system: System) -> Iterator[str]:
 def _of_itself(fmu: Fmu, system: System) -> Iterator[str]:
     """The outputs of an FMU by which its steps and its faults are judged."""
     description = fmu.description
-    controlled = system.step_control is not None and not fmu.sampled
+    controlled = system.coupling.step_control is not None and not fmu.sampled
     for scalar in description.outputs:
         if controlled or scalar.bound or scalar.port in TOLD.get(description.block or "", ()):
             yield scalar.name

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.plan.operations import Repeat
+from hapticlink.orchestrator.results.record import Iterations
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.jacobians import Through
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -19,21 +19,6 @@ from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.ports import beside
 from hapticlink.orchestrator.system.system import Connection, System
-
-
-@dataclass
-class Iterations:
-    """Counts of a run's fixed-point iterations: steps that were iterated, iterations and rollbacks
-    in all, the most iterations of a step, Jacobians evaluated by differences and by directional
-    derivatives, and steps that did not converge."""
-
-    steps: int = 0
-    iterations: int = 0
-    rollbacks: int = 0
-    max_iterations: int = 0
-    jacobians: int = 0
-    directional_jacobians: int = 0
-    unconverged: int = 0
 
 
 def total(counts: Iterable[Iterations]) -> Iterations | None:
@@ -70,7 +55,7 @@ class FixedPoint:
     ) -> None:
         system, signals = simulation.system, simulation.signals
         self._guess, self._body, self._again = calls
-        self._settings: Iteration = system.iteration
+        self._settings: Iteration = system.coupling.iteration
         self._signals, self._meters, self._dticks = signals, simulation.meters, operation.dticks
         self.counts = Iterations()
         self._seconds = system.timeline.seconds
@@ -172,9 +157,9 @@ def _constant(c: Connection, system: System) -> bool:
     """Whether the target's input is constant over its step and linear in the guess, and its outputs
     are those after the step."""
     return (
-        system.substeps.get(c.target, 1) == 1
+        system.coupling.substeps.get(c.target, 1) == 1
         and held_polynomials.order(system, c) == 0
-        and c.target not in system.get_after_set
+        and c.target not in system.coupling.get_after_set
         and c.latency is None
         and c.kind in (None, "table")
     )

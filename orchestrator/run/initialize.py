@@ -13,6 +13,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.loop_names import DEVICE
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -141,7 +142,6 @@ def _raise_unsettled(
                 raise FmuFault(fmu.name, said, 0.0, repeatable=True)
 
 
-DEVICE = "haptic_device"
 TOLD = {DEVICE: ("workspace_margin", "x_true")}
 """Outputs by which an unreachable start pose is told, by block."""
 

@@ -104,7 +104,7 @@ def _context(
             places[entries] = found.moving
             moving = Reader(signals, places.tolist(), work)
     if HOLDS[connection.hold or ""].needs == "spring":
-        of = spring(connection, system.springs)
+        of = spring(connection, system.energy.springs)
         assert of is not None
         if of not in shared:
             shared[of] = spring_holds.tank(of, system, signals)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import ctypes
 import gc
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -34,7 +33,7 @@ class Pace:
     """Schedule and statistics of a run; the compiled loop works on `c`.
 
     clock: time (ns) of a clock that is never set back; wait: waits until a time of that clock, or
-    shorter. By default those of the machine.
+    shorter. Without them `take` gets those of the machine.
     """
 
     def __init__(
@@ -42,52 +41,24 @@ class Pace:
         clock: Callable[[], int] | None = None,
         wait: Callable[[int], object] | None = None,
     ) -> None:
-        self.clock, self.wait = clock or time.perf_counter_ns, wait or self._sleep
-        self._injected = clock is not None
+        self._given = clock and wait and (clock, wait)
         self.lateness, self.steps = np.zeros(BINS, np.int64), np.zeros(BINS, np.int64)
         self.c = structures.Pace(most=MOST)
         self.c.lateness, self.c.steps = self.lateness.ctypes.data, self.steps.ctypes.data
 
-    def now(self) -> int:
-        return self.clock()
-
-    def _sleep(self, until: int) -> None:
-        time.sleep(max(until - self.clock(), 0) * 1e-9)
-
     def take(self, library: ctypes.CDLL) -> None:
-        """Give the compiled loop a clock: by default its own, which this object then uses, too."""
-        if self._injected:
-            self._calls: tuple[Any, Any] = _CLOCK(self.clock), _WAIT(self.wait)
-        else:
-            self.clock, self.wait = library.now, library.wait
-            self._calls = library.now, library.wait
+        """Take the clock, and give it to the compiled loop, whose own it is by default."""
+        self._calls: tuple[Any, Any] = library.now, library.wait
+        self.clock: Callable[[], int]
+        self.wait: Callable[[int], object]
+        self.clock, self.wait = self._given or self._calls
+        if self._given:
+            self._calls = _CLOCK(self.clock), _WAIT(self.wait)
         pointers = (ctypes.cast(call, ctypes.c_void_p).value for call in self._calls)
         self.c.clock, self.c.wait = pointers
 
-    def due(self, seconds: float) -> int:
-        """When the event of a simulated time is due (ns)."""
-        origin: int = self.c.origin
-        return origin + int(1e9 * seconds)
-
-    def begin(self, seconds: float) -> None:
-        """The haptic clock's event of a simulated time begins."""
-        c = self.c
-        c.begun, c.due = self.clock(), self.due(seconds)
-        late = c.begun - c.due
-        self.lateness[_bin(late)] += 1
-        c.latest = max(c.latest, late)
-        if late > c.most:
-            c.origin += late
-            c.moved += late
-
-    def end(self, period: float) -> None:
-        """It is complete; the next one is `period` (s) after it."""
-        c, time = self.c, self.clock()
-        took = time - c.begun
-        self.steps[_bin(took)] += 1
-        c.longest = max(c.longest, took)
-        c.missed += time - c.due > int(1e9 * period)
-        c.ticks += 1
+    def now(self) -> int:
+        return self.clock()
 
     @contextmanager
     def undisturbed(self) -> Iterator[None]:
@@ -126,13 +97,6 @@ def quantiles(bins: NDArray[np.int64], largest: int) -> dict[str, float]:
         for name, share in shares.items()
     }
     return found | {"max": 1e-9 * largest}
-
-
-def _bin(ns: int) -> int:
-    if ns < EXACT:
-        return max(ns, 0)
-    shift = ns.bit_length() - 7
-    return min(EXACT * shift + (ns >> shift), BINS - 1)
 
 
 def _upper(i: int) -> int:

@@ -10,9 +10,9 @@ from typing import Any
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run import concurrent_fmus
+from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.concurrent_fmus import ThreadWorker, Worker
 from hapticlink.orchestrator.run.pace import Pace
-from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.simulation import Simulation
 
 MANY = 4096
@@ -33,7 +33,7 @@ class RealTimeRun:
 
     def __init__(
         self,
-        turn: Callable[[Simulation, PythonLoop], object] | None = None,
+        turn: Callable[[Simulation, CompiledLoop], object] | None = None,
         clock: Callable[[], int] | None = None,
         wait: Callable[[int], object] | None = None,
         worker: Callable[[], Worker] = ThreadWorker,
@@ -57,7 +57,7 @@ class RealTimeRun:
             left = (side.close() for side in simulation.sides.values())
             self._abandoned = [name for name in left if name]
 
-    def turn(self, loop: PythonLoop) -> None:
+    def turn(self, loop: CompiledLoop) -> None:
         """Raises FmuFault where an FMU beside the loop hangs, and whatever the turn raises."""
         simulation = self._simulation
         for side in simulation.sides.values():

@@ -43,7 +43,7 @@ class SignalVector:
                     self._of_derivatives[connection.name] = span
                     end = span.stop + len(connection.inputs)
         self._credits = end
-        self.values = np.zeros(end + len(system.springs))
+        self.values = np.zeros(end + len(system.energy.springs))
 
     def fmu(self, name: str) -> slice:
         return self._of_fmu[name]
@@ -97,7 +97,7 @@ class SignalVector:
     def recorded(self, clock: str) -> dict[str, int] | None:
         """The columns `fmu.variable` of a clock's table with their indices, None where it has no
         table."""
-        span, written = self.clock(clock), self._system.recorded
+        span, written = self.clock(clock), self._system.recording.outputs
         names = {f"{f}.{v}": i for (f, v), i in self._of_scalar.items()}
         found = {n: i for n, i in names.items() if span.start <= i < span.stop}
         if written is None:

@@ -11,6 +11,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.results.files import Recorder
+from hapticlink.orchestrator.results.record import LinkCounts
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
@@ -52,7 +53,7 @@ class Simulation:
         self.isolated = isolated(system.fmus)
         self.instances = opened(system, self.signals, self.isolated, stack)
         stack.callback(self._dismiss)
-        repeated = system.step_control is not None or system.coupling == "iterated"
+        repeated = system.coupling.step_control is not None or system.coupling.scheme == "iterated"
         self.step_checks = {
             fmu.name: StepCheck(self.instances[fmu.name])
             for fmu in (() if repeated else system.fmus)
@@ -93,14 +94,14 @@ class Simulation:
             if derived := self._derived(incoming):
                 derive = self.instances[fmu.name].connect_derivatives
                 self.derivative_setters[fmu.name] = derive(*derived)
-            if fmu.name in self.system.get_after_set:
+            if fmu.name in self.system.coupling.get_after_set:
                 sources = [p for c in incoming for p in self.signals.sources(c)]
                 self.now_setters[fmu.name] = connect(scalars, sources)
         for clock in self.system.timeline.clocks:
             recorded = self.signals.recorded(clock.name)
             columns = None if recorded is None else [*recorded]
             places = [] if recorded is None else [*recorded.values()]
-            every = self.system.every
+            every = self.system.recording.every
             made = self._results.recorder(clock.name, columns, values, places, every)
             self.recorders[clock.name] = self._stack.enter_context(made)
             for fmu in self.system.fmus:
@@ -136,11 +137,7 @@ class Simulation:
         rows.sort(key=lambda row: row[1])
         return [r[0] for r in rows], [r[1] for r in rows], [r[2] for r in rows]
 
-    def links(self) -> dict[str, dict[str, int]]:
+    def links(self) -> dict[str, LinkCounts]:
         """Per connection with a latency, the number of samples sent, lost and overtaken."""
         links = {n: getattr(h, "link", None) for n, h in self.holds.items()}
-        return {
-            n: {"sent": k.sent, "lost": k.lost, "overtaken": k.overtaken}
-            for n, k in links.items()
-            if k
-        }
+        return {n: LinkCounts(k.sent, k.lost, k.overtaken) for n, k in links.items() if k}

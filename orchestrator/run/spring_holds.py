@@ -78,7 +78,7 @@ def join_sides(
     """Give the energy tank of each spring both sides: where its force goes back to the FMU that
     sets its far end, to act on that displacement, and the hold observes the work of it. A force
     that is late or converted is left out."""
-    for i, s in enumerate(system.springs):
+    for i, s in enumerate(system.energy.springs):
         fmu, _, port = s.set_position.partition(".")
         sets = next((c for c in system.into(fmu) if c.target_port == port), None)
         for c in system.out_of(fmu):

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,6 +29,7 @@ from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
+from hapticlink.orchestrator.results.record import StepErrors
 
 EVERY = 97
 """One step in so many is checked, which adds two half steps, a saved state and two reads to them. A
@@ -45,19 +45,6 @@ AT_REST = 1e-6
 
 ROOM = 256
 """Checks for which there is room at first."""
-
-
-@dataclass(frozen=True)
-class StepErrors:
-    """Of the steps of an FMU, `size` (s) the longest checked: the estimated sum of all e_k of an
-    output, the largest e_k, and the output and time (s) of the latter."""
-
-    checked: int
-    sum: float
-    largest: float
-    output: str
-    time: float
-    size: float
 
 
 class StepCheck:

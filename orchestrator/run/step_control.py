@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -13,6 +12,7 @@ from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.operations import Part
+from hapticlink.orchestrator.results.record import Steps
 from hapticlink.orchestrator.run.energy.bonds import bond
 from hapticlink.orchestrator.run.fixed_point import Unconverged
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -34,8 +34,8 @@ class Advancer:
         calls: Callable[[Part], Sequence[Call]],
     ) -> None:
         system, signals = simulation.system, simulation.signals
-        assert system.step_control is not None
-        self._settings = settings = system.step_control
+        assert system.coupling.step_control is not None
+        self._settings = settings = system.coupling.step_control
         self._clock, self._values, self._meters = clock, signals.values, simulation.meters
         self._calls, self._seconds = calls, system.timeline.seconds
         base, longest = system.timeline.base, system.timeline.clock(clock).longest
@@ -181,26 +181,6 @@ def _compared(
         for s in system.fmu[n].description.outputs
     ]
     return [output for output, follows in every if not follows] or [output for output, _ in every]
-
-
-@dataclass
-class Steps:
-    """Statistics of step control on a clock: steps taken, rejected for their error, failed in an
-    FMU, and forced (accepted at `min` although the error was too large); the shortest and longest
-    step (s). A step of doubling consists of its two halves."""
-
-    taken: int = 0
-    rejected: int = 0
-    failed: int = 0
-    forced: int = 0
-    shortest: float = 0.0
-    longest: float = 0.0
-
-    def count(self, size: float, forced: bool) -> None:
-        self.shortest = min(self.shortest, size) if self.taken else size
-        self.longest = max(self.longest, size)
-        self.taken += 1
-        self.forced += forced
 
 
 def integral(error: float, order: int) -> float:

@@ -2,150 +2,171 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
-from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.linkage import GraphicsCopy
+from hapticlink.orchestrator.base.loop_names import (
+    CONTROLLER,
+    DEVICE,
+    ENVIRONMENT,
+    HAND,
+    MECHANISM,
+    block_of_user,
+)
 from hapticlink.orchestrator.scene.rates import AnyRate
 from hapticlink.orchestrator.scene.scene import Scene
 
 
 @dataclass(frozen=True)
 class BlockPlan:
-    """A block of the scene with its settings and its rate; "haptics" or "graphics" for blocks of
-    the haptic loop."""
+    """An FMU that is built: `block` is the name in `components.blocks.BLOCKS` of the function that
+    builds it; the rate of a block of the haptic loop is "haptics" or "graphics"."""
 
     name: str
+    block: str
     rate: AnyRate
     settings: dict[str, Any]
-    kind: str = ""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """All blocks of a scene, planned once and handed on from the scene to the system."""
+
+    loop: tuple[BlockPlan, ...]
+    """Those of the haptic loop in its order, whether an FMU replaces them or not."""
+    replaced: Mapping[str, BlockPlan]
+    """Those of the loop that an FMU of the scene replaces, by name."""
+    own: tuple[BlockPlan, ...]
+    """The others of the loop."""
+    built: tuple[BlockPlan, ...]
+    """All that are built into FMUs: `own`, then those of [[fmu]] tables."""
+    rates: Mapping[str, AnyRate]
+    """The rate of each FMU: of the loop's blocks, then of [[fmu]] tables."""
+
+
+def blocks(scene: Scene, *, skip: bool = True) -> Blocks:
+    """The blocks of `scene`; skip=False includes what nothing in it uses."""
+    loop = tuple(_loop(scene, skip))
+    replacing = {f.replaces for f in scene.fmu}
+    replaced = {b.name: b for b in loop if b.name in replacing}
+    own = tuple(b for b in loop if b.name not in replaced)
+    rates = {b.name: b.rate for b in own}
+    for f in scene.fmu:
+        rates[f.name] = f.rate or (replaced[f.name].rate if f.name in replaced else "haptics")
+    tables = (
+        BlockPlan(f.name, f.block, rates[f.name], dict(f.settings)) for f in scene.fmu if f.block
+    )
+    return Blocks(loop, replaced, own, (*own, *tables), rates)
+
+
+@dataclass(frozen=True)
+class FromGraphics:
+    """What the virtual environment computes for other blocks."""
+
+    mobility: bool
+    directions: bool
+    """P_c: for the controller, or as an output that the scene requests beside the mobility."""
+    contacts: bool
+    """The geometry of the pairs that can touch."""
+    local_model: bool
 
     @property
-    def made_by(self) -> str:
-        """The name in `components.blocks.BLOCKS` of the function that builds it."""
-        return self.kind or self.name
+    def names(self) -> list[str]:
+        """What it computes, in words; empty where the block is not needed."""
+        words = ("Lambda_inv", "P_c", "contact geometry", "the local model")
+        wanted = (self.mobility, self.directions, self.contacts, self.local_model)
+        return [word for word, is_wanted in zip(words, wanted, strict=True) if is_wanted]
 
 
-def blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
-    """All blocks that are built into FMUs: those of the haptic loop, then those of [[fmu]] tables.
-
-    skip=False includes what nothing in the scene uses.
-    """
-    rates = fmu_rates(scene)
-    named = (
-        BlockPlan(f.name, rates[f.name], dict(f.settings), f.block) for f in scene.fmu if f.block
+def from_graphics(scene: Scene) -> FromGraphics:
+    held = scene.directions_from == "graphics"
+    directions = topology(scene) or (impedance(scene) and scene.mechanism.directions)
+    linkage, contacts = scene.linkage, scene.contacts
+    geometry = linkage and contacts and contacts.detection == "graphics"
+    return FromGraphics(
+        mobility=held and impedance(scene),
+        directions=held and directions,
+        contacts=bool(geometry and near(linkage, contacts)),  # type: ignore[arg-type]
+        local_model=scene.local_model,
     )
-    return (*loop_blocks(scene, skip=skip), *named)
 
 
-def loop_blocks(scene: Scene, *, skip: bool = True) -> tuple[BlockPlan, ...]:
-    """The blocks of the haptic loop that no FMU replaces, in its order; skip=False includes what
-    nothing uses."""
-    replacing = {f.replaces for f in scene.fmu}
-    return tuple(b for b in _loop(scene, skip) if b.name not in replacing)
-
-
-def replaced_blocks(scene: Scene) -> dict[str, BlockPlan]:
-    """The blocks of the haptic loop that an FMU of the scene replaces, by name."""
-    replacing = {f.replaces for f in scene.fmu}
-    return {b.name: b for b in _loop(scene, True) if b.name in replacing}
-
-
-def loop_names(scene: Scene) -> list[str]:
-    """The names of the loop's blocks in its order, replaced ones among them."""
-    return [b.name for b in _loop(scene, True)]
-
-
-def _loop(scene: Scene, skip: bool) -> tuple[BlockPlan, ...]:
+def _loop(scene: Scene, skip: bool) -> Iterator[BlockPlan]:
+    """The blocks of the haptic loop in its order."""
     if not skip:
-        scene = unskipped(scene)
-    found = []
-    if scene.hand:
-        found.append(BlockPlan("hand", "haptics", {"hand": scene.hand}))
-    for name, hand in scene.hands.items():
-        found.append(BlockPlan(f"hand_{name}", "haptics", {"hand": hand}, "hand"))
-    if scene.controller:
-        settings = settings_of(scene, "controller", "directions", "linkage")
-        if others(scene):
-            settings["controller"] = replace(scene.controller, contact=True)
-        found.append(BlockPlan("controller", "haptics", settings))
-    for name, controller in scene.users.items():
-        felt = replace(controller, contact=True)
-        settings = {**settings_of(scene, "directions", "linkage"), "controller": felt}
-        found.append(BlockPlan(f"controller_{name}", "haptics", settings, "controller"))
-    if scene.device:
-        found.append(BlockPlan("haptic_device", "haptics", {"device": scene.device}))
-    for name, device in scene.devices.items():
-        plan = BlockPlan(f"haptic_device_{name}", "haptics", {"device": device}, "haptic_device")
-        found.append(plan)
-    if scene.linkage:
-        settings = {"linkage": scene.linkage, "mechanism": scene.mechanism}
-        if scene.directions_from == "mechanism" or scene.mechanism.directions:
-            settings["directions"] = scene.directions
-        if scene.contacts:
-            settings["contacts"] = scene.contacts
-        if scene.controller and others(scene):
-            settings["felt"] = True
-        if scene.devices:
-            settings["users"] = tuple(scene.devices)
-        if scene.contacts or scene.linkage.limited or (others(scene) and controllers(scene)):
-            settings["length_scale"] = scene.directions.length_scale
-        if scene.local_model:
-            settings["local_model"] = True
-        found.append(BlockPlan("virtual_mechanism", scene.mechanism_at, settings))
-    if scene.linkage and scene.graphics and (graphics_block(scene) or not skip):
-        names = (f.name for f in fields(GraphicsCopy))
-        copy = GraphicsCopy(**{name: getattr(scene.graphics, name) for name in names})
+        scene = _unskipped(scene)
+    yield from _blocks_of_users(scene)
+    if not scene.linkage:
+        return
+    yield BlockPlan(MECHANISM, MECHANISM, scene.mechanism_at, _mechanism(scene))
+    if scene.graphics:
+        wanted = from_graphics(scene)
+        if not skip:
+            wanted = replace(wanted, mobility=True, directions=True)
+        if wanted.names:
+            yield BlockPlan(ENVIRONMENT, ENVIRONMENT, "graphics", _environment(scene, wanted))
+
+
+def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
+    for user, hand in scene.all_hands.items():
+        yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", {"hand": hand})
+    for user, controller in scene.all_controllers.items():
         settings = {
+            "controller": replace(controller, contact=True) if others(scene) else controller,
+            "directions": scene.directions,
             "linkage": scene.linkage,
-            "graphics": copy,
-            "directions": (
-                scene.directions if directions_from_graphics(scene) or not skip else None
-            ),
-            "contacts": scene.contacts if contacts_from_graphics(scene) else None,
-            "mobility": mobility_from_graphics(scene) or not skip,
-            "local_model": scene.local_model,
         }
-        if scene.devices:
-            settings["users"] = tuple(scene.devices)
-        found.append(BlockPlan("virtual_environment", "graphics", settings))
-    return tuple(found)
+        yield BlockPlan(block_of_user(CONTROLLER, user), CONTROLLER, "haptics", settings)
+    for user, device in scene.all_devices.items():
+        settings = {"device": device}
+        if scene.sensing == "encoders":
+            settings["encoders"] = True
+        yield BlockPlan(block_of_user(DEVICE, user), DEVICE, "haptics", settings)
 
 
-def settings_of(scene: Scene, *parts: str) -> dict[str, Any]:
-    return {part: getattr(scene, part) for part in parts}
+def _mechanism(scene: Scene) -> dict[str, Any]:
+    """The settings of the virtual mechanism, without those that only repeat a default."""
+    assert scene.linkage is not None
+    settings: dict[str, Any] = {"linkage": scene.linkage, "mechanism": scene.mechanism}
+    felt = others(scene) and bool(scene.all_controllers)
+    if scene.directions_from == "mechanism" or scene.mechanism.directions:
+        settings["directions"] = scene.directions
+    if scene.contacts:
+        settings["contacts"] = scene.contacts
+    if scene.controller and felt:
+        settings["felt"] = True
+    if scene.devices:
+        settings["users"] = tuple(scene.devices)
+    if scene.contacts or scene.linkage.limited or felt:
+        settings["length_scale"] = scene.directions.length_scale
+    if scene.local_model:
+        settings["local_model"] = True
+    return settings
 
 
-def controllers(scene: Scene) -> list[Controller]:
-    return [*([scene.controller] if scene.controller else []), *scene.users.values()]
-
-
-def fmu_rates(scene: Scene) -> dict[str, AnyRate]:
-    """The rate of each FMU by its name: of the scene's blocks, then of [[fmu]] tables."""
-    replaced = {name: b.rate for name, b in replaced_blocks(scene).items()}
-    foreign = {f.name: f.rate or replaced.get(f.name, "haptics") for f in scene.fmu}
-    return {b.name: b.rate for b in loop_blocks(scene)} | foreign
+def _environment(scene: Scene, wanted: FromGraphics) -> dict[str, Any]:
+    """The settings of the virtual environment."""
+    copied = {f.name: getattr(scene.graphics, f.name) for f in fields(GraphicsCopy)}
+    settings: dict[str, Any] = {
+        "linkage": scene.linkage,
+        "graphics": GraphicsCopy(**copied),
+        "directions": scene.directions if wanted.directions else None,
+        "contacts": scene.contacts if wanted.contacts else None,
+        "mobility": wanted.mobility,
+        "local_model": wanted.local_model,
+    }
+    return settings | ({"users": tuple(scene.devices)} if scene.devices else {})
 
 
 def impedance(scene: Scene) -> bool:
-    return any(controller.impedance for controller in controllers(scene))
+    return any(controller.impedance for controller in scene.all_controllers.values())
 
 
 def topology(scene: Scene) -> bool:
-    return any(controller.topology is not False for controller in controllers(scene))
-
-
-def mobility_from_graphics(scene: Scene) -> bool:
-    return scene.directions_from == "graphics" and impedance(scene)
-
-
-def directions_from_graphics(scene: Scene) -> bool:
-    """Whether the virtual environment computes P_c: for the controller, or as an output that the
-    scene requests beside the mobility."""
-    wanted = topology(scene) or (impedance(scene) and scene.mechanism.directions)
-    return scene.directions_from == "graphics" and wanted
+    return any(controller.topology is not False for controller in scene.all_controllers.values())
 
 
 def others(scene: Scene) -> bool:
@@ -155,25 +176,7 @@ def others(scene: Scene) -> bool:
     return bool(linkage and (linkage.point or any("effort" in j.ports for j in linkage.joint)))
 
 
-def contacts_from_graphics(scene: Scene) -> bool:
-    """Whether the mechanism's contact geometry comes from the virtual environment."""
-    if not scene.contacts or not scene.linkage or scene.contacts.detection != "graphics":
-        return False
-    return bool(near(scene.linkage, scene.contacts))
-
-
-def graphics_block(scene: Scene) -> list[str]:
-    """What the virtual environment computes for other blocks; empty where it is not needed."""
-    reasons = {
-        "Lambda_inv": mobility_from_graphics(scene),
-        "P_c": directions_from_graphics(scene),
-        "contact geometry": contacts_from_graphics(scene),
-        "the local model": scene.local_model,
-    }
-    return [name for name, wanted in reasons.items() if wanted]
-
-
-def unskipped(scene: Scene) -> Scene:
+def _unskipped(scene: Scene) -> Scene:
     """The scene with all optional outputs of the mechanism and every pair of contacts."""
     contacts = scene.contacts and replace(scene.contacts, broad_phase=False)
     mechanism = replace(scene.mechanism, directions=True, diagnostics=True)

@@ -8,6 +8,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
+
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
     "<=": operator.le,
@@ -38,5 +40,5 @@ def parse_condition(text: str) -> Condition:
             raise ValueError
         return Condition(match[1], match[2], match[3], value)
     except ValueError:
-        example = "haptic_device.workspace_margin < 0"
+        example = f"{WORKSPACE_MARGIN} < 0"
         raise ValueError(f"{text!r}: write a signal against a number, {example!r}") from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path as FilePath
 
@@ -69,10 +68,5 @@ def from_source(source: Source) -> Scene:
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
     if wrong := checks.check(found):
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
-    if found.device and found.device.sensing != found.sensing:
-        found = replace(found, device=replace(found.device, sensing=found.sensing))
-    if any(d.sensing != found.sensing for d in found.devices.values()):
-        devices = {n: replace(d, sensing=found.sensing) for n, d in found.devices.items()}
-        found = replace(found, devices=devices)
     found = read_parts.put(found, parts)
     return WrittenScene(**vars(found), origin=origin, written=found)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach
 from hapticlink.components.linkage.closures import rows
-from hapticlink.orchestrator.scene.blocks import graphics_block, impedance, topology
+from hapticlink.orchestrator.base.loop_names import ENVIRONMENT
+from hapticlink.orchestrator.scene.blocks import from_graphics, impedance, topology
 from hapticlink.orchestrator.scene.scene import Scene
 
 
@@ -42,9 +43,9 @@ def needs(scene: Scene) -> Iterator[Need]:
         topology(scene) or scene.mechanism.directions,
         f"from {scene.directions_from}" if topology(scene) else "no topology controller",
     )
-    reasons = graphics_block(scene)
+    reasons = from_graphics(scene).names
     yield Need(
-        "virtual_environment",
+        ENVIRONMENT,
         bool(reasons and scene.graphics),
         f"for {', '.join(reasons)}" if reasons else "nothing depends on it",
     )

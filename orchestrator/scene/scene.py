@@ -26,6 +26,7 @@ from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand,
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.faults import Finding
+from hapticlink.orchestrator.base.loop_names import DEVICE, WORKSPACE_MARGIN
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
@@ -191,10 +192,21 @@ class Scene:
         return None
 
     @property
-    def users(self) -> dict[str, Controller]:
-        """The controllers of the devices at further points, by point."""
+    def all_hands(self) -> dict[str, Hand]:
+        """The hands by the points that they hold; the first one's name is empty."""
+        return ({"": self.hand} if self.hand else {}) | dict(self.hands)
+
+    @property
+    def all_devices(self) -> dict[str, Device]:
+        """The devices by user, who is named by the point; the first one's name is empty."""
+        return ({"": self.device} if self.device else {}) | dict(self.devices)
+
+    @property
+    def all_controllers(self) -> dict[str, Controller]:
+        """The controllers of `all_devices`, by user."""
+        first = {"": self.controller} if self.controller else {}
         own = self.controller or Controller()
-        return {name: self.controllers.get(name, own) for name in self.devices}
+        return first | {name: self.controllers.get(name, own) for name in self.devices}
 
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""
@@ -208,8 +220,8 @@ class Scene:
     def ends_when(self) -> str:
         """The condition that ends the run, its default included; "" where there is none."""
         if self.stop_when is None:
-            own = self.device and all(f.replaces != "haptic_device" for f in self.fmu)
-            return "haptic_device.workspace_margin < 0" if own else ""
+            own = self.device and all(f.replaces != DEVICE for f in self.fmu)
+            return f"{WORKSPACE_MARGIN} < 0" if own else ""
         return self.stop_when
 
 

@@ -22,7 +22,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
-from hapticlink.orchestrator.scene.blocks import fmu_rates
+from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import AnyRate
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
@@ -167,7 +167,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     found["stop_when"] = scene.ends_when
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
     found["holds"] = {**scene.holds, **own}
-    rates = fmu_rates(scene)
+    rates = blocks(scene).rates
     if scene.graphics and "graphics" in rates.values():
         graphics = pydantic.TypeAdapter(type(scene.graphics))
         found["graphics"] = graphics.dump_python(

@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.loop_names import HAND
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import described
-from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
+from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
@@ -20,10 +21,19 @@ from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import connect, whole
 from hapticlink.orchestrator.system.recorded import recorded
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
-from hapticlink.orchestrator.system.system import Connection, Fmu, System
+from hapticlink.orchestrator.system.system import (
+    Connection,
+    Coupling,
+    EnergyPorts,
+    Fmu,
+    Recording,
+    System,
+)
 
 
-def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> System:
+def from_scene(
+    scene: Scene, blocks: Blocks, timeline: Timeline, files: Mapping[str, Path]
+) -> System:
     """The system of `scene`; `files` are the FMU files of its blocks, by name.
 
     Raises SceneFault with every finding: FMUs that cannot be read or used, connections and holds
@@ -31,13 +41,13 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     """
     problems: list[Problem] = []
     of = timeline.of
-    blocks = replacements.replaced(scene)
-    ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in loop_blocks(scene))
+    replaced = replacements.replaced(blocks.replaced)
+    ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in blocks.own)
     foreign = (
         Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
-        for fmu, description, starts in fmu_tables.fmus(scene, files, blocks, problems)
+        for fmu, description, starts in fmu_tables.fmus(scene, files, replaced, problems)
     )
-    order = {name: i for i, name in enumerate(loop_names(scene))}
+    order = {b.name: i for i, b in enumerate(blocks.loop)}
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
     fmus = tuple(
         with_sizes(replace(u, isolate=u.isolate or scene.isolate), timeline) for u in every
@@ -47,7 +57,8 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
     rules = rules_of(scene, fmus, connections)
     assigned, refused = assign(fmus, connections, timeline, rules)
     problems += checks.unfit(scene, fmus, assigned, refused, rules.springs)
-    problems += checks.step_sizes(scene, fmus, timeline)
+    problems += replacements.unfit(scene, replaced, haptic_loop.rows(scene), fmus, connections)
+    problems += checks.step_sizes(fmus, timeline)
     problems += checks.iterated(scene, fmus, assigned)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(fmus, condition):
@@ -59,27 +70,26 @@ def from_scene(scene: Scene, timeline: Timeline, files: Mapping[str, Path]) -> S
         fmus,
         assigned,
         timeline,
-        scene.coupling,
+        Coupling(
+            scene.coupling,
+            scene.iteration,
+            scene.step_control,
+            scene.substeps,
+            (*scene.get_after_set, *_read_again(scene, ours)),
+        ),
         condition,
         scene.faults,
-        rules.power,
-        scene.substeps,
-        (*scene.get_after_set, *_read_again(scene, ours)),
-        scene.iteration,
-        scene.step_control,
+        EnergyPorts(rules.power, rules.springs, haptic_loop.energy_in_play(scene)),
+        Recording(written, scene.record.every),
         refused,
-        rules.springs,
-        haptic_loop.energy_in_play(scene),
-        replacements.replacements(blocks, haptic_loop.rows(scene), fmus, assigned),
-        written,
-        scene.record.every,
+        replacements.replacements(replaced, haptic_loop.rows(scene), fmus, assigned),
     )
 
 
 def _read_again(scene: Scene, ours: Iterable[Fmu]) -> Iterator[str]:
     """The hands that are plants, in iterated coupling: their force depends directly on the handle,
     and errs to order 1 unless it is read with the inputs at the end of the step."""
-    hands = [u.name for u in ours if u.description.block == "hand" and not u.sampled]
+    hands = [u.name for u in ours if u.description.block == HAND and not u.sampled]
     if scene.coupling == "iterated":
         yield from (name for name in hands if name not in scene.get_after_set)
 

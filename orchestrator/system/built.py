@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.assemble import from_scene
 from hapticlink.orchestrator.system.fmu_files import fmu_files
@@ -23,5 +24,7 @@ def built(scene: Scene, starts: Mapping[str, Starts] | None = None) -> Iterator[
     can be built from the settings, SceneFault where FMUs and connections do not fit.
     """
     with temporary_folders.room() as room:
-        time = timeline(scene)
-        yield from_scene(scene, time, fmu_files(scene, time, room, starts=starts))
+        planned = blocks(scene)
+        time = timeline(scene, planned)
+        files = fmu_files(scene, planned, time, room, starts=starts)
+        yield from_scene(scene, planned, time, files)

@@ -16,7 +16,6 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 from hapticlink.orchestrator.system import springs
 from hapticlink.orchestrator.system.ports import names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
-from hapticlink.orchestrator.system.timeline import clocks
 
 
 def unfit(
@@ -107,16 +106,16 @@ def _power(scene: Scene, i: int, p: PowerPort, units: Mapping[str, Fmu]) -> Iter
         yield ("power", i), message
 
 
-def step_sizes(scene: Scene, units: Iterable[Fmu], timeline: Timeline) -> Iterator[Problem]:
+def step_sizes(units: Iterable[Fmu], timeline: Timeline) -> Iterator[Problem]:
     """A finding for each FMU with a fixed communication step size on a clock whose steps vary."""
-    paces, seconds = clocks(scene).paces, timeline.seconds
+    seconds = timeline.seconds
     for unit in units:
         clock = timeline.clock(unit.clock)
         if clock.first == clock.period or varies_step(unit.description):
             continue
         least = seconds(min(clock.first, clock.shortest))
         yield (
-            paces[clock.name].path,
+            clock.key,
             f"{unit.name} takes steps of one size only ({VARIABLE_STEP} is not true), but its "
             f"steps here are {least:.6g} to {seconds(clock.longest):.6g} s: take a fixed rate, "
             "with neither a phase nor align = 'tick'",

@@ -40,12 +40,12 @@ def costs(scene: Scene, timeline: Timeline, *, skip: bool = True) -> tuple[Block
     tick = timeline.clock("haptics").longest
     clocks = {clock.name for clock in timeline.clocks}
     found = []
-    for block in blocks(scene, skip=skip):
+    for block in blocks(scene, skip=skip).built:
         # A block that the scene skips may have a rate that no clock runs at.
         clock = timeline.of.get(block.name, str(block.rate))
         period = timeline.clock(clock).longest if clock in clocks else tick
         try:
-            counted = cost(block.made_by, block.settings)
+            counted = cost(block.block, block.settings)
         except FmuError as error:
             raise InputFault(str(error)) from error
         found.append(BlockCost(block.name, counted, tick / period))

@@ -11,13 +11,14 @@ from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import STEP_SIZE, sizes
 
 
 def fmu_files(
     scene: Scene,
+    blocks: Blocks,
     timeline: Timeline,
     room: Path,
     platforms: Sequence[str] = (),
@@ -34,19 +35,20 @@ def fmu_files(
     """
     interrupt.add(remove_locks)
     try:
-        return dict(_files(scene, timeline, room, platforms, starts))
+        return dict(_files(scene, blocks, timeline, room, platforms, starts))
     finally:
         interrupt.remove(remove_locks)
 
 
 def _files(
     scene: Scene,
+    blocks: Blocks,
     timeline: Timeline,
     room: Path,
     platforms: Sequence[str],
     starts: Mapping[str, Starts] | None,
 ) -> Iterator[tuple[str, Path]]:
-    for block in blocks(scene):
+    for block in blocks.built:
         interrupt.check()
         given: Starts = {}
         experiment: dict[str, float] = {}
@@ -59,7 +61,7 @@ def _files(
             experiment = {"stop_time": scene.duration, "step_size": steps[STEP_SIZE]}
         try:
             file = build_block(
-                block.made_by,
+                block.block,
                 block.settings,
                 room / block.name,  # two hands are two files of one name
                 experiment=experiment,

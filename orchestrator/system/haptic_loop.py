@@ -12,27 +12,35 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from hapticlink.orchestrator.base.loop_names import (
+    ENVIRONMENT,
+    HAND_WRENCH,
+    HANDLE_POSE,
+    HANDLE_VELOCITY,
+    MECHANISM,
+    POINT_POSE,
+    POINT_VELOCITY,
+    SHARED,
+    signal_of_user,
+)
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 
 Row = tuple[str, str]
-MECHANISM, CONTROLLER = "virtual_mechanism", "controller"
-WORKSPACE = ("haptic_device", "workspace_margin")
-"""The output (m) that is negative where the device is outside its workspace."""
 
 _LOOP: tuple[Row, ...] = (
-    ("virtual_mechanism.{at}x", "haptic_device{of}.x_start"),
-    ("virtual_mechanism.{at}x", "controller{of}.x_ref"),
-    ("hand{of}.F", "haptic_device{of}.F_hand"),
-    ("haptic_device{of}.x", "controller{of}.x_D"),
-    ("haptic_device{of}.v", "controller{of}.v_D"),
-    ("haptic_device{of}.M", "controller{of}.M"),
-    ("haptic_device{of}.c", "controller{of}.c"),
-    ("virtual_mechanism.{at}x", "controller{of}.x_S"),
-    ("virtual_mechanism.{at}v", "controller{of}.v_S"),
-    ("virtual_mechanism.{at}a_bias", "controller{of}.a_bias"),
-    ("virtual_mechanism.{at}F_env", "controller{of}.F_env"),
+    ("virtual_mechanism.x", "haptic_device.x_start"),
+    ("virtual_mechanism.x", "controller.x_ref"),
+    ("hand.F", "haptic_device.F_hand"),
+    ("haptic_device.x", "controller.x_D"),
+    ("haptic_device.v", "controller.v_D"),
+    ("haptic_device.M", "controller.M"),
+    ("haptic_device.c", "controller.c"),
+    ("virtual_mechanism.x", "controller.x_S"),
+    ("virtual_mechanism.v", "controller.v_S"),
+    ("virtual_mechanism.a_bias", "controller.a_bias"),
+    ("virtual_mechanism.F_env", "controller.F_env"),
     ("virtual_mechanism.x", "virtual_environment.x_ref"),
     ("virtual_mechanism.v", "virtual_environment.v_ref"),
     ("virtual_mechanism.q", "virtual_environment.q_ref"),
@@ -42,22 +50,10 @@ _LOOP: tuple[Row, ...] = (
     ("virtual_environment.W", "virtual_mechanism.W"),
     ("virtual_environment.w", "virtual_mechanism.w"),
     ("virtual_environment.J_h", "virtual_mechanism.J_h"),
-    ("controller{of}.F_motor", "haptic_device{of}.F_motor"),
-    ("controller{of}.F_drift", "virtual_mechanism.{at}F_drift"),
+    ("controller.F_motor", "haptic_device.F_motor"),
+    ("controller.F_drift", "virtual_mechanism.F_drift"),
 )
-"""Rows with {of} are those of a user: for the first one {of} and {at} are empty, for the one at a
-further point they are the suffix of its blocks and the prefix of its ports."""
-
-_HELD: tuple[Row, ...] = (
-    ("{handle}x{true}", "hand{of}.x"),
-    ("{handle}v{true}", "hand{of}.v"),
-    ("{wrench}", "controller{of}.F_hand"),
-    ("{wrench}", "virtual_mechanism.{at}F_hand"),
-    ("{directions}.{at}Lambda_inv", "controller{of}.Lambda_inv"),
-    ("{directions}.{at}P_c", "controller{of}.P_c"),
-)
-"""What depends on the scene: {handle} is that of the device or the point of the mechanism, {wrench}
-the hand's or its observer's."""
+"""The connections of every scene, as those of the first user."""
 
 
 def rows(scene: Scene) -> tuple[Wire, ...]:
@@ -78,36 +74,30 @@ def wires(scene: Scene, described: Mapping[str, Description]) -> tuple[Wire, ...
 
 def _rows(scene: Scene) -> tuple[Row, ...]:
     """(source, target) as `fmu.variable`, for every connection that the scene may have."""
-    first = [_formatted(row, {"of": "", "at": ""}) for row in _LOOP]
-    held = [_formatted(row, _fields(scene, "")) for row in _HELD]
+    own = [row for row in _LOOP if any(end.partition(".")[0] not in SHARED for end in row)]
     further: list[Row] = []
-    for name in {**scene.hands, **scene.devices}:
-        fields = _fields(scene, name)
-        own = [row for row in _LOOP if "{of}" in row[0] + row[1]] if name in scene.devices else []
-        further += [_formatted(row, fields) for row in (*own, *_HELD)]
-    return (*first, *further, *held)
+    for user in {**scene.hands, **scene.devices}:
+        rows = (*(own if user in scene.devices else ()), *_scene_rows(scene, user))
+        further += [(signal_of_user(a, user), signal_of_user(b, user)) for a, b in rows]
+    return (*_LOOP, *further, *_scene_rows(scene, ""))
 
 
-def _formatted(row: Row, fields: Mapping[str, str]) -> Row:
-    source, target = row
-    return source.format_map(fields), target.format_map(fields)
-
-
-def _fields(scene: Scene, name: str) -> dict[str, str]:
-    """The fields of the user at a further point, or of the first user, whose name is empty."""
-    of, at = (f"_{name}", f"{name}.") if name else ("", "")
-    device = name in scene.devices if name else scene.device
-    ideal = scene.sensing == "ideal" or not device
-    return {
-        "of": of,
-        "at": at,
-        "handle": f"haptic_device{of}." if device else f"virtual_mechanism.{at}",
-        "true": "_true" if device else "",
-        "wrench": f"hand{of}.F" if ideal else f"haptic_device{of}.F_hand_observed",
-        "directions": {"graphics": "virtual_environment", "mechanism": "virtual_mechanism"}[
-            scene.directions_from
-        ],
-    }
+def _scene_rows(scene: Scene, user: str) -> tuple[Row, ...]:
+    """The connections of a user that depend on the scene, as those of the first user, whose name is
+    empty."""
+    device = scene.devices.get(user) if user else scene.device
+    x, v = (HANDLE_POSE, HANDLE_VELOCITY) if device else (POINT_POSE, POINT_VELOCITY)
+    observed = device and scene.sensing != "ideal"
+    wrench = "haptic_device.F_hand_observed" if observed else HAND_WRENCH
+    directions = ENVIRONMENT if scene.directions_from == "graphics" else MECHANISM
+    return (
+        (x, "hand.x"),
+        (v, "hand.v"),
+        (wrench, "controller.F_hand"),
+        (wrench, "virtual_mechanism.F_hand"),
+        (f"{directions}.Lambda_inv", "controller.Lambda_inv"),
+        (f"{directions}.P_c", "controller.P_c"),
+    )
 
 
 def energy_in_play(scene: Scene) -> float | None:

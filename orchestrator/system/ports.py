@@ -10,7 +10,7 @@ from hapticlink.orchestrator.fmi.kind_check import MATRICES, turn
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import PowerPort
-from hapticlink.orchestrator.system.system import Connection, Fmu
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
 def names(c: Connection) -> tuple[str, str, str]:
@@ -29,6 +29,16 @@ def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
     """Whether an entry of a connection has a power port."""
     power = tuple(power)
     return any(paired(c, entry, power) for entry in c.inputs)
+
+
+def power_across_rates(system: System) -> list[str]:
+    """Names of the connections that carry power across rates."""
+    return [
+        c.name
+        for c in system.connections
+        if carries_power(c, system.energy.power)
+        and system.fmu[c.source].clock != system.fmu[c.target].clock
+    ]
 
 
 def kind(c: Connection, fmus: Mapping[str, Fmu]) -> Kind | None:

@@ -8,25 +8,26 @@ from typing import TYPE_CHECKING
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.scene.blocks import replaced_blocks
+from hapticlink.orchestrator.scene.blocks import BlockPlan
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.system import Connection, Fmu, Replacement
 
 if TYPE_CHECKING:
-    from hapticlink.components.component import Component
+    from hapticlink.components.component import Component, Variable
+
+MAX_PORTS = 12
+"""Ports of one kind that a message lists."""
 
 
-def replaced(scene: Scene) -> dict[str, Component]:
+def replaced(plans: Mapping[str, BlockPlan]) -> dict[str, Component]:
     """The blocks that FMUs replace, by name. Raises InputFault where the settings of one give no
     block."""
-    found = {}
-    for name, plan in replaced_blocks(scene).items():
-        try:
-            found[name] = component(plan.made_by, plan.settings)
-        except FmuError as error:
-            raise InputFault(str(error)) from error
-    return found
+    try:
+        return {name: component(plan.block, plan.settings) for name, plan in plans.items()}
+    except FmuError as error:
+        raise InputFault(str(error)) from error
 
 
 def replacements(
@@ -61,3 +62,51 @@ def replacements(
         for name, block in blocks.items()
         if name in described
     }
+
+
+def unfit(
+    scene: Scene,
+    blocks: Mapping[str, Component],
+    rows: Iterable[Wire],
+    fmus: Iterable[Fmu],
+    connections: Iterable[Connection],
+) -> Iterator[Problem]:
+    """FMUs none of whose outputs reaches another FMU, though those of the block that they replace
+    may: each with the ports by which the haptic loop knows the block (`rows`), and those of the
+    FMU."""
+    ends = {end for row in rows for end in (row.from_, row.to)}
+    described = {u.name: u.description for u in fmus}
+    heard = {c.source for c in connections}
+    for i, table in enumerate(scene.fmu):
+        name = table.replaces
+        if name not in blocks or name not in described or name in heard:
+            continue
+        block, scalars = blocks[name], described[name].scalars
+        gives, takes = (
+            [_port(v) for v in variables if f"{name}.{v.name}" in ends]
+            for variables in (block.outputs, block.inputs)
+        )
+        if not gives:
+            continue
+        has = {
+            kind: dict.fromkeys(s.port for s in scalars if s.causality == kind)
+            for kind in ("output", "input")
+        }
+        message = (
+            f"none of its outputs reaches another FMU, so that it is no {name}: that block gives "
+            f"{_listed(gives)} and takes {_listed(takes)}; "
+            f"the FMU has outputs {_listed(has['output'])} and inputs {_listed(has['input'])}. "
+            "Give it ports of these names, or lead a [[connection]] from it"
+        )
+        yield ("fmu", i, "replaces"), message
+
+
+def _port(variable: Variable) -> str:
+    size = ",".join(map(str, variable.shape))
+    return f"{variable.name}[{size}]" if size else variable.name
+
+
+def _listed(ports: Iterable[str]) -> str:
+    names = [*ports]
+    more = f" and {len(names) - MAX_PORTS} more" if len(names) > MAX_PORTS else ""
+    return ", ".join(names[:MAX_PORTS]) + more if names else "none"

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from hapticlink.orchestrator.base.loop_names import ENVIRONMENT
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.system.system import Fmu
 
 STEP_SIZE, FRAME_SIZE = "step_size", "frame_size"
 """As in `components.component`, which loads CasADi."""
-COPY = "virtual_environment"
 
 
 def sizes(clock: str, timeline: Timeline) -> dict[str, float]:
     """The longest steps (s) of an FMU's clock and of the graphics copy, by parameter."""
-    clocks = {STEP_SIZE: clock} | ({FRAME_SIZE: timeline.of[COPY]} if COPY in timeline.of else {})
+    clocks = {STEP_SIZE: clock} | (
+        {FRAME_SIZE: timeline.of[ENVIRONMENT]} if ENVIRONMENT in timeline.of else {}
+    )
     return {n: timeline.seconds(timeline.clock(c).longest) for n, c in clocks.items()}
 
 

@@ -80,35 +80,57 @@ class Replacement:
 
 
 @dataclass(frozen=True)
-class System:
-    """What is simulated, on which timeline, with which coupling scheme.
+class Coupling:
+    """In which order and how often the FMUs are called."""
 
-    ends_when: condition that ends the run early. power: the power ports. substeps: by plant, the
-    doSteps per communication step, held inputs updated before each. get_after_set: plants whose
-    outputs may be read again after inputs are set, without a doStep between. refused: holds that
-    did not fit. springs: spring-dampers whose set positions are connected. energy_in_play: scale
-    of the mechanism's gravitational energy (J), None where its energy balance is not checked.
-    recorded: the outputs that are written, `fmu.output`, None for all. every: communication points
-    of a clock for which it gets a row.
-    """
+    scheme: str
+    iteration: Iteration = field(default_factory=Iteration)
+    step_control: StepControl | None = None
+    substeps: Mapping[str, int] = field(default_factory=dict)
+    """By plant, the doSteps per communication step, held inputs updated before each."""
+    get_after_set: tuple[str, ...] = ()
+    """Plants whose outputs may be read again after inputs are set, without a doStep between."""
+
+
+@dataclass(frozen=True)
+class EnergyPorts:
+    """What is known of the energy that crosses connections."""
+
+    power: tuple[PowerPort, ...] = ()
+    springs: tuple[SetSpring, ...] = ()
+    """Spring-dampers whose set positions are connected."""
+    in_play: float | None = None
+    """Scale (J) of the mechanism's gravitational energy, None where its energy balance is not
+    checked."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What is written."""
+
+    outputs: tuple[str, ...] | None = None
+    """The outputs, `fmu.output`; None for all."""
+    every: int = 1
+    """Number of communication points of a clock for which it gets a row."""
+
+
+@dataclass(frozen=True)
+class System:
+    """What is simulated, on which timeline, with which coupling."""
 
     fmus: tuple[Fmu, ...]
     connections: tuple[Connection, ...]
     timeline: Timeline
-    coupling: str
+    coupling: Coupling
     ends_when: Condition | None = None
+    """Condition that ends the run early."""
     faults: Faults = field(default_factory=Faults)
-    power: tuple[PowerPort, ...] = ()
-    substeps: Mapping[str, int] = field(default_factory=dict)
-    get_after_set: tuple[str, ...] = ()
-    iteration: Iteration = field(default_factory=Iteration)
-    step_control: StepControl | None = None
+    energy: EnergyPorts = field(default_factory=EnergyPorts)
+    recording: Recording = field(default_factory=Recording)
     refused: tuple[Refused, ...] = ()
-    springs: tuple[SetSpring, ...] = ()
-    energy_in_play: float | None = None
+    """Holds that did not fit."""
     replacements: Mapping[str, Replacement] = field(default_factory=dict)
-    recorded: tuple[str, ...] | None = None
-    every: int = 1
+    """The FMUs in the place of the loop's blocks, by name."""
 
     @cached_property
     def fmu(self) -> Mapping[str, Fmu]:

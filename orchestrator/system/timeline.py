@@ -19,18 +19,19 @@ from hapticlink.orchestrator.base.ticks import (
     periodic,
     variable,
 )
-from hapticlink.orchestrator.scene.blocks import fmu_rates
+from hapticlink.orchestrator.scene.blocks import Blocks, blocks
 from hapticlink.orchestrator.scene.rates import AnyRate, VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 
-def timeline(scene: Scene) -> Timeline:
-    """The timeline with the clock `haptics` and those of all FMUs; it ends at the last haptic tick
-    at or before the duration. Raises SceneFault for a rate that cannot be put on ticks."""
+def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
+    """The timeline with the clock `haptics` and those of all FMUs, of the blocks `planned` if they
+    are known; it ends at the last haptic tick at or before the duration. Raises SceneFault for a
+    rate that cannot be put on ticks."""
     haptic = 1 / exact(scene.haptics.rate)
     steps = math.floor(exact(scene.duration) / haptic)
-    given = clocks(scene)
+    given = clocks(scene, planned)
     exactly = [p for p in given.paces.values() if not p.on_ticks]
     spans = [span for p in exactly for span in (_period(p), p.first or _period(p))]
     base = common_base([*spans, *([exact(scene.step_control.min)] if scene.step_control else [])])
@@ -48,7 +49,7 @@ def timeline(scene: Scene) -> Timeline:
                     starts = tuple(frame * a_tick for frame in frames)
             except ValueError as error:
                 raise SceneFault(scene.title, [scene.place(pace.path, str(error))]) from error
-        found.append(Clock(name, starts))
+        found.append(Clock(name, starts, pace.path))
     return Timeline(base, steps * a_tick, tuple(found), given.of)
 
 
@@ -89,11 +90,11 @@ class Clocks:
     paces: Mapping[str, Pace]
 
 
-def clocks(scene: Scene) -> Clocks:
+def clocks(scene: Scene, planned: Blocks | None = None) -> Clocks:
     """The clocks of `scene`: `haptics` always, others only where an FMU runs at them."""
     paths: dict[str, Path] = {fmu.name: ("fmu", i, "rate") for i, fmu in enumerate(scene.fmu)}
-    rates = fmu_rates(scene).items()
-    found = {fmu: _of(fmu, rate, paths.get(fmu, ()), scene) for fmu, rate in rates}
+    rates = (planned or blocks(scene)).rates
+    found = {fmu: _of(fmu, rate, paths.get(fmu, ()), scene) for fmu, rate in rates.items()}
     paces = {"haptics": _pace("haptics", (), scene)}
     for name, pace in sorted(found.values(), key=lambda clock: clock[0] != "graphics"):
         paces.setdefault(name, pace)

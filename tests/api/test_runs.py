@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.figures import figure_process
+from hapticlink.visualization.figures import run_figures
 from tests.shared_fixtures import sets, status
 
 SHORT = {"duration": 0.1, "graphics.rate": 40}
@@ -162,7 +163,7 @@ def test_a_folder_without_a_run_is_refused(bar: Path, tmp_path: Path) -> None:
     with pytest.raises(hl.InputFault, match="not the folder of a run"):
         hl.load(tmp_path)
     (tmp_path / "run.json").write_text("{}")
-    with pytest.raises(hl.InputFault, match="not the folder of a run"):
+    with pytest.raises(hl.InputFault, match=r"run\.json: scene: field required: run the"):
         hl.load(tmp_path)
     hl.run(bar, out=tmp_path)
     (tmp_path / "haptics.csv").unlink()
@@ -192,13 +193,13 @@ def test_ctrl_c_raises_with_the_results_so_far(out: str | None, tmp_path: Path) 
 def test_ctrl_c_while_figures_are_drawn_says_so(
     bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    drawn = figure_process.pngs
+    drawn = run_figures.pngs
 
-    def interrupted(found: hl.Run) -> figure_process.Pngs:
+    def interrupted(found: hl.Run) -> Iterator[tuple[str, bytes]]:
         os.kill(os.getpid(), signal.SIGINT)
         return drawn(found)
 
-    monkeypatch.setattr(figure_process, "pngs", interrupted)
+    monkeypatch.setattr(run_figures, "pngs", interrupted)
     assert status("run", bar, "--out", tmp_path) == 1
     assert "has the results of the run, not all of its figures" in capsys.readouterr().err
     assert hl.load(tmp_path).run["end"]["reason"] == "duration"

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hapticlink.analysis.findings.workspace import lines
 from hapticlink.components.specs.device import Device
-from hapticlink.visualization.mechanism.workspace_drawing import draw, lines
+from hapticlink.visualization.mechanism.workspace_drawing import draw
 from tests.shared_fixtures import status
 
 FAR = ("--set", "linkage.start.float=[0.22, 0.0, 0.0]")

@@ -49,4 +49,5 @@ def test_every_page_has_a_picture(page) -> None:
 def test_pictures_are_small_and_not_empty() -> None:
     for path in (p for folder in FOLDERS for p in folder.iterdir()):
         assert path.stat().st_size < 120_000, path
-        assert np.ptp(imread(path)[..., :3]) > 0.9, path
+        if path.suffix != ".svg":  # whose content tests/test_rooms.py compares
+            assert np.ptp(imread(path)[..., :3]) > 0.9, path

@@ -61,7 +61,7 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
     """Each block of the report's experiment as a Python and as a native FMU."""
     scene = open_scene.load("closed-loop", OPTIONS)
     folder = tmp_path_factory.mktemp("both")
-    made = {b.name: component(b.made_by, b.settings) for b in blocks.blocks(scene)}
+    made = {b.name: component(b.block, b.settings) for b in blocks.blocks(scene).built}
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"})
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
     made["passive"] = controller(Controller(passivity=True), 0.04)

@@ -15,7 +15,7 @@ from tests.fmus import sample_components
 
 def components(scene, *options):
     read = load(scene, options)
-    return {block.name: component(block.made_by, block.settings) for block in blocks(read)}
+    return {block.name: component(block.block, block.settings) for block in blocks(read).built}
 
 
 PULLED = ("closed-loop", "graphics.sync=operational")

@@ -7,6 +7,7 @@ import pytest
 
 from hapticlink.fmus.check import check_fmu
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
 
@@ -17,7 +18,7 @@ NAMES = ("hand", "controller", "haptic_device", "virtual_mechanism", "virtual_en
 def built(folder):
     scene = open_scene.load("closed-loop", OPTIONS)
     folder.mkdir()
-    return fmu_files.fmu_files(scene, timeline(scene), folder)
+    return fmu_files.fmu_files(scene, blocks(scene), timeline(scene), folder)
 
 
 @pytest.fixture(scope="module")

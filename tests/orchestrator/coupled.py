@@ -21,7 +21,7 @@ from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
 from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Coupling, EnergyPorts, Fmu, System
 from tests.orchestrator import oscillator
 from tests.orchestrator.systems import connected
 
@@ -98,11 +98,8 @@ def system(
         units,
         connections,
         timeline,
-        coupling,
-        substeps=dict.fromkeys(fmus, substeps),
-        power=power,
-        springs=springs,
-        **others,  # type: ignore[arg-type]
+        Coupling(coupling, substeps=dict.fromkeys(fmus, substeps), **others),  # type: ignore[arg-type]
+        energy=EnergyPorts(power, springs),
     )
 
 

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.built import built
 from hapticlink.orchestrator.system.connections import connect
-from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
+from hapticlink.orchestrator.system.system import Connection, Fmu, Refused, System
+
+
+def system_of(scene: object, *options: str) -> System:
+    """The system of a scene, by its name or path. Its FMU files need not exist any more."""
+    with built(open_scene.load(str(scene), options)) as system:
+        return system
+
+
+def with_coupling(system: System, **settings: object) -> System:
+    """The system with other settings of its coupling."""
+    return replace(system, coupling=replace(system.coupling, **settings))  # type: ignore[arg-type]
 
 
 def connected(

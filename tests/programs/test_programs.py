@@ -77,7 +77,7 @@ def test_outputs_are_those_of_a_run_to_the_bit(name: str, tmp_path: Path) -> Non
 
 def _measured(measured: dict[str, float], experiment) -> None:
     """Energies and step errors are those that the run reports, but for the order of sums."""
-    energies, errors = experiment.outcome.energies, experiment.outcome.step_errors
+    energies, errors = experiment.outcome.details.meters, experiment.outcome.details.step_errors
     connections = experiment.system.connection
     for name, energy in energies.items():
         c = connections[name]

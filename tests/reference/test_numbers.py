@@ -9,6 +9,7 @@ import pytest
 
 from hapticlink.fmus.check import session
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
 
@@ -30,7 +31,9 @@ WRENCH = (-0.5, 0.0, -0.0025)
 def at_rest(tmp_path_factory):
     """Outputs by name of the two FMUs in initialisation, the wrench set on the mechanism."""
     scene = open_scene.load("closed-loop", ["mechanism.directions=true"])
-    files = fmu_files.fmu_files(scene, timeline(scene), tmp_path_factory.mktemp("fmus"))
+    files = fmu_files.fmu_files(
+        scene, blocks(scene), timeline(scene), tmp_path_factory.mktemp("fmus")
+    )
     found = {}
     for name in ("virtual_mechanism", "virtual_environment"):
         with session(files[name]) as opened:

@@ -9,13 +9,13 @@ import numpy as np
 
 from hapticlink.analysis.findings.forces import all_wrenches
 from hapticlink.analysis.findings.tracking import (
-    MECHANISM,
     constrained,
     has_tracking,
     of_block,
     pose_error,
 )
 from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.orchestrator.base.loop_names import POINT_POSE
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.visualization.figure_axes import plain
@@ -62,9 +62,9 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
         if any(len(time) for time, _ in curves.values())
     }
     paths: Curves = {
-        name: (table[MECHANISM][:, 0] * 1e3, table[MECHANISM][:, 1] * 1e3)
+        name: (table[POINT_POSE][:, 0] * 1e3, table[POINT_POSE][:, 1] * 1e3)
         for name, run in runs.items()
-        if (table := of_block(run, MECHANISM, 3))
+        if (table := of_block(run, POINT_POSE, 3))
     }
     if paths:
         figure = _figure("Paths of the operational point", "x (mm)", "y (mm)", paths)

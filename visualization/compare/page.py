@@ -28,19 +28,19 @@ FINE = ("none", "no", numbers.NONE)
 def page(runs: Mapping[str, Results]) -> str:
     """The page of runs by the names that tell them apart. The same runs give the same bytes."""
     every, names = list(runs.values()), list(runs)
-    titles = dict.fromkeys(run.run["scene"]["title"] for run in every)
+    titles = dict.fromkeys(run.record.scene["title"] for run in every)
     parts = [f"<h1>{escape('; '.join(titles))}</h1>"]
     if other := settings.other_scenes(every):
         parts.append(f'<p class="note">{escape(other)}</p>')
     for title, rows in numbers.sections(every).items():
         if rows:
             parts += [f"<h2>{escape(title)}</h2>", _table(names, rows)]
-        if title.startswith("How well"):
+        if title.startswith(numbers.PERFORMANCE):
             parts += _figures(runs)
     if len(every) > 1:
         rows = [Row(key, values) for key, values in settings.differing(every).items()]
-        found = _table(names, rows) if rows else "<p>None: the scenes are the same.</p>"
-        parts += ["<h2>Settings that differ</h2>", found]
+        table = _table(names, rows) if rows else "<p>None: the scenes are the same.</p>"
+        parts += ["<h2>Settings that differ</h2>", table]
     parts += ["<h2>How to make it again</h2>", *_again(runs)]
     style = STYLE.read_text(encoding="utf-8")
     head = (

@@ -15,7 +15,7 @@ ABOUT = ("title", "description")
 def differing(runs: Sequence[Results]) -> dict[str, tuple[str, ...]]:
     """The keys of which the scenes have different values, with the value of each; entries of lists
     of tables are named by their `name` or counted from 1."""
-    every = [dict(_leaves(run.run["scene"])) for run in runs]
+    every = [dict(_leaves(run.record.scene)) for run in runs]
     keys = dict.fromkeys(key for leaves in every for key in leaves)
     found = {key: tuple(leaves.get(key, UNSET) for leaves in every) for key in keys}
     return {k: v for k, v in found.items() if len(set(v)) > 1 and k not in ABOUT}
@@ -23,7 +23,7 @@ def differing(runs: Sequence[Results]) -> dict[str, tuple[str, ...]]:
 
 def other_scenes(runs: Sequence[Results]) -> str:
     """A sentence where the runs are of scenes with other titles or mechanisms; "" where not."""
-    titles = dict.fromkeys(run.run["scene"]["title"] for run in runs)
+    titles = dict.fromkeys(run.record.scene["title"] for run in runs)
     if not one_mechanism(runs):
         return f"different mechanisms: {'; '.join(titles)}"
     return f"different scenes: {'; '.join(titles)}" if len(titles) > 1 else ""
@@ -31,7 +31,7 @@ def other_scenes(runs: Sequence[Results]) -> str:
 
 def one_mechanism(runs: Sequence[Results]) -> bool:
     """Whether all runs are of the same linkage, so that their poses can be compared."""
-    return all(run.run["scene"]["linkage"] == runs[0].run["scene"]["linkage"] for run in runs)
+    return all(run.record.scene["linkage"] == runs[0].record.scene["linkage"] for run in runs)
 
 
 def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, str]]:

@@ -5,7 +5,7 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -17,10 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.episodes import episodes
-from hapticlink.analysis.findings.forces import ENVIRONMENT, WRENCHES, touching, wrenches
+from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
 from hapticlink.analysis.findings.tracking import (
-    DEVICE,
-    MECHANISM,
     constrained,
     further_users,
     of_block,
@@ -31,6 +29,13 @@ from hapticlink.analysis.findings.user_port import UserPort, user_port
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.base.loop_names import (
+    ENVIRONMENT_WRENCH,
+    HANDLE_POSE,
+    JOINT_COORDINATES,
+    POINT_POSE,
+    signal_of_user,
+)
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.scene_part import all_devices, scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
@@ -50,10 +55,9 @@ SOURCES = {
     "shaping": "shaping of the device's inertia",
     "drift": "virtual coupling, F_drift",
     "topology": "topology controller, F_T",
-    "environment": WRENCHES[ENVIRONMENT],
+    "environment": WRENCHES[ENVIRONMENT_WRENCH],
 }
 """The blocks of `port_blocks.py` as a reader knows them."""
-COORDINATES = "virtual_mechanism.q"
 
 
 def figures(results: Results) -> dict[str, Figure]:
@@ -72,13 +76,13 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
         results, "linkage", Linkage
     )  # an SSP has the block, but not its description
     size = len(coordinate_units(linkage)) if linkage else 0
-    if linkage and (coordinates := of_block(results, COORDINATES, size)):
-        q = coordinates[COORDINATES]
+    if linkage and (coordinates := of_block(results, JOINT_COORDINATES, size)):
+        q = coordinates[JOINT_COORDINATES]
         if len(q := q[np.isfinite(q).all(axis=1)]):
             found["mechanism"] = partial(_mechanism, results, linkage, q)
-    if of_block(results, MECHANISM, 3):
+    if of_block(results, POINT_POSE, 3):
         found["trajectories"] = partial(_trajectories, results)
-        if of_block(results, DEVICE, 3):
+        if of_block(results, HANDLE_POSE, 3):
             found["distance"] = partial(_distance, results)
     if wrenches(results):
         found["forces"] = partial(forces, results, all_devices(results))
@@ -90,18 +94,15 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
         found["user_port"] = partial(_port, results, port)
     if generated := _generated(results):
         found["energies"] = partial(_energies, results, generated)
-    if (paced := results.run.get("real_time")) and paced["ticks"]:
+    if (paced := results.record.real_time) and paced["ticks"]:
         found["real_time"] = partial(real_time, results)
     return found
 
 
-def warm_up() -> None:
-    """Draws a figure that nobody sees: the first one takes longest, as it loads fonts."""
-    ended = Results(None, {"end": {"reason": "duration"}}, {})
-    figure, axes = titled(ended, "0", "0", "0")
-    axes.plot([0, 1], label="0")
-    figure_axes.legend_below(figure)
-    png(figure)
+def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
+    """Name and PNG of each figure of a run, each drawn when it is asked for."""
+    for name, draw in drawings(results).items():
+        yield name, png(draw())
 
 
 def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
@@ -124,9 +125,9 @@ def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
 
 def _mark(results: Results, axes: Axes) -> None:
     """The episodes of a run, along the path of the operational point."""
-    if (table := of_block(results, MECHANISM, 3)) is None:
+    if (table := of_block(results, POINT_POSE, 3)) is None:
         return
-    time, path = table["time"], table[MECHANISM][:, :2] * 1e3
+    time, path = table["time"], table[POINT_POSE][:, :2] * 1e3
     marked = [*episodes(results)]
     for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
         color, label = marks.KINDS[kind]
@@ -141,16 +142,16 @@ def _mark(results: Results, axes: Axes) -> None:
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
     """Label, line style and path (mm) of operational point, handle and further points."""
-    linkage = results.run["scene"]["linkage"] or {}
+    linkage = results.record.scene["linkage"] or {}
     further = [
-        (f"virtual_mechanism.{point['name']}.x", f"point {point['name']}", "-.")
+        (signal_of_user(POINT_POSE, point["name"]), f"point {point['name']}", "-.")
         for point in linkage.get("point", ())
     ]
     return [
         (label, style, table[signal][:, :2] * 1e3)
         for signal, label, style in (
-            (MECHANISM, "operational point x_S", "-"),
-            (DEVICE, "handle x_D", "--"),
+            (POINT_POSE, "operational point x_S", "-"),
+            (HANDLE_POSE, "handle x_D", "--"),
             *further,
         )
         if (table := of_block(results, signal, 3))
@@ -159,7 +160,7 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if of_block(results, DEVICE, 3):
+    if of_block(results, HANDLE_POSE, 3):
         apart = short(tracking(results)[1].max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:
@@ -199,9 +200,9 @@ def _point(user: str) -> str:
 
 
 def _contact(results: Results, time: Vector, pushing: NDArray[np.bool_]) -> Figure:
-    table = of_block(results, ENVIRONMENT, 3)
+    table = of_block(results, ENVIRONMENT_WRENCH, 3)
     assert table is not None  # it tells when contacts push
-    force = np.linalg.norm(table[ENVIRONMENT][:, :2], axis=1)
+    force = np.linalg.norm(table[ENVIRONMENT_WRENCH][:, :2], axis=1)
     share = 100 * float(pushing.mean())
     most = short(force[pushing].max(initial=0.0))
     title = f"Contacts push in {short(share)} % of the samples, with |F_env| of at most {most} N"
@@ -225,7 +226,7 @@ def _constraints(results: Results, table: Table, name: str) -> Figure:
 
 
 def _port(results: Results, port: UserPort) -> Figure:
-    peak = 1e3 * port.told["peak"]
+    peak = 1e3 * port.measured.peak
     title = f"The rendering generates at most {short(peak)} mJ"
     if peak > 0 and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
@@ -244,10 +245,7 @@ def _port(results: Results, port: UserPort) -> Figure:
 
 def _generated(results: Results) -> dict[str, float]:
     """Energy (J) that the hold of each connection generated, connections across rates first."""
-    across = results.run.get("energies", "none")  # a crash leaves none
-    within = results.run.get("energies_within_a_rate", {})
-    booked = ({} if across == "none" else across) | within
-    return {name: energy["generated"] for name, energy in booked.items()}
+    return {name: energy.generated for name, energy in results.record.meters.items()}
 
 
 def _energies(results: Results, generated: dict[str, float]) -> Figure:

@@ -45,7 +45,7 @@ def check(metric: str, scenes: Sequence[Scene]) -> None:
 
     Connections are not known yet, so any `generated_J` column is accepted.
     """
-    fmus = {b.name for s in scenes for b in blocks(s)} | {f.name for s in scenes for f in s.fmu}
+    fmus = {name for s in scenes for name in blocks(s).rates}
     known = (
         *NAMES,
         "switches",

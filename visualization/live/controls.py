@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.live_run import LiveRun
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.visualization.live import messages
 from hapticlink.visualization.live.mouse_hand import STIFFNESS
 
-GAINS = ("hand", "controller")
+GAINS = (HAND, CONTROLLER)
 """Blocks of a user whose tunable parameters are gains; those of the mechanism are, too."""
 OTHERS = ("length_scale", "target", "rank_tolerance")
 """Tunable parameters of theirs that are none."""
@@ -165,26 +166,21 @@ def users(scene: Scene) -> tuple[str, ...]:
     return ("", *scene.devices)
 
 
-def block(name: str, user: str) -> str:
-    """The FMU of a user, by its block."""
-    return f"{name}_{user}" if user else name
-
-
 def stiffness(user: str) -> str:
     """The stiffness with which a user's mouse pulls."""
-    return f"{block('hand', user)}.stiffness"
+    return f"{block_of_user(HAND, user)}.stiffness"
 
 
 def target(user: str) -> str:
     """The pose that a user's mouse pulls to."""
-    return f"{block('hand', user)}.target"
+    return f"{block_of_user(HAND, user)}.target"
 
 
 def _gains(live: LiveRun) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
     """Values and units of the parameters that a page can scale, by their name."""
     found: dict[str, tuple[NDArray[np.float64], list[str]]] = {}
     fixed = limited_gains(live.system)
-    names = ["virtual_mechanism", *(block(b, user) for user in users(live.scene) for b in GAINS)]
+    names = [MECHANISM, *(block_of_user(b, user) for user in users(live.scene) for b in GAINS)]
     for fmu in (live.system.fmu[name] for name in names if name in live.system.fmu):
         tunable = [
             s

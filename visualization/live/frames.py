@@ -7,32 +7,55 @@ from collections.abc import Mapping
 from typing import Any
 
 from hapticlink.analysis.findings.limits import FELT
+from hapticlink.orchestrator.base.loop_names import (
+    CLOSURE_ERROR,
+    CONSTRAINT_COUNTS,
+    CONTACT_GAP,
+    COPY_BRANCH_OK,
+    COPY_JOINT_COORDINATES,
+    DEVICE,
+    DRIFT_WRENCH,
+    ENVIRONMENT_WRENCH,
+    HAND,
+    HAND_WRENCH,
+    HANDLE_POSE,
+    JOINT_COORDINATES,
+    MEASURED_HANDLE_POSE,
+    MECHANISM_ENERGY,
+    MOTOR_WRENCH,
+    MULTIPLIERS,
+    POINT_POSE,
+    PROJECTORS,
+    TOPOLOGY_WRENCH,
+    WORKSPACE_MARGIN,
+    signal_of_user,
+)
 from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.results.record import Energy
 from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
-from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.visualization.mechanism.picture import PORT
 
 SHOWN = {
-    "q": ("virtual_mechanism.q",),
-    "ghost": ("virtual_environment.q",),
-    "lambda": ("virtual_mechanism.lambda",),
-    "closure_error": ("virtual_mechanism.closure_error",),
-    "gap": ("virtual_mechanism.contact_gap",),
-    "branch_ok": ("virtual_environment.branch_ok",),
+    "q": (JOINT_COORDINATES,),
+    "ghost": (COPY_JOINT_COORDINATES,),
+    "lambda": (MULTIPLIERS,),
+    "closure_error": (CLOSURE_ERROR,),
+    "gap": (CONTACT_GAP,),
+    "branch_ok": (COPY_BRANCH_OK,),
 }
 """By name in a frame, the output that it is, the first that the scene has."""
 OF_USER = {
-    "x": ("virtual_mechanism.{at}x",),
-    "handle": ("haptic_device{of}.x_true", "virtual_mechanism.{at}x"),
-    "F_hand": ("hand{of}.F",),
-    "F_drift": ("controller{of}.F_drift",),
-    "F_constraint": ("controller{of}.F_constraint",),
-    "F_env": ("virtual_mechanism.{at}F_env",),
-    "n": ("virtual_environment.{at}n_constraints", "virtual_mechanism.{at}n_constraints"),
-    "P_c": ("virtual_environment.{at}P_c", "virtual_mechanism.{at}P_c"),
-    "margin": ("haptic_device{of}.workspace_margin",),
-    "F_motor": ("controller{of}.F_motor",),
-    "measured": ("haptic_device{of}.x",),
+    "x": (POINT_POSE,),
+    "handle": (HANDLE_POSE, POINT_POSE),
+    "F_hand": (HAND_WRENCH,),
+    "F_drift": (DRIFT_WRENCH,),
+    "F_constraint": (TOPOLOGY_WRENCH,),
+    "F_env": (ENVIRONMENT_WRENCH,),
+    "n": CONSTRAINT_COUNTS,
+    "P_c": PROJECTORS,
+    "margin": (WORKSPACE_MARGIN,),
+    "F_motor": (MOTOR_WRENCH,),
+    "measured": (MEASURED_HANDLE_POSE,),
 }
 """The same of each user; what further ones have is in `others` of a frame, by their points."""
 SELDOM = 5
@@ -47,8 +70,8 @@ class Frames:
     def __init__(self, live: LiveRun) -> None:
         fmus = live.system.fmu
         self._outputs = _there(fmus, shown())
-        self._others = {user: _there(fmus, of_user(user)) for user in live.scene.devices}
-        self._turns, self._start = 0, float(live["virtual_mechanism.energy"][0])
+        self._others = {user: _there(fmus, shown_of_user(user)) for user in live.scene.devices}
+        self._turns, self._start = 0, float(live[MECHANISM_ENERGY][0])
         self._past: deque[tuple[float, float, float]] = deque()
         self._energy: dict[str, float] = {}
 
@@ -89,14 +112,13 @@ class Frames:
         has stored beyond the work of the hands on their handles and on further points."""
         block = live.system.block
         on = [live.system.connection[n] for n in booked]
-        handles = {c.source for c in on if block(c.target) == "haptic_device"}
+        handles = {c.source for c in on if block(c.target) == DEVICE}
         hands = [
             c.name
             for c in on
-            if block(c.source) == "hand"
-            and (block(c.target) == "haptic_device" or c.source not in handles)
+            if block(c.source) == HAND and (block(c.target) == DEVICE or c.source not in handles)
         ]
-        stored = float(live["virtual_mechanism.energy"][0]) - self._start
+        stored = float(live[MECHANISM_ENERGY][0]) - self._start
         return stored - sum(booked[name].held for name in hands)
 
 
@@ -110,13 +132,12 @@ def light(generated: float, put_in: float) -> str:
 
 def shown() -> dict[str, tuple[str, ...]]:
     """What a frame shows of a scene and of its first user, without `others`."""
-    return SHOWN | of_user("")
+    return SHOWN | shown_of_user("")
 
 
-def of_user(user: str) -> dict[str, tuple[str, ...]]:
+def shown_of_user(user: str) -> dict[str, tuple[str, ...]]:
     """What a frame shows of a user, whose name is that of the point, "" for the first one's."""
-    of, at = (f"_{user}", f"{user}.") if user else ("", "")
-    return {k: tuple(n.format(of=of, at=at) for n in names) for k, names in OF_USER.items()}
+    return {k: tuple(signal_of_user(n, user) for n in names) for k, names in OF_USER.items()}
 
 
 def _there(fmus: Any, asked: Mapping[str, tuple[str, ...]]) -> dict[str, str]:

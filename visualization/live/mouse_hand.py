@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.loop_names import HAND, block_of_user
 from hapticlink.orchestrator.scene.overrides import Options, written
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -23,7 +24,7 @@ def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scen
             "mechanisms, for instance `hapticlink view closed-loop`"
         )
     read = open_scene.load(name, (*written({"packaging": "native"}), *written(options)))
-    hands = ("hand", *(f"hand_{user}" for user in read.devices))
+    hands = [block_of_user(HAND, user) for user in ("", *read.devices)]
     if any(fmu.replaces in hands for fmu in read.fmu):
         raise InputFault(
             f"{name}: an FMU replaces the hand, which the mouse has to be: leave it out"

@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from hapticlink.analysis.stability.analysis import Stability, at_rest
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.modes import leading
+from hapticlink.analysis.stability.scene_stability import Stability, at_rest
 from hapticlink.analysis.stability.state_vector import size
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.base.loop_names import DEVICE
 from hapticlink.orchestrator.live_run import held_by
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.built import built
@@ -117,5 +118,5 @@ def _said(found: Stability) -> str:
         return "marginal at rest"
     owners = [name.partition(".")[0] for name in found.names]
     whose = leading(found.modes[0], owners, 1)[0][0] if found.modes else "all"
-    whose = whose.replace("virtual_", "").replace("haptic_device", "handle").replace("_", " ")
+    whose = whose.replace("virtual_", "").replace(DEVICE, "handle").replace("_", " ")
     return f"unstable, grows {rate}, mode of {whose}"

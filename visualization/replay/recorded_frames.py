@@ -21,15 +21,15 @@ from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.results.checked_run import load_whole
+from hapticlink.orchestrator.base.loop_names import JOINT_COORDINATES, POINT_POSE
 from hapticlink.orchestrator.results.scene_part import by_user, scene_part
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
-from hapticlink.visualization.live.frames import of_user, shown
+from hapticlink.orchestrator.results.tables import Results, Table, Vector, load
+from hapticlink.visualization.live.frames import shown, shown_of_user
 from hapticlink.visualization.mechanism.picture import PORT, Picture
 
 PLACES = ("q", "x", "handle")
 """What a frame cannot be drawn without, of each user."""
-NEEDED = ("virtual_mechanism.q", "virtual_mechanism.x")
+NEEDED = (JOINT_COORDINATES, POINT_POSE)
 MOST = 4000
 """Frames of a run; of longer ones every second, third, ... sample is shown."""
 DIGITS = 7
@@ -44,7 +44,7 @@ class Recorded:
     Raises InputFault for a folder without a run of a linkage, or without its poses."""
 
     def __init__(self, folder: str) -> None:
-        self.results = results = load_whole(folder)
+        self.results = results = load(folder)
         self.folder = folder
         linkage: Linkage | None = scene_part(results, "linkage", Linkage)
         if linkage is None:
@@ -110,9 +110,8 @@ class Recorded:
         which on it stands."""
         frames = self.frames()
         keys = dict.fromkeys(key for frame in frames for key in frame)
-        run = self.results.run
         return {
-            "title": run["scene"]["title"],
+            "title": self.results.record.scene["title"],
             "ending": summary.ending(self.results),
             "marks": [mark._asdict() for mark in self.picture.marks],
             "times": [_rounded(float(t)) for t in self.times],
@@ -144,11 +143,11 @@ def newest(table: Table, times: Vector) -> NDArray[np.intp]:
 def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
     """The recorded signal of each name of a frame, and those that are not recorded although the
     scene has them. A signal that stands in for another one does so only where there is no other."""
-    left_out = results.run.get("not_recorded", ())
+    left_out = results.record.not_recorded
     found, missing = dict[str, str](), list[str]()
     asked = shown()
     for user in further_users(results):
-        asked |= {f"{user}.{key}": names for key, names in of_user(user).items()}
+        asked |= {f"{user}.{key}": names for key, names in shown_of_user(user).items()}
     for key, names in asked.items():
         for name in names:
             if name in left_out:

@@ -76,7 +76,7 @@ def _repeat(system: System, event: Event, group: list[Fmu]) -> Iterator[Operatio
     dticks = building_blocks.dticks(event, group[0])
     body = [op for fmu in group for op in _step(system, event, fmu, loop)]
     # The signal vector still contains the guess, which direct feed-through is evaluated with.
-    body += [Set(n, now=True) for n in names if n in system.get_after_set]
+    body += [Set(n, now=True) for n in names if n in system.coupling.get_after_set]
     body += [Get(n, dticks) for n in names]
     yield from (Save(n) for n in names)
     yield Repeat(
@@ -99,7 +99,7 @@ def _push_on(system: System, event: Event, group: list[Fmu]) -> Iterator[Operati
 
 def _step(system: System, event: Event, fmu: Fmu, loop: list[Connection]) -> Iterator[Operation]:
     """The step of a plant; each substep uses mean and first moment of the inputs from `loop`."""
-    parts, dticks = system.substeps.get(fmu.name, 1), building_blocks.dticks(event, fmu)
+    parts, dticks = system.coupling.substeps.get(fmu.name, 1), building_blocks.dticks(event, fmu)
     inside = {c.name for c in loop}
     for part in range(parts):
         for operation in building_blocks.feed(system, event, fmu, part):

@@ -19,7 +19,7 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
         operations += building_blocks.feed(system, event, unit)
     for unit in sampled:
         operations += building_blocks.step(system, event, unit)
-    divided = [unit for unit in started if unit.name in system.substeps]
+    divided = [unit for unit in started if unit.name in system.coupling.substeps]
     for unit in divided:  # all its substeps take what the first one does
         operations += building_blocks.step(system, event, unit)
     for unit in sampled:

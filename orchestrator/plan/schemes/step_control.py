@@ -31,7 +31,7 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
     Raises InputFault for plants whose step size cannot be varied, and if there are no connected
     plants.
     """
-    assert system.step_control is not None
+    assert system.coupling.step_control is not None
     between = {u.clock: _between(system, u.clock) for u in system.fmus}
     if not any(between.values()):
         raise InputFault(
@@ -49,7 +49,7 @@ def block(system: System, event: Event, scheme: Scheme) -> tuple[Operation, ...]
                 f"[step_control] varies the step, and {', '.join(fixed)} cannot take that "
                 f"({VARIABLE_STEP} is not true); take it out, with a higher rate"
             )
-        if system.step_control.method == "doubling":
+        if system.coupling.step_control.method == "doubling":
             what = "[step_control] method = 'doubling'"
             building_blocks.require_rollback(system, [u.name for u in plants], what)
         else:
@@ -66,14 +66,14 @@ def _between(system: System, clock: str) -> list[Connection]:
 def _require_energy(system: System, between: list[Connection], kind: Part, scheme: Scheme) -> None:
     """Raises InputFault for ecco if no connection between the plants carries power, if `energy` is
     missing, or if the coupling scheme interpolates."""
-    assert system.step_control is not None
-    if not any(carries_power(c, system.power) for c in between):
+    assert system.coupling.step_control is not None
+    if not any(carries_power(c, system.energy.power) for c in between):
         raise InputFault(
             "[step_control] method = 'ecco' needs the energy between plants, and no connection "
             f"between plants of {kind.clock} carries power: pair efforts and displacements in "
             "[[power]], or take method = 'doubling'"
         )
-    if system.step_control.energy is None:
+    if system.coupling.step_control.energy is None:
         raise InputFault(
             "[step_control] method = 'ecco' measures errors relative to a typical energy of the "
             "scene: give energy (J)"
@@ -81,7 +81,7 @@ def _require_energy(system: System, between: list[Connection], kind: Part, schem
     if any(isinstance(op, Get) and op.ahead for op in flat(part(system, kind, scheme))):
         raise InputFault(
             "[step_control] method = 'ecco' estimates the error of extrapolation, and coupling = "
-            f"{system.coupling!r} interpolates: take 'jacobi', 'gauss-seidel', or 'doubling'"
+            f"{system.coupling.scheme!r} interpolates: take 'jacobi', 'gauss-seidel', or 'doubling'"
         )
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import runpy
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 HERE = Path(__file__).parent
+LAWS = runpy.run_path(str(HERE / "generate_laws.py"))
 SOURCES = (
     "loop.h", "loop.c", "events.c", "pace.c", "fmu_calls.c", "step_check.c", "meters.c", "holds.c",
     "manifolds.c", "energy_account.c", "energy_tank.c", "platform.c", "python_errors.c",
@@ -29,6 +31,7 @@ def name() -> str:
     sha = hashlib.sha256()
     for source in SOURCES:
         sha.update((HERE / source).read_bytes().replace(b"\r\n", b"\n"))
+    sha.update(LAWS["text"]().encode())
     return f"loop-{sha.hexdigest()[:16]}{SUFFIX}"
 
 
@@ -56,9 +59,10 @@ def compile_loop(library: Path, compiler: Sequence[str]) -> None:
     subprocess.CalledProcessError, or OSError, where that fails."""
     with tempfile.TemporaryDirectory(dir=library.parent, prefix=".loop-") as room:
         made = Path(room) / library.name
+        Path(room, "hold_laws.h").write_text(LAWS["text"](), encoding="utf-8")
         sources = [str(HERE / source) for source in SOURCES if source.endswith(".c")]
         math = [] if sys.platform == "win32" else ["-lm"]
-        command = [*compiler, *FLAGS, "-o", str(made), *sources, *math]
+        command = [*compiler, *FLAGS, f"-I{room}", "-o", str(made), *sources, *math]
         environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(Path(room) / "cache")}
         subprocess.run(command, check=True, capture_output=True, env=environment)
         os.replace(made, library)

@@ -1,4 +1,5 @@
-/* The order of events: orchestrator/run/paced_events.py is the specification. */
+/* The order of events: python_loop.py is the specification. In real time each begins when it is due,
+ * and that of a clock whose steps are taken in a thread once they are done: concurrent_fmus.py. */
 
 #include "loop.h"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -73,20 +73,30 @@ class Events:
                 machine.serve(code, c.at, c.tick)
         turn(c.tick)
 
-    def point(self, clock: str, ahead: int = 0) -> int:
-        """See Points."""
-        i = [c.name for c in self._timeline.clocks].index(clock)
-        return self._starts[i][self._given[i] + self._clocks[i].at + ahead]
+    def previous(self, clock: str) -> int:
+        """The communication point (ticks) at which the newest sample of a clock is."""
+        return self._point(clock, -1)
 
-    def change(self, clock: str, starts: Sequence[int]) -> None:
-        """See Points."""
-        i = [c.name for c in self._timeline.clocks].index(clock)
+    def current(self, clock: str) -> int:
+        """The communication point (ticks) that a clock goes to."""
+        return self._point(clock, 0)
+
+    def _point(self, clock: str, further: int) -> int:
+        i = self._index(clock)
+        return self._starts[i][self._given[i] + self._clocks[i].at + further]
+
+    def change_rate(self, clock: str, starts: Sequence[int]) -> None:
+        """Replace the communication points of a clock, `previous` and `current` the first."""
+        i = self._index(clock)
         self._starts[i], self._given[i], self._clocks[i].at = starts, 1, 0
         self._next_window(i)
 
     def patience(self, ns: int) -> None:
-        """See Points."""
+        """Have `turn` called after that time each."""
         self._c.patience = ns
+
+    def _index(self, clock: str) -> int:
+        return [c.name for c in self._timeline.clocks].index(clock)
 
     def _next_window(self, i: int) -> None:
         """The next communication points of clock i: the current one comes first."""
@@ -106,10 +116,14 @@ class Events:
             for clock, k in zip(clocks, key[1:], strict=True)
             if k
         )
-        self.add(Event(bool(key[0]), tuple(fired)))
+        self._add(Event(bool(key[0]), tuple(fired)))
 
-    def add(self, event: Event) -> None:
-        """Add a kind of event."""
+    def prepare(self, kinds: Iterable[Event]) -> None:
+        """Bind kinds of events before they occur."""
+        for kind in kinds:
+            self._add(kind)
+
+    def _add(self, event: Event) -> None:
         fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
         key = [event.first, *(fired.get(clock.name, 0) for clock in self._timeline.clocks)]
         first, last = self._block(event)

@@ -86,7 +86,7 @@ static inline int call(const Transfer *t, int64_t i, int64_t *count, At *at) {
     at->what = i;
     at->status = transferred(t);
     if (t->kind.python && exception_left()) return RAISED;
-    return at->status > WARNING ? FAILED : 0;
+    return fmu_succeeded(at->status) ? 0 : FAILED;
 }
 
 int fmu_get(const Fmu *f, int64_t judged, At *at) {
@@ -156,7 +156,8 @@ int fmu_step(Fmu *f, double time, double end, double size, At *at) {
     p->size = size;
     p->end = end;
     if (p->ended || p->waiting) return CALL;
-    if (f->get_state && (at->status = fmu_save(f, f->get_state, f->state)) > WARNING) return UNSAVED;
+    if (f->get_state && !fmu_succeeded(at->status = fmu_save(f, f->get_state, f->state)))
+        return UNSAVED;
     const int timed = !f->sparse || f->n_steps % EACH == 0;
     const int64_t begin = timed ? now() : 0;
     at->what = -1;
@@ -164,7 +165,7 @@ int fmu_step(Fmu *f, double time, double end, double size, At *at) {
     if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
     if (f->kind.python && exception_left()) return RAISED;
     if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
-    if (at->status > WARNING || (f->kind.fmi == 3 && *f->terminate)) return STEPPED;
+    if (!fmu_succeeded(at->status) || (f->kind.fmi == 3 && *f->terminate)) return STEPPED;
     p->time = end;
     return 0;
 }

@@ -1,5 +1,6 @@
-/* The shipped holds. Each is what its Python class is, operation by operation: the classes in
- * `orchestrator/holds/` are the specification and have the equations. */
+/* The shipped holds: what they keep of their samples. The laws of those whose value is a polynomial
+ * in time are `orchestrator/holds/laws.py`; generate_laws.py writes hold_laws.h from it. Of the
+ * others the classes in `orchestrator/holds/` are the specification, operation by operation. */
 
 #include "loop.h"
 
@@ -28,50 +29,21 @@ static void keep(Hold *h, const double *y, int64_t stamp) {
     h->stamps[h->count++] = stamp;
 }
 
-/* History.slope at sample i, entry k. */
-static double slope(const Hold *h, int64_t i, int64_t k) {
-    if (i < 1) return 0.0;
-    return (sample(h, i)[k] - sample(h, i - 1)[k]) / (double)(h->stamps[i] - h->stamps[i - 1]);
-}
+#define LAW(kind, i) (3 * (kind) + (i))
 
-/* --- delayed, smooth, mean -------------------------------------------------------------------- */
-
-static void delayed(const Hold *h, int64_t tick, double ahead, double *value) {
-    const int64_t newest = h->count - 1, before = h->stamps[0], stamp = h->stamps[newest];
-    const double *y = sample(h, newest), *from = vector(h, 0);
-    double share = 1.0;
-    if (stamp > before) share = ((double)(tick - h->arrival) + ahead) / (double)(stamp - before);
-    for (int64_t k = 0; k < h->n; k++)
-        value[k] = share >= 1.0 ? y[k] : from[k] + (y[k] - from[k]) * share;
-}
-
-/* Value and slope (per tick) of Smooth at `time`. */
-static void curve(const Hold *h, double time, double *value, double *tangent) {
-    const int64_t last = h->count - 1;
-    const double *first = sample(h, 0), *newest = sample(h, last);
-    const double *start = vector(h, 0), *begun = vector(h, 1);
-    const double period = (double)(h->stamps[last] - h->stamps[0]);
-    const double r = (time - (double)h->arrival) / period;
-    for (int64_t k = 0; k < h->n; k++) {
-        if (h->stamps[last] == h->stamps[0]) {
-            value[k] = newest[k];
-            if (tangent) tangent[k] = 0.0;
-            continue;
-        }
-        const double rise = newest[k] - first[k];
-        if (r >= 1.0) {
-            value[k] = newest[k] + rise * (r - 1.0);
-            if (tangent) tangent[k] = rise / period;
-            continue;
-        }
-        const double s = begun[k] * period, falling = (1.0 - r) * (1.0 - r);
-        double y = start[k] * ((1 + 2 * r) * falling) + s * (r * falling);
-        y += newest[k] * (r * r * (3 - 2 * r)) + rise * (r * r * (r - 1));
-        value[k] = y;
-        if (!tangent) continue;
-        double t = (newest[k] - start[k]) * (6 * r * (1 - r)) + s * ((1 - r) * (1 - 3 * r));
-        t += rise * (r * (3 * r - 2));
-        tangent[k] = t / period;
+/* The value of a law of laws.py, of `kind`: the hold's own, or that of its slope. Without a loop
+ * there are no seconds. */
+static void law(const Hold *h, int64_t kind, const Loop *l, int64_t tick, double ahead, double *value) {
+    const int64_t n = h->n, last = h->count - 1, *t = h->stamps + last;
+    const double *y = sample(h, last), *y1 = sample(h, last > 0 ? last - 1 : 0), *y2 = h->samples;
+    const double *w = vector(h, 0), *wd = vector(h, 1);
+    const double s = (double)(tick - t[0]) + ahead, elapsed = l ? seconds(l, s) : 0.0;
+    const double H = last > 0 ? (double)(t[0] - t[-1]) : 0.0, period = l ? seconds(l, H) : 0.0;
+    const double H1 = last > 1 ? (double)(t[-1] - t[-2]) : 0.0;
+    const double r = ((double)(tick - h->arrival) + ahead) / H;
+    const int reached = last > 0 && r >= 1.0 && (h->kind == DELAYED || h->kind == SMOOTH);
+    switch (LAW(kind, last + reached)) {
+#include "hold_laws.h"
     }
 }
 
@@ -109,16 +81,10 @@ static void mean_value(Hold *h, double *value) {
 static void take(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     switch (h->kind) {
     case DELAYED:
-        if (h->count)
-            delayed(h, arrival, 0.0, vector(h, 1));
-        else
-            memcpy(vector(h, 1), y, h->n * sizeof *y);
-        memcpy(vector(h, 0), vector(h, 1), h->n * sizeof *y);
-        h->arrival = arrival;
-        break;
     case SMOOTH:
         if (h->count) {
-            curve(h, (double)arrival, vector(h, 2), vector(h, 3));
+            law(h, h->kind, NULL, arrival, 0.0, vector(h, 2));
+            if (h->kind == SMOOTH) law(h, SMOOTH_SLOPE, NULL, arrival, 0.0, vector(h, 3));
             memcpy(vector(h, 0), vector(h, 2), 2 * h->n * sizeof *y);
         } else {
             memcpy(vector(h, 0), y, h->n * sizeof *y);
@@ -213,56 +179,6 @@ int hold_push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     return 0;
 }
 
-static void extrapolate(const Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
-    const int64_t n = h->n;
-    const int64_t last = h->count - 1;
-    const double *y = sample(h, last), *first = sample(h, 0);
-    const double s = (double)(tick - h->stamps[last]) + ahead;
-    switch (h->kind) {
-    case ZERO_ORDER: memcpy(value, y, n * sizeof *value); return;
-    case LEAD:
-        for (int64_t k = 0; k < n; k++) value[k] = y[k] + (y[k] - first[k]) / 2;
-        return;
-    case FIRST_ORDER:
-        for (int64_t k = 0; k < n; k++) value[k] = y[k] + slope(h, last, k) * s;
-        return;
-    case FIRST_ORDER_DERIVATIVE: {
-        const double elapsed = seconds(l, s);
-        for (int64_t k = 0; k < n; k++) value[k] = y[k] + y[n + k] * elapsed;
-        return;
-    }
-    case SECOND_ORDER:
-        for (int64_t k = 0; k < n; k++) {
-            const double d1 = slope(h, last, k);
-            value[k] = y[k] + d1 * s;
-            if (h->count < 3) continue;
-            const double d2 = (d1 - slope(h, last - 1, k)) / (double)(h->stamps[2] - h->stamps[0]);
-            value[k] += d2 * (s * (s + (double)h->stamps[2] - (double)h->stamps[1]));
-        }
-        return;
-    case HERMITE: {
-        const double elapsed = seconds(l, s), whole = (double)(h->stamps[last] - h->stamps[0]);
-        const double r = ((double)(tick - h->stamps[0]) + ahead) / whole, width = seconds(l, whole);
-        const double falling = (1 - r) * (1 - r), rising = r * r;
-        const double a = (1 + 2 * r) * falling, b = r * falling * width;
-        const double c = (3 - 2 * r) * rising, d = (r - 1) * rising * width;
-        for (int64_t k = 0; k < n; k++)
-            value[k] = h->count < 2
-                           ? y[k] + y[n + k] * elapsed
-                           : a * first[k] + b * first[n + k] + c * y[k] + d * y[n + k];
-        return;
-    }
-    case SLOPE: {
-        const double width = seconds(l, (double)(h->stamps[last] - h->stamps[0]));
-        for (int64_t k = 0; k < n; k++)
-            value[k] = h->count < 2 ? 0.0 : (y[n + k] - first[n + k]) / width;
-        return;
-    }
-    case DELAYED: delayed(h, tick, ahead, value); return;
-    case SMOOTH: curve(h, (double)tick + ahead, value, NULL); return;
-    }
-}
-
 /* The value at `tick`, or GROW. */
 int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
     if (h->account && !account_has_room(h->account, h->link ? h->link->n : 0)) return GROW;
@@ -274,7 +190,7 @@ int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value
         memcpy(value, h->tank->modulated + h->row * h->n, h->n * sizeof *value);
         break;
     case OBSERVED: account_value(h->account, l, tick, ahead, value); break;
-    default: extrapolate(h, l, tick, ahead, value);
+    default: law(h, h->kind, l, tick, ahead, value);
     }
     if (h->manifold) manifold_value(h, value);
     return 0;

@@ -1,4 +1,4 @@
-"""Holds in C, with the Python classes as their specification."""
+"""Holds in C, made from those in Python, which are their specification."""
 
 from __future__ import annotations
 
@@ -32,25 +32,23 @@ from hapticlink.orchestrator.run.energy.bonds import Reader
 from hapticlink.orchestrator.run.spring_holds import WithFurther
 from hapticlink.orchestrator.system.latency import Late, Link
 
-KINDS: Mapping[type[Hold], tuple[int, int]] = {
-    kind: (code, depth)
-    for code, depth, *kinds in (
-        (structures.ZERO_ORDER, 1, ZeroOrder, Latest),
-        (structures.LEAD, 2, Lead),
-        (structures.FIRST_ORDER, 2, FirstOrder),
-        (structures.FIRST_ORDER_DERIVATIVE, 1, FirstOrderDerivative),
-        (structures.SECOND_ORDER, 3, SecondOrder),
-        (structures.HERMITE, 2, Hermite),
-        (structures.DELAYED, 2, Delayed),
-        (structures.SMOOTH, 2, Smooth),
-        (structures.MEAN, 1, Mean),
-        (structures.PASSIVE_SET_POSITION, 1, PassiveSetPosition),
-        (structures.OBSERVED, 1, Passive, NearlyEnergyPreserving),
-        (structures.SLOPE, 2, Slope),
-    )
-    for kind in kinds
+KINDS: Mapping[type[Hold], int] = {
+    ZeroOrder: structures.ZERO_ORDER,
+    Latest: structures.ZERO_ORDER,
+    Lead: structures.LEAD,
+    FirstOrder: structures.FIRST_ORDER,
+    FirstOrderDerivative: structures.FIRST_ORDER_DERIVATIVE,
+    SecondOrder: structures.SECOND_ORDER,
+    Hermite: structures.HERMITE,
+    Slope: structures.SLOPE,
+    Delayed: structures.DELAYED,
+    Smooth: structures.SMOOTH,
+    Mean: structures.MEAN,
+    PassiveSetPosition: structures.PASSIVE_SET_POSITION,
+    Passive: structures.OBSERVED,
+    NearlyEnergyPreserving: structures.OBSERVED,
 }
-"""By class: its code in loop.h, and the number of samples that it keeps."""
+"""The holds that have C, with their names in loop.h."""
 DRAWN, FEW = 256, 16
 """Latencies that are drawn at a time, and samples that there is room for at first."""
 
@@ -205,7 +203,7 @@ class CompiledHold(Hold, State):
     ) -> None:
         self.own, angles, matrix, link, further, self.far = parts(hold)
         own = self.own
-        n, (code, depth) = len(held), KINDS[type(own)]
+        n, depth = len(held), getattr(own, "depth", 1)
         places = [*sources, *(further.where if further else ())]
         width, turned = len(places), len(angles.angles) if angles else 0
         rows = matrix.n if matrix else 0
@@ -215,7 +213,7 @@ class CompiledHold(Hold, State):
         self._sources, self._further = np.array(places, np.intp), further
         self._held, self._tank = held, tank
         self._c = c = self.structure(structures.Hold)
-        c.kind, c.n, c.width, c.depth = code, n, width, depth
+        c.kind, c.n, c.width, c.depth = KINDS[type(own)], n, width, depth
         c.samples, c.vectors = self.place(depth * width), self.place(8 * n)
         c.sources, c.held = self._sources.ctypes.data, held.ctypes.data
         if angles:

@@ -174,7 +174,7 @@ enum { NO_MATRIX, PROJECTOR, SEMIDEFINITE };
 
 enum {
     ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
-    MEAN, PASSIVE_SET_POSITION, OBSERVED, SLOPE
+    MEAN, PASSIVE_SET_POSITION, OBSERVED, SLOPE, SMOOTH_SLOPE /* of SMOOTH, no hold */
 };
 
 /* --- meters, tables --------------------------------------------------------------------------- */
@@ -316,7 +316,10 @@ static inline double tick_time(const Loop *l, int64_t tick) { /* s */
 #endif
 #endif
 
-enum { WARNING = 1 }; /* of FMI: a status up to it is a success */
+/* Of FMI: ok (0) and warning (1) are a success, and no other number is; status.py. */
+static inline int fmu_succeeded(int status) {
+    return status == 0 || status == 1;
+}
 
 int loop_carry_out(Loop *l, int64_t tick, At *at);
 int fmu_get(const Fmu *f, int64_t judged, At *at);

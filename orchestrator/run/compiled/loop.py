@@ -3,50 +3,39 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
-from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.machine import Machine
-from hapticlink.orchestrator.run.paced_events import Points
 from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.simulation import Simulation
 
 
 class CompiledLoop(PythonLoop):
-    """The same operations, in C where there is C for them."""
+    """The same operations, in C where there is C for them; alone in real time.
+
+    events: the clocks and the kinds of events. change_hold: see Machine.
+    """
 
     def __init__(self, plan: Plan, simulation: Simulation, library: ctypes.CDLL) -> None:
         machine = Machine(library, simulation)
         super().__init__(plan, simulation, machine.in_python, machine.joined)
         self._machine = machine
         timeline, pace = plan.system.timeline, simulation.pace
-        self._events = Events(machine, timeline, self._block, pace, simulation.sides)
+        self.change_hold = machine.change_hold
+        self.events = Events(machine, timeline, self._block, pace, simulation.sides)
 
     def run(self, turn: Callable[[int], object]) -> None:
         """Run all events; `turn` is called from time to time, and at the end, with the tick."""
         watch = self._machine.library.watch
         try:
             watch(True)
-            self._events.run(turn)
+            self.events.run(turn)
         finally:
             watch(False)
-            self.complete = self._events.complete
-
-    def prepare(self, kinds: Iterable[Event]) -> None:
-        """Bind kinds of events before they occur."""
-        for kind in kinds:
-            self._events.add(kind)
-
-    @property
-    def _points(self) -> Points:
-        return self._events
-
-    def change_hold(self, connection: str, hold: Hold) -> None:
-        """Replace a hold. Raises InputFault where there is no C for it."""
-        self._machine.change_hold(connection, hold)
+            self.complete = self.events.complete
 
     def _block(self, event: Event) -> tuple[int, int]:
         return self._machine.block(self._binder.instructions(self._plan.block(event)))

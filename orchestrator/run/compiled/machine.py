@@ -39,6 +39,7 @@ from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 from hapticlink.orchestrator.run.metered_operations import Feed, Move, Read, Sample
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
+from hapticlink.orchestrator.system.system import System
 
 EXACT = 2**53
 """Up to here every whole number is a double, and the quotient of two is rounded once."""
@@ -46,12 +47,9 @@ PATIENCE = 20_000_000
 """ns after which Python gets a turn: signals, progress."""
 
 
-def too_long(simulation: Simulation) -> str:
+def too_long(system: System) -> str:
     """Why the times of a run are not exact in the compiled loop, "" where they are."""
-    timeline, parts = (
-        simulation.system.timeline,
-        max(simulation.system.substeps.values(), default=1),
-    )
+    timeline, parts = system.timeline, max(system.coupling.substeps.values(), default=1)
     base, last = timeline.base, timeline.end + max(c.longest for c in timeline.clocks)
     if max(last * parts * base.numerator, base.denominator * parts) < EXACT:
         return ""
@@ -90,7 +88,9 @@ class Machine:
 
     def _make_holds(self) -> None:
         simulation, system = self._simulation, self._simulation.system
-        rolls_back = system.coupling == "iterated" or system.step_control is not None
+        rolls_back = (
+            system.coupling.scheme == "iterated" or system.coupling.step_control is not None
+        )
         shared = tanks(simulation.holds.values(), rolls_back)
         for name, hold in simulation.holds.items():
             own = parts(hold).own

@@ -1,5 +1,5 @@
-/* Real time: when an event is due, and how late and how long it was. orchestrator/run/pace.py is the
- * specification. */
+/* Real time: when an event is due, and how late and how long it was. orchestrator/run/pace.py has the
+ * definitions. */
 
 #include "loop.h"
 

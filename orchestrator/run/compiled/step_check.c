@@ -51,20 +51,20 @@ int fmu_checked_step(Fmu *f, double time, double end, double size, At *at) {
     const int regular = (*c->steps + 1) % c->every == c->first, jumped = moved(c, f->outputs);
     const int due = regular || jumped;
     if (due && (f->get_state || f->place->ended || *c->count == c->room)) return CALL;
-    if (due && fmu_save(f, c->get_state, c->state) > WARNING) return CALL;
+    if (due && !fmu_succeeded(fmu_save(f, c->get_state, c->state))) return CALL;
     note_rates(c, f->outputs, jumped);
     ++*c->steps;
     if (!due) return fmu_step(f, time, end, size, at);
     const size_t bytes = f->n_outputs * sizeof(double);
     const double half = (end - time) / 2;
     memcpy(c->before, f->outputs, bytes);
-    const int halved = fmu_do_step(f, time, half) <= WARNING
-                       && fmu_do_step(f, time + half, half) <= WARNING && !fmu_get(f, 0, at);
+    const int halved = fmu_succeeded(fmu_do_step(f, time, half))
+                       && fmu_succeeded(fmu_do_step(f, time + half, half)) && !fmu_get(f, 0, at);
     if (halved) memcpy(c->halves, f->outputs, bytes);
     f->place->rollbacks++;
     f->place->setter = 0;
     at->status = ((SetState)c->set_state)(f->fmu, *(void **)c->state);
-    int code = at->status > WARNING ? UNRESTORED : fmu_step(f, time, end, size, at);
+    int code = !fmu_succeeded(at->status) ? UNRESTORED : fmu_step(f, time, end, size, at);
     if (!code && !(code = fmu_get(f, 0, at)) && halved)
         compare(c, f->outputs, time, end, regular ? (double)c->every : 1.0);
     memcpy(f->outputs, c->before, bytes);

@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hapticlink.orchestrator.base.faults import Diverged
-from hapticlink.orchestrator.run.energy.meter import Energy
+from hapticlink.orchestrator.base.loop_names import CONTROLLER, MECHANISM
+from hapticlink.orchestrator.results.record import Energy
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.haptic_loop import CONTROLLER, MECHANISM
 from hapticlink.orchestrator.system.system import System
 
 LEAST = 1e-6
@@ -26,7 +26,7 @@ class Balance:
 
     def __init__(self, system: System, signals: SignalVector) -> None:
         self._system, self._values = system, signals.values
-        judged = system.energy_in_play is not None and MECHANISM in system.fmu
+        judged = system.energy.in_play is not None and MECHANISM in system.fmu
         self._place = signals.scalar(MECHANISM, "energy") if judged else None
         self._start = 0.0
 
@@ -39,10 +39,11 @@ class Balance:
         put in; None where the balance holds."""
         if self._place is None:
             return None
-        assert self._system.energy_in_play is not None
+        in_play = self._system.energy.in_play
+        assert in_play is not None
         work = [e.held for n, e in booked.items() if self._system.connection[n].target == MECHANISM]
         gained = float(self._values[self._place]) - self._start - sum(work)
-        scale = abs(self._start) + sum(map(abs, work)) + self._system.energy_in_play + LEAST
+        scale = abs(self._start) + sum(map(abs, work)) + in_play + LEAST
         if gained <= scale:
             return None
         what = f"has {gained:.3g} J more than it had at the start and was given: the run has"

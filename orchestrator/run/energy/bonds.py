@@ -51,7 +51,7 @@ class Bond:
 
 def bond(c: Connection, system: System, signals: SignalVector) -> Bond | None:
     target = system.fmu[c.target].description
-    pairs = [(i, s, paired(c, s, system.power)) for i, s in enumerate(c.inputs)]
+    pairs = [(i, s, paired(c, s, system.energy.power)) for i, s in enumerate(c.inputs)]
     found = [(i, s, p) for i, s, p in pairs if p]
     if not found or c.initial:
         return None

@@ -15,7 +15,6 @@ changes over the substeps of a step counts with its mean.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import reduce
 from typing import NamedTuple, TypeVar
 
@@ -23,24 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.results.record import Energy
 
 Read = Callable[[], Vector]
 Rows = TypeVar("Rows", NDArray[np.float64], NDArray[np.int64])
 ROWS = 1024
 """Rows of the target's steps that are kept before they are added to the sums."""
 Mark = tuple[int, int, int]
-
-
-@dataclass(frozen=True)
-class Energy:
-    """Energies (J) of a connection from 0 to `until` (s), the newest sample of the source that the
-    target has stepped past; symbols as in the module's text."""
-
-    generated: float
-    held: float
-    ideal: float
-    until: float
-    peak: float
 
 
 class _Sums(NamedTuple):

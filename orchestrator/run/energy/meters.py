@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from hapticlink.orchestrator.results.record import Energy
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
-from hapticlink.orchestrator.run.energy.meter import Energy, Mark, Meter
+from hapticlink.orchestrator.run.energy.meter import Mark, Meter
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import System
 
@@ -18,7 +19,7 @@ class Meters:
         self.of_source: dict[str, list[str]] = {}
         self.of_target: dict[str, list[str]] = {}
         self._seconds = float(system.timeline.base)
-        self.shares = {name: 1.0 / parts for name, parts in system.substeps.items()}
+        self.shares = {name: 1.0 / parts for name, parts in system.coupling.substeps.items()}
         for c in system.connections:
             found = bond(c, system, signals)
             if found is None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import chain, islice
 
 from hapticlink.orchestrator.base.faults import COUNTED
+from hapticlink.orchestrator.scene.blocks import blocks as plan_blocks
 from hapticlink.orchestrator.scene.checks import (
     blocks,
     contacts,
@@ -28,16 +29,17 @@ def check(scene: Scene) -> list[Problem]:
     if shapes and scene.contacts:
         # The broad phase needs a valid tree and valid polygons.
         scene = replace(scene, contacts=replace(scene.contacts, broad_phase=False))
+    planned = plan_blocks(scene)
     rest = chain(
         _condition(scene),
-        rates.check(scene),
+        rates.check(scene, planned),
         coupling.delays(scene),
         blocks.missing(scene),
-        fmus.check(scene),
+        fmus.check(scene, planned),
         shapes,
         device.check(scene),
         coupling.check(scene),
-        blocks.check(scene),
+        blocks.check(scene, planned),
     )
     return list(islice(rest, COUNTED))
 

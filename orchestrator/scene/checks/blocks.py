@@ -5,19 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hapticlink.orchestrator.scene.blocks import (
-    blocks,
-    directions_from_graphics,
-    mobility_from_graphics,
-)
+from hapticlink.orchestrator.scene.blocks import Blocks, from_graphics
 from hapticlink.orchestrator.scene.checks.linkage import points
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check(scene: Scene) -> Iterator[Problem]:
+def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
     yield from points(scene)
-    if scene.packaging == "native" and not blocks(scene):
+    if scene.packaging == "native" and not blocks.built:
         message = (
             "'native' compiles the scene's own blocks, and every FMU here is ready: take it out"
         )
@@ -57,9 +53,8 @@ def missing(scene: Scene) -> Iterator[Problem]:
     if not scene.graphics:
         if scene.mechanism_at == "graphics":
             yield ("mechanism_at",), "there is no graphics rate: add [graphics] with its rate"
-        if scene.directions_from == "graphics" and (
-            mobility_from_graphics(scene) or directions_from_graphics(scene)
-        ):
+        wanted = from_graphics(scene)
+        if wanted.mobility or wanted.directions:
             yield (
                 ("directions_from",),
                 "the controller needs Lambda_inv and P_c: add [graphics], or take "

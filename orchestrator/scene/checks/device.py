@@ -31,9 +31,6 @@ def _device(device: Device, here: Path) -> Iterator[Problem]:
             "upward, plane B downward"
         )
         yield (*here, "base_y_a"), message
-    if device.sensing != "ideal":
-        table = ".".join(map(str, here))
-        yield (*here, "sensing"), f"write sensing = {device.sensing!r} outside of [{table}]"
     reach = device.proximal_length + device.distal_length
     folded = abs(device.proximal_length - device.distal_length)
     if (2 * device.reach_limit - 1) * reach <= folded:

@@ -8,14 +8,14 @@ from collections.abc import Collection, Iterator
 
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.faults import unknown
-from hapticlink.orchestrator.scene.blocks import loop_blocks, loop_names
+from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check(scene: Scene) -> Iterator[Problem]:
-    taken = dict.fromkeys(b.name for b in loop_blocks(scene))
+def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
+    taken = dict.fromkeys(b.name for b in blocks.own)
     for i, fmu in enumerate(scene.fmu):
         path: Path = ("fmu", i)
         if not re.fullmatch(r"\w+", fmu.name):
@@ -26,7 +26,7 @@ def check(scene: Scene) -> Iterator[Problem]:
         yield from _source(path, fmu)
         yield from _velocity(path, fmu, scene)
         if fmu.replaces is not None:
-            yield from _replacement(path, fmu, loop_names(scene))
+            yield from _replacement(path, fmu, [b.name for b in blocks.loop])
     for i, wire in enumerate(scene.connection):
         for key, end in (("from", wire.from_), ("to", wire.to)):
             fmu_name, dot, variable = end.partition(".")

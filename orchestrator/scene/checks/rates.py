@@ -3,17 +3,17 @@ message with remedy)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from hapticlink.orchestrator.base.faults import unknown
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.scene.blocks import fmu_rates
+from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.rates import AnyRate, Seconds, VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check(scene: Scene) -> Iterator[Problem]:
+def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
     if exact(scene.duration) * exact(scene.haptics.rate) < 1:
         yield (
             ("duration",),
@@ -33,7 +33,7 @@ def check(scene: Scene) -> Iterator[Problem]:
             yield path, "there is no graphics rate: add [graphics] with its rate"
         elif fmu.rate not in (None, "haptics", "graphics"):
             yield from _rate(path, fmu.rate, scene)
-    yield from _phases(scene)
+    yield from _phases(scene, blocks.rates)
 
 
 def _rate(path: Path, rate: AnyRate, scene: Scene) -> Iterator[Problem]:
@@ -47,8 +47,7 @@ def _rate(path: Path, rate: AnyRate, scene: Scene) -> Iterator[Problem]:
             yield path, "times must rise: sort them and drop repeated ones"
 
 
-def _phases(scene: Scene) -> Iterator[Problem]:
-    known = fmu_rates(scene)
+def _phases(scene: Scene, known: Mapping[str, AnyRate]) -> Iterator[Problem]:
     for fmu, phase in scene.phases.items():
         path: Path = ("phases", fmu)
         if fmu not in known:

@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import cache
 
 import numpy as np
 import pytest
 
 from hapticlink.analysis.findings import summary
-from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.analysis.findings.user_port import UserPort, user_port
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.figures.run_figures import figures
+
+
+@cache
+def account(scene: str, *options: str) -> tuple[Results, UserPort | None]:
+    """A run in memory and the energy at its user's port."""
+    with temporary_folders.room() as folder:
+        results = simulate(scene, folder, options, csv=False).results
+    return results, user_port(results)
+
+
+def with_port(scene: str, *options: str) -> tuple[Results, UserPort]:
+    """As `account`, of a run that has one."""
+    results, port = account(scene, *options)
+    assert port
+    return results, port
+
 
 SECOND = (
     "linkage.point=[{name='left', body='link4', at=[0.02, 0.0]}]",
@@ -36,24 +53,21 @@ SCENES = [
 
 
 @pytest.mark.parametrize(("scene", "options"), SCENES)
-def test_its_blocks_are_all_of_it(tmp_path: Path, scene: str, options: tuple[str, ...]) -> None:
+def test_its_blocks_are_all_of_it(scene: str, options: tuple[str, ...]) -> None:
     """The blocks add up to the port at every sample, which is found from energy and works alone;
     what the mechanism loses is its energy less the meters' works, and without friction, contacts
     and drives, run at the ticks, nothing."""
-    results = simulate(scene, tmp_path, ["duration=1.0", *options]).results
-    port = user_port(results)
-    assert port
+    results, port = with_port(scene, "duration=1.0", *options)
     total = sum(port.blocks_J.values())
     assert np.abs(total - port.generated_J).max() < 1e-15 + 1e-13 * np.abs(port.generated_J).max()
-    across = results.run["energies"]
-    booked = ({} if across == "none" else across) | results.run["energies_within_a_rate"]
-    if port.time_s[-1] == results.run["end"]["time"]:
-        on_handle = booked["hand.F -> haptic_device.F_hand"]["held"]
+    meters = results.record.meters
+    if port.time_s[-1] == results.record.end.time:
+        on_handle = meters["hand.F -> haptic_device.F_hand"].held
         assert port.works["hand"] == pytest.approx(on_handle)
     energy = next(t["virtual_mechanism.energy"] for t in results.tables.values()
                   if "virtual_mechanism.energy" in t)  # fmt: skip
-    into = sum(e["held"] for n, e in booked.items() if "-> virtual_mechanism." in n)
-    lost = port.told["blocks"]["mechanism"]["generated"]
+    into = sum(e.held for n, e in meters.items() if "-> virtual_mechanism." in n)
+    lost = port.measured.blocks["mechanism"].generated
     assert lost == pytest.approx(energy[-1] - energy[0] - into, abs=1e-6)
     if scene == "closed-loop":
         assert abs(lost) < 1e-6
@@ -67,13 +81,12 @@ LATE = [
 
 @pytest.mark.parametrize(("scene", "options", "ticks"), LATE)
 def test_a_force_that_comes_late_counts_where_it_acts(
-    tmp_path: Path, scene: str, options: tuple[str, ...], ticks: int
+    scene: str, options: tuple[str, ...], ticks: int
 ) -> None:
     """By a latency, or in the order of Jacobi, a force acts `ticks` after its stamp: paired with
     the displacements there, at every sample (the first one acts until the second arrives)."""
-    found = simulate(scene, tmp_path, ["duration=0.5", *options]).results
-    port, table = user_port(found), found.haptics
-    assert port
+    results, port = with_port(scene, "duration=0.5", *options)
+    table = results.haptics
     work = np.zeros(len(table["time"]))
     for hand, handle in (("hand", "haptic_device"), ("hand_left", "haptic_device_left")):
         force = table[f"{hand}.F"]
@@ -85,9 +98,7 @@ def test_a_force_that_comes_late_counts_where_it_acts(
 
 
 @pytest.mark.parametrize("link", [{"loss": 0.3}, {"max": 0.02}, {"max": 0.02, "loss": 0.3}])
-def test_a_force_that_is_lost_or_overtaken_does_not_act(
-    tmp_path: Path, link: dict[str, float]
-) -> None:
+def test_a_force_that_is_lost_or_overtaken_does_not_act(link: dict[str, float]) -> None:
     """The newest force that has arrived acts, each with a latency and a luck drawn by PCG64 (that
     of t = 0 is known, and sent again by a sampled hand)."""
     rows = [[t / 10, *np.cos([9 * t, 7 * t, 5 * t]) * (0.6, 0.6, 0.01)] for t in range(11)]
@@ -99,9 +110,8 @@ def test_a_force_that_is_lost_or_overtaken_does_not_act(
             for key, value in (link | {"seed": 2}).items()
         ),
     ]
-    found = simulate("closed-loop", tmp_path, options).results
-    port, table = user_port(found), found.haptics
-    assert port
+    results, port = with_port("closed-loop", *options)
+    table = results.haptics
     force, x = table["hand.F"], table["haptic_device.x_true"]
     drawn = np.random.Generator(np.random.PCG64(2)).random((len(force), 2))[1:]
     late = np.ceil(drawn[:, 0] * link.get("max", 0.0) * 512 - 1e-9)
@@ -114,26 +124,24 @@ def test_a_force_that_is_lost_or_overtaken_does_not_act(
     np.testing.assert_allclose(port.generated_J, expected, atol=1e-9 * np.abs(work).max())
 
 
-def test_a_meter_that_stops_between_two_frames(tmp_path: Path) -> None:
+def test_a_meter_that_stops_between_two_frames() -> None:
     """A hand half a tick beside the others: its work until the last frame is that of its samples,
     whatever the energy between the frames before."""
     options = ["duration=0.5", "phases.hand=1/1024", "hand.wrench=[-0.5, 0.0, 0.0]"]
-    found = simulate("closed-loop-direct", tmp_path, options).results
-    port, frames, ticks = user_port(found), found.graphics, found.haptics
-    assert port
+    results, port = with_port("closed-loop-direct", *options)
+    frames, ticks = results.graphics, results.haptics
     x = np.interp(frames["time"], ticks["time"], ticks["haptic_device.x_true"][:, 0])
     energy = frames["virtual_mechanism.energy"]
     np.testing.assert_allclose(port.generated_J, energy - energy[0] + 0.5 * (x - x[0]), atol=1e-12)
 
 
-def test_a_run_that_ends_beside_a_frame(tmp_path: Path) -> None:
+def test_a_run_that_ends_beside_a_frame() -> None:
     """Meters stop at the newest sample of the source that the mechanism has stepped past, the
     account at the newest one of the mechanism, 2 ms later: the mechanism's loss is still its energy
     less the work of what it held from frame to frame."""
-    found = simulate("closed-loop-direct", tmp_path, ["duration=0.95"]).results
-    port, frames, ticks = user_port(found), found.graphics, found.haptics
-    assert port
-    assert port.time_s[-1] > found.run["energies"]["hand.F -> virtual_mechanism.F_hand"]["until"]
+    results, port = with_port("closed-loop-direct", "duration=0.95")
+    frames, ticks = results.graphics, results.haptics
+    assert port.time_s[-1] > results.record.meters["hand.F -> virtual_mechanism.F_hand"].until
     rows = np.searchsorted(ticks["time"], frames["time"][:-1] + 1e-12, "right") - 1
     acts = (ticks["hand.F"] - ticks["controller.F_drift"])[rows]
     work = (acts * np.diff(frames["virtual_mechanism.x"], axis=0)).sum()
@@ -142,70 +150,62 @@ def test_a_run_that_ends_beside_a_frame(tmp_path: Path) -> None:
     assert lost == pytest.approx(energy[-1] - energy[0] - work, abs=1e-9)
 
 
-def test_a_meter_that_goes_on_after_the_last_frame(tmp_path: Path) -> None:
+def test_a_meter_that_goes_on_after_the_last_frame() -> None:
     """The hand's work until the mechanism's last frame is that of its constant wrench until then,
     without that of the ticks after it, which the meter has."""
     options = ["duration=0.6", "graphics.rate=60", "hand.wrench=[-0.5, 0.0, 0.0]"]
-    found = simulate("closed-loop-direct", tmp_path, options).results
-    port, frames, ticks = user_port(found), found.graphics, found.haptics
-    assert port
-    assert found.run["energies_within_a_rate"]["hand.F -> haptic_device.F_hand"]["until"] > (
-        port.time_s[-1] + 0.01
-    )
+    results, port = with_port("closed-loop-direct", *options)
+    frames, ticks = results.graphics, results.haptics
+    until = results.record.meters["hand.F -> haptic_device.F_hand"].until
+    assert until > port.time_s[-1] + 0.01
     x = np.interp(frames["time"], ticks["time"], ticks["haptic_device.x_true"][:, 0])
     energy = frames["virtual_mechanism.energy"]
     np.testing.assert_allclose(port.generated_J, energy - energy[0] + 0.5 * (x - x[0]), atol=1e-12)
 
 
-def test_a_hold_of_its_drift_force_is_that_of_the_meter(tmp_path: Path) -> None:
-    results = simulate("closed-loop-direct", tmp_path, ["duration=1.0"]).results
-    port = user_port(results)
-    assert port
+def test_a_hold_of_its_drift_force_is_that_of_the_meter() -> None:
+    results, port = with_port("closed-loop-direct", "duration=1.0")
+    blocks = port.measured.blocks
     name = "controller.F_drift -> virtual_mechanism.F_drift"
-    hold = port.told["blocks"]["hold of controller.F_drift on the mechanism"]["generated"]
-    assert hold == pytest.approx(results.run["energies"][name]["generated"], abs=1e-12)
-    assert hold == pytest.approx(max(b["generated"] for b in port.told["blocks"].values()))
+    hold = blocks["hold of controller.F_drift on the mechanism"].generated
+    assert hold == pytest.approx(results.record.across[name].generated, abs=1e-12)
+    assert hold == pytest.approx(max(block.generated for block in blocks.values()))
 
 
-def test_all_blocks_vanish_with_the_step(tmp_path: Path) -> None:
+def test_all_blocks_vanish_with_the_step() -> None:
     """At one rate, with all velocity terms, every block vanishes with the step."""
-    found = []
+    generated = []
     for rate in (512, 4096):
         options = [f"haptics.rate={rate}", f"graphics.rate={rate}", "controller.bias=full"]
-        port = user_port(simulate("closed-loop", tmp_path / str(rate), options).results)
-        assert port
-        found.append({n: abs(b["generated"]) for n, b in port.told["blocks"].items()})
-    coarse, fine = found
-    assert sum(fine.values()) < sum(coarse.values()) / 4
+        _, port = with_port("closed-loop", *options)
+        generated.append(sum(abs(b.generated) for b in port.measured.blocks.values()))
+    coarse, fine = generated
+    assert fine < coarse / 4
 
 
-def test_a_held_mobility_modulates_power(tmp_path: Path) -> None:
+def test_a_held_mobility_modulates_power() -> None:
     """No force crosses a rate, and yet the frames' rate decides what the motors give: less at each
     higher rate, to nothing where the frames are the ticks."""
     works = []
     for rate in (10, 30, 60, 512):
         options = [f"graphics.rate={rate}", "mechanism.directions=true", "controller.bias=full"]
-        found = simulate("closed-loop", tmp_path / str(rate), options).results
-        port = user_port(found)
-        assert port
+        _, port = with_port("closed-loop", *options)
         works.append(port.works["held mobility"])
     assert np.all(np.diff(works) < 0.0)
     assert works[0] > 4e-3
     assert works[-1] < 0.2 * works[2]
 
 
-def test_contacts_have_an_account_on_both_sides(tmp_path: Path) -> None:
+def test_contacts_have_an_account_on_both_sides() -> None:
     """Walls take energy; the handle, a little elsewhere, gives up nearly the same."""
-    port = user_port(simulate("enclosure", tmp_path, ["graphics.rate=60"]).results)
-    assert port
+    _, port = with_port("enclosure", "graphics.rate=60")
     handle, mechanism = (port.works[name] for name in ("F_env", "F_env on the mechanism"))
     assert mechanism < -1e-3
     assert handle == pytest.approx(mechanism, rel=0.1)
 
 
-def test_without_a_handle_there_is_none(tmp_path: Path) -> None:
-    found: Results = simulate("five-bar", tmp_path, ["duration=0.01"]).results
-    assert user_port(found) is None
+def test_without_a_handle_there_is_none() -> None:
+    assert account("five-bar", "duration=0.01")[1] is None
 
 
 LACKING = [
@@ -215,28 +215,23 @@ LACKING = [
 ]
 
 
-def test_a_handle_that_something_else_pushes_has_none(tmp_path: Path) -> None:
+def test_a_handle_that_something_else_pushes_has_none() -> None:
     """The work on it is not that of `hand.F`."""
     other = "connection=[{from='hand_left.F', to='haptic_device.F_hand'}]"
-    results = simulate("closed-loop", tmp_path, ["duration=0.1", *SECOND, other]).results
-    assert user_port(results) is None
-    told = [line for line in summary.lines(results) if "no energy at the user's port" in line]
-    assert "hand_left.F -> haptic_device.F_hand" in told[0]
+    results, port = account("closed-loop", "duration=0.1", *SECOND, other)
+    assert port is None
+    notes = [line for line in summary.lines(results) if "no energy at the user's port" in line]
+    assert "hand_left.F -> haptic_device.F_hand" in notes[0]
 
 
-@pytest.mark.parametrize(("signals", "found"), LACKING)
-def test_what_is_not_recorded_is_nobodys_energy(
-    tmp_path: Path, signals: list[str], found: bool
-) -> None:
+@pytest.mark.parametrize(("signals", "has_port"), LACKING)
+def test_what_is_not_recorded_is_nobodys_energy(signals: list[str], has_port: bool) -> None:
     """Without another hand's work there is no energy at the port, which would be the work's size;
     without a block's wrench no block, since others would have its energy."""
-    options = ["duration=0.2", f"record.signals={signals}"]
-    results = simulate("two-users", tmp_path, options).results
-    port = user_port(results)
-    assert bool(port) == found
+    results, port = account("two-users", "duration=0.2", f"record.signals={signals}")
+    assert bool(port) == has_port
     if port:
-        whole = user_port(simulate("two-users", tmp_path, options[:1]).results)
-        assert whole
+        _, whole = with_port("two-users", "duration=0.2")
         np.testing.assert_array_equal(port.generated_J, whole.generated_J)
         assert whole.blocks_J
         assert not port.blocks_J

@@ -14,7 +14,7 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.trajectory import Trajectory, trajectory
 from tests.analysis.stability.test_virtual_coupling import HELD, POINT
 
-LINKAGES = Path(__file__).parents[3] / "orchestrator" / "study" / "linkages"
+LINKAGES = Path(__file__).parents[3] / "studies" / "mismatch" / "linkages"
 FOUR_BAR, SLIDER_CRANK = LINKAGES / "four-bar.toml", LINKAGES / "slider-crank.toml"
 
 
@@ -168,7 +168,7 @@ def test_a_variant_without_an_equilibrium_nearby_is_run_from_its_own_start(
     scene = hl.scene("virtual-wall", {"linkage.start.rail": 0.001, "duration": 1.0})
     soft, stiff = ([f"fmu.wall.start.stiffness={K}"] for K in (1000, 4000))
     for variants in ((soft, stiff), (stiff,)):
-        with loaded_variants.Session(scene) as judge:
+        with loaded_variants.LoadedVariants(scene) as judge:
             for variant in variants:
                 judge.judge(variant)
     assert begun[1] == pytest.approx(begun[2], rel=1e-12, abs=1e-15)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.stability import tangent
+from hapticlink.analysis.stability import forward_sensitivity
 
 Vector = NDArray[np.float64]
 HELD: dict[str, Any] = {
@@ -51,18 +51,18 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
     differ by d |f''| bounds the first."""
     scene, options, without = CASES[case]
     compared, worst = 0, 0.0
-    decide = tangent.decided
+    decide = forward_sensitivity.decided
 
     def watched(exact: Vector, slope: Vector, error: Vector) -> Any:
         nonlocal compared, worst
-        rounding = AMPLIFIED * np.finfo(float).eps / tangent.STEP
+        rounding = AMPLIFIED * np.finfo(float).eps / forward_sensitivity.STEP
         allowed = np.abs(error) + rounding * max(1.0, np.abs(slope).max(initial=0.0))
         has = np.isfinite(exact)
         compared += int(np.count_nonzero(exact[has]))
         worst = max(worst, (np.abs(slope - exact) / allowed)[has].max(initial=0.0))
         return decide(exact, slope, error)
 
-    monkeypatch.setattr(tangent, "decided", watched)
+    monkeypatch.setattr(forward_sensitivity, "decided", watched)
     found = hl.stability(scene, options)
     assert compared > 10
     assert worst < 1.0
@@ -71,7 +71,7 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
         assert graph == "graph"
         assert set(filter(None, others.split(", "))) <= without.get(fmu, set())
 
-    monkeypatch.setattr(tangent, "graph_slopes", lambda *_: None)
+    monkeypatch.setattr(forward_sensitivity, "graph_slopes", lambda *_: None)
     differences = hl.stability(scene, options)
     assert set(differences.linearised.values()) == {"differences"}
     both = found.uncertainty + differences.uncertainty

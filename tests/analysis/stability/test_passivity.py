@@ -9,7 +9,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
-from hapticlink.analysis.stability.opened_ports import hand_port, mechanism_port
+from hapticlink.analysis.stability.port_response import hand_port, mechanism_port
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.system.built import built
 

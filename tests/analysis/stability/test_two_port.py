@@ -14,17 +14,21 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from hapticlink.analysis.stability import passivity
-from hapticlink.analysis.stability.absolute_stability import lacking, lacking_of_two, least
+from hapticlink.analysis.stability.absolute_stability import (
+    damping_shortage,
+    damping_shortage_of_two,
+    least,
+)
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.lifted_map import opened
-from hapticlink.analysis.stability.opened_ports import HandPort, MechanismPort
+from hapticlink.analysis.stability.lifted_map import lifted_map
 from hapticlink.analysis.stability.passivity import Passivity
+from hapticlink.analysis.stability.port_response import HandPort, MechanismPort
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.run.test_multirate import F, V, X
 from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed
@@ -88,7 +92,7 @@ def judged(folder: Path, rate: int) -> Passivity:
     rows = [(f"device.{s}", f"{to}.{s}") for s in "xv" for to in ("hand", "coupling")]
     rows += [("mechanism.x", "coupling.x_l"), ("mechanism.v", "coupling.v_l")]
     rows += [("coupling.F", "device.F"), ("coupling.F", "mechanism.F"), ("hand.F", "device.F_h")]
-    made = System(fmus, connected(fmus, rows, timeline)[0], timeline, "gauss-seidel")
+    made = System(fmus, connected(fmus, rows, timeline)[0], timeline, Coupling("gauss-seidel"))
     place = SignalVector(made).scalar
     hand = HandPort(
         "hand", "device", ("F_h",), (place("hand", "F"),),
@@ -97,7 +101,7 @@ def judged(folder: Path, rate: int) -> Passivity:
     port = MechanismPort(
         "mechanism", ((("F", -1.0),),), (place("mechanism", "x"),), (place("mechanism", "v"),)
     )
-    with opened(made) as map_:
+    with lifted_map(made) as map_:
         return passivity.of(
             "two masses", map_, equilibrium(map_, trajectory(map_, 1.0)), hand, port, T
         )
@@ -183,7 +187,7 @@ def test_no_passive_ends_are_unstable_with_the_damping_and_some_are_with_less(fo
 def worst(Z: Complex, b: float, hertz: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Passive ends (m, b, k) that oscillate with Z + b I at a frequency, with half the damping
     that they could have."""
-    _, s = lacking_of_two(Z, 1)
+    _, s = damping_shortage_of_two(Z, 1)
     D = np.diag([np.exp(s), 1.0])
     Z = Z + b * np.eye(2)
     scaled = D @ Z @ np.linalg.inv(D)
@@ -213,7 +217,7 @@ def test_the_impedance_display_of_adams_and_hannaford() -> None:
                 Z = np.array([[Z_d + hold * Z_c, hold * Z_c], [Z_c, Z_c]])
                 margin = (1 / Z_c).real / limit - 1
                 if abs(margin) > 1e-3:
-                    verdicts.append((margin > 0, lacking_of_two(Z, 1)[0] < 0))
+                    verdicts.append((margin > 0, damping_shortage_of_two(Z, 1)[0] < 0))
     assert len(set(verdicts)) == 2  # both occur, and both always agree
     assert all(theirs == ours for theirs, ours in verdicts)
 
@@ -224,14 +228,14 @@ def test_with_several_directions_the_damping_is_necessary_and_sufficient() -> No
     generator = np.random.Generator(np.random.PCG64(5))
     for _ in range(20):
         Z = generator.normal(size=(6, 6)) + 1j * generator.normal(size=(6, 6))
-        b, s = lacking_of_two(Z, 3)
+        b, s = damping_shortage_of_two(Z, 3)
         D = np.diag(np.repeat([np.exp(s), 1.0], 3))
         assert least(D @ Z @ np.linalg.inv(D) + b * np.eye(6)) == pytest.approx(0.0, abs=1e-6)
         assert least(Z) >= b - 1e-9
         below = Z + (b - 0.05) * np.eye(6)
         assert flow(below) is not None
         assert flow(Z + (b + 0.05) * np.eye(6)) is None
-        assert lacking(Z, [3, 3]) == pytest.approx(b, abs=0.05 * abs(b))
+        assert damping_shortage(Z, [3, 3]) == pytest.approx(b, abs=0.05 * abs(b))
 
 
 def flow(Z: Complex) -> Complex | None:

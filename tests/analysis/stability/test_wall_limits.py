@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
-from hapticlink.analysis.stability.loaded_variants import Session
+from hapticlink.analysis.stability.loaded_variants import LoadedVariants
 from hapticlink.orchestrator import open_scene
 
 M, D, T = 0.3, 5.0, 1 / 512
@@ -158,7 +158,7 @@ TABLE = [0.1810, 0.3273, 0.4435, 0.5333, 0.6000, 0.6462, 0.6741, 0.6857, 0.6828]
 
 
 def test_the_lifted_map_has_the_table_of_a_sampled_damper() -> None:
-    with Session(open_scene.load("virtual-wall", UNDAMPED)) as session:
+    with LoadedVariants(open_scene.load("virtual-wall", UNDAMPED)) as session:
         for n, alpha in enumerate(TABLE, start=1):
             gains = [f"{DAMPING}={n / 10 * M / T}"]
             for share, verdict in ((0.995, "stable"), (1.005, "unstable")):

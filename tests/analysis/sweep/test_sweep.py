@@ -8,9 +8,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from decimal import Decimal
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,9 +26,10 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import process_cache
+from hapticlink.orchestrator.results.record import Energy
 from hapticlink.orchestrator.results.tables import Results, Table
-from hapticlink.orchestrator.run.energy.meter import Energy
 from hapticlink.visualization.figures import sweep_figure
+from tests.orchestrator.results.records import run_json
 from tests.shared_fixtures import status
 
 # --- what is varied ---------------------------------------------------------------------------
@@ -144,23 +145,19 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
             np.column_stack([slow, rest, count, closure]),
         ),
     }
-    fmus = {name: {"block": name} for name in ("virtual_mechanism", "haptic_device")}
-    held = SimpleNamespace(name="a -> b", hold="zoh")
-    within = SimpleNamespace(name="c -> d", hold=None)
-    outcome = SimpleNamespace(
-        reason="stop_when", end_time=1.0, fault=None, wall_time=0.5,
-        energies={
-            "a -> b": Energy(0.25, 1.0, 0.75, 1.0, 0.5), "c -> d": Energy(9.0, 9.0, 0.0, 1.0, 9.0),
-        },
+    fmus = {
+        name: {"rate": "haptics", "timing": "continuous", "block": name}
+        for name in ("virtual_mechanism", "haptic_device")
+    }
+    run = run_json(
+        fmus=fmus,
+        holds={"a -> b": "zoh"},
+        end={"reason": "stop_when", "time": 1.0},
+        energies={"a -> b": asdict(Energy(0.25, 1.0, 0.75, 1.0, 0.5))},
+        energies_within_a_rate={"c -> d": asdict(Energy(9.0, 9.0, 0.0, 1.0, 9.0))},
         calls={"m": {"step": 10, "get": 11}},
-    )  # fmt: skip
-    made = row.measure(
-        SimpleNamespace(  # type: ignore[arg-type]
-            outcome=outcome,
-            system=SimpleNamespace(connections=[held, within]),
-            results=Results(tmp_path, {"fmus": fmus}, tables),
-        )
     )
+    made = row.of_results(Results(tmp_path, run, tables))
     assert made["tracking_max_mm"] == pytest.approx(5, rel=1e-12)
     grid_rms = 5 * np.sqrt(np.mean(slow**2))
     assert made["tracking_rms_mm"] == pytest.approx(grid_rms, rel=1e-12)

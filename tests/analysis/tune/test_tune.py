@@ -18,7 +18,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.stability.linearise import linearised
+from hapticlink.analysis.stability.linearisation import linearised
 from hapticlink.analysis.tune.held_equilibria import held
 from hapticlink.analysis.tune.poses import LIGHT, Pose
 from hapticlink.analysis.tune.search import COARSE, search
@@ -26,8 +26,8 @@ from hapticlink.analysis.tune.spring_hand import FIRM, HANDS, spring
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.overrides import written
 
-RECORDED = Path(__file__).parents[2] / "results" / "tune"
-TUNED = sorted(path.parent.name for path in RECORDED.glob("*/tune.json"))
+RECORDED = Path(__file__).parents[3] / "results" / "tune"
+TUNED = ("closed-loop", "enclosure", "obstacles", "serial", "telescope")
 NO_ENCODER = ("device.encoder_resolution=1e-12",)
 """The map has no quantisation."""
 
@@ -123,7 +123,7 @@ def test_felt_stiffness_has_its_closed_form(
     """The closed form is the limit of high rates."""
     pose = Pose(0.0, {"rail": 0.0205}, (0.0205, 0.0, 0.0), (1.0, 0.0, 0.0))
     options = pose.options((f"haptics.rate={rate}", f"graphics.rate={rate // 16}"))
-    with held(open_scene.load(slider, options)) as place:
+    with held(slider, options) as place:
         X = place.compliance({}, FIRM, hertz)
         assert place.signal("virtual_mechanism.F_env")[0] == pytest.approx(-1.0, abs=0.03)
         M = place.signal("haptic_device.M").reshape(3, 3)
@@ -230,7 +230,7 @@ def test_rest_is_found_with_gains_that_are_unstable_there() -> None:
     """Own gains of `obstacles` throw the handle off; they are judged at the pose all the same."""
     pose = {pose.name: pose for pose in poses(recorded("obstacles"))}["1.8 s"]
     given = pose.options(("sensing=encoders", "graphics.rate=32"))
-    with held(open_scene.load("obstacles", given)) as place:
+    with held("obstacles", given) as place:
         assert place.signal("haptic_device.x_true") == pytest.approx(pose.point, abs=1e-6)
         assert place.stable(dict.fromkeys(place.gains.laws, 0.5), FIRM)
         assert not place.stable({}, FIRM)
@@ -255,7 +255,7 @@ def test_the_columns_that_are_carried_hold_all_modes() -> None:
     them has the same spectral radius."""
     pose = poses(recorded("closed-loop"))[0]
     given = pose.options(("sensing=encoders", "graphics.rate=32"))
-    with held(open_scene.load("closed-loop", given)) as place:
+    with held("closed-loop", given) as place:
         for scale in (0.1, 1.0, 3.0):
             place.stable(dict.fromkeys(("drift", "topology"), scale), HANDS[0])
             whole = linearised(place._map, place._at.point)

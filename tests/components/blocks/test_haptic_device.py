@@ -13,7 +13,7 @@ from tests.blocks import Running
 T = 1 / 512
 START = (-0.02, 0.01, 3.6)
 IDEAL = haptic_device(Device())
-ENCODERS = haptic_device(Device(sensing="encoders"))
+ENCODERS = haptic_device(Device(), encoders=True)
 
 
 def at_start(component, **inputs):
@@ -129,7 +129,7 @@ def test_theta_is_continuous_over_many_turns():
 def test_observer_converges_to_a_constant_force(rule):
     """The motors balance the hand: the device stays, and the observed force is the hand's."""
     component = haptic_device(
-        Device(sensing="encoders", encoder_resolution=1e-6, observer=Observer(rule=rule))
+        Device(encoder_resolution=1e-6, observer=Observer(rule=rule)), encoders=True
     )
     hand = np.array([0.4, -0.3, 0.003])
     device = at_start(component, F_hand=hand, F_motor=-hand)

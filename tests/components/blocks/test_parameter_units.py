@@ -17,7 +17,7 @@ def declared() -> dict[str, str]:
 
 
 def test_device_and_observer() -> None:
-    units = {p.name: p.unit for p in haptic_device(Device(sensing="encoders")).parameters}
+    units = {p.name: p.unit for p in haptic_device(Device(), encoders=True).parameters}
     keys = declared()
     assert len(keys) == 24
     unused = {"substeps"}  # structure

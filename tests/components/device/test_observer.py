@@ -5,16 +5,20 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from hapticlink.components.device import discretisation, observer
+from hapticlink.components.device import discretisation
+from hapticlink.components.device.observer import Observer, State
 
 MASS, OMEGA_N, K_D = 0.3, 50.0, 100.0
 
 
 def observer_function(rule, n=1):
-    s = {k: ca.SX.sym(k, n) for k in ("x1", "x2", "pose", "pose_next", "F_motor")}
-    s |= {"M": ca.SX.sym("M", n, n), "C": ca.SX.sym("C", n, n)}
-    s |= {k: ca.SX.sym(k) for k in ("omega_n", "k_D", "period")}
-    return ca.Function("observer", list(s.values()), list(observer.step(rule, **s)))
+    x1, x2, pose, pose_next, F_motor = (ca.SX.sym("x", n) for _ in range(5))
+    M, C = ca.SX.sym("M", n, n), ca.SX.sym("C", n, n)
+    omega_n, k_D, period = (ca.SX.sym("gain") for _ in range(3))
+    arguments = pose, pose_next, F_motor, M, C, period
+    state = Observer(rule, omega_n, k_D).step(State(x1, x2), *arguments)
+    symbols = [x1, x2, pose, pose_next, F_motor, M, C, omega_n, k_D, period]
+    return ca.Function("observer", symbols, list(state))
 
 
 def matrices(rule, period, omega_n=OMEGA_N, k_D=K_D, mass=MASS):
@@ -80,9 +84,9 @@ def test_unity_gain_at_dc(rule, period):
     x1, x2 = ca.DM(0), ca.DM(0)
     for _ in range(1000):
         x1, x2 = f(x1, x2, 0, 0, -F, MASS, 0, OMEGA_N, K_D, period)
-    at = {"x1": ca.SX(x1), "pose": ca.SX(0)}
-    force = float(ca.DM(observer.force(**at, M=ca.SX(MASS), omega_n=ca.SX(OMEGA_N))))
-    velocity = float(ca.DM(observer.velocity(**at, x2=ca.SX(x2), k_D=ca.SX(K_D))))
+    observer, state = Observer(rule, ca.SX(OMEGA_N), ca.SX(K_D)), State(ca.SX(x1), ca.SX(x2))
+    force = float(ca.DM(observer.force(state, ca.SX(0), ca.SX(MASS))))
+    velocity = float(ca.DM(observer.velocity(state, ca.SX(0))))
     assert force == pytest.approx(F, rel=1e-9)
     assert velocity == pytest.approx(0, abs=1e-10)
     # the trap: x2 itself is biased by k_D F / K_p

@@ -2,7 +2,9 @@
 linkage, the step size and the forces; and its order, against SciPy."""
 
 from dataclasses import replace
+from types import MappingProxyType
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +12,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
+from hapticlink.components.integrators import METHODS
+from hapticlink.components.integrators.base import Integrator
+from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
 from hapticlink.components.specs.drives import ConstantDrive, ProfileDrive
 from hapticlink.components.specs.linkage import (
     Body,
@@ -166,6 +171,35 @@ def test_a_stiff_spring_keeps_its_energy():
     for h in np.random.default_rng(1).uniform(0.01, 0.05, 300):
         block.step(h)
     assert block.y["energy"] == pytest.approx(0.5e6, rel=1e-9)
+
+
+class Counting(Integrator):
+    """A method of its own that takes the steps of passive midpoint and counts them."""
+
+    order = 2
+    counters = MappingProxyType({"steps": "steps that were taken"})
+
+    def step(self, ode, x, u, p, t, h):
+        raise NotImplementedError
+
+    def mechanism_step(self, mechanism):
+        after = PassiveMidpoint().mechanism_step(mechanism)
+        return ca.vertcat(after[:-1], 1)
+
+
+def test_any_method_may_use_the_terms_of_a_mechanism_and_count(monkeypatch):
+    monkeypatch.setitem(METHODS, "counting", Counting())
+    linkage = replace(five_bar(), start_velocity={"shoulder1": 4.0, "shoulder2": -2.0})
+    own, counting = (
+        Running(virtual_mechanism(linkage, Mechanism(integrator=name)))
+        for name in ("passive-midpoint", "counting")
+    )
+    for _ in range(20):
+        own.step(0.01)
+        counting.step(0.01)
+    assert counting.y["steps"] == counting.state["steps"] == 20
+    assert np.abs(own.state["qd"]).max() > 1
+    np.testing.assert_array_equal(counting.x[:8], own.x[:8])
 
 
 @pytest.mark.parametrize(

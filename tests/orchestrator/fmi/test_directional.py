@@ -21,6 +21,7 @@ from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.compiled import compiled
 from tests.orchestrator.coupled import ROWS, simulate, system
 from tests.orchestrator.native_mass import FLAGS, native
+from tests.orchestrator.systems import with_coupling
 
 STEP, WRONG, FAILING = 1.0, 2.0, 3.0
 """What an FMU offers: derivatives of its step, others, or an error."""
@@ -50,7 +51,7 @@ def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path: Path, between: str) -
     """Linear plants: the Jacobian told is exact, so Newton needs no differences."""
     outcome, table = solved(iterated(tmp_path, STEP, between), tmp_path)
     without, same = solved(iterated(tmp_path, STEP, between, FLAGS[:-1]), tmp_path)
-    counts, plain = outcome.iterations, without.iterations
+    counts, plain = outcome.details.iterations, without.details.iterations
     assert counts is not None
     assert plain is not None
     assert (counts.jacobians, counts.directional_jacobians) == (0, 1)
@@ -68,9 +69,9 @@ def test_derivatives_that_do_not_help_give_way_to_differences(
 ) -> None:
     outcome, table = solved(iterated(tmp_path, offered, "foh"), tmp_path)
     _, same = solved(iterated(tmp_path, STEP, "foh"), tmp_path)
-    assert outcome.iterations is not None
-    assert outcome.iterations.jacobians >= 1
-    assert outcome.iterations.unconverged == 0
+    assert outcome.details.iterations is not None
+    assert outcome.details.iterations.jacobians >= 1
+    assert outcome.details.iterations.unconverged == 0
     np.testing.assert_allclose(table["one.x"], same["one.x"], rtol=0, atol=1e-8)
 
 
@@ -78,13 +79,13 @@ def test_where_the_jacobian_is_not_that_of_a_step_differences_are_taken(tmp_path
     """Substeps, and feed-through read after the step with other inputs."""
     made = iterated(tmp_path, STEP, "foh")
     for other in (
-        replace(made, substeps={"one": 1, "two": 2}),
-        replace(made, get_after_set=("two",)),
+        with_coupling(made, substeps={"one": 1, "two": 2}),
+        with_coupling(made, get_after_set=("two",)),
     ):
         outcome, table = solved(other, tmp_path)
-        assert outcome.iterations is not None
-        assert outcome.iterations.directional_jacobians == 0
-        assert outcome.iterations.jacobians >= 1
+        assert outcome.details.iterations is not None
+        assert outcome.details.iterations.directional_jacobians == 0
+        assert outcome.details.iterations.jacobians >= 1
         assert table["two.calls"][-1] == 0
 
 

@@ -362,5 +362,5 @@ def test_steps_that_are_taken_back_put_nothing_in_the_tank(tmp_path: Path) -> No
     options = (control, "haptics.rate=50", "duration=2.0", "holds.near.u=pspm")
     experiment, found = run(tmp_path, scene, *options)
     assert experiment.outcome.fault is None
-    assert experiment.outcome.steps["haptics"].rejected > 10
+    assert experiment.outcome.details.controlled_steps["haptics"].rejected > 10
     assert found.haptics["near.most"].max() <= 0.5 * 100.0 * 0.25**2 * (1 + 1e-9)

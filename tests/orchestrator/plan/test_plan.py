@@ -2,7 +2,6 @@
 
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import replace
 from fractions import Fraction
 
 from hypothesis import HealthCheck, given, settings
@@ -16,6 +15,7 @@ from hapticlink.orchestrator.plan.schemes import SCHEMES
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline as timeline_of
+from tests.orchestrator.systems import with_coupling
 from tests.orchestrator.timelines import CAUSAL, fixed, scenes, varying
 
 Make = Callable[[Timeline, str], System]
@@ -63,7 +63,7 @@ def test_get_after_set_reads_and_pushes_what_the_new_inputs_give(stamped: Make) 
     """Once the step has ended, its feed-through outputs are those of the inputs of that instant."""
     plan = Plan(stamped(fixed(Fraction(100), Fraction(50), 10, "tick"), "jacobi"))
     plant = next(u.name for u in plan.system.fmus if not u.sampled and plan.system.into(u.name))
-    plan = Plan(replace(plan.system, get_after_set=(plant,)))
+    plan = Plan(with_coupling(plan.system, get_after_set=(plant,)))
     event = next(e for _, e in plan if not e.first and any(
         f.clock == plan.system.fmu[plant].clock for f in e.firings))  # fmt: skip
     operations = plan.block(event)
@@ -101,7 +101,7 @@ def test_nothing_reads_the_future_and_holds_give_the_newest(
 ) -> None:
     """Of every clock: what it puts out is used at the first tick at or after its stamp, by plants,
     in all their substeps, and by sampled blocks. Jacobi's sampled outputs come an event later."""
-    system = replace(stamped(timeline, coupling), substeps=substeps)
+    system = with_coupling(stamped(timeline, coupling), substeps=substeps)
     sources = {c.name: system.fmu[c.source] for c in system.connections}
     for tick, connection, stamp in uses(Plan(system)):
         assert stamp <= tick

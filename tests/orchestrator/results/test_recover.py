@@ -17,6 +17,7 @@ from hapticlink.orchestrator.results import rows, tables
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.recover import Recovered, recover
 from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
+from tests.orchestrator.results.records import run_json
 from tests.orchestrator.run.test_interrupt import COMMAND, ONE
 
 LAST = 3.5
@@ -68,9 +69,8 @@ def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path: Path) -> None:
     assert rows.read(recorder.target)[1].tolist() == expected
     recorder.block.filled.value = 0
     assert rows.read(recorder.target)[1].tolist() == expected[:2]
-    (tmp_path / "run.json").write_text(
-        json.dumps({"end": {"reason": "running"}, "rates": ["haptics"], "files": ["haptics.csv"]})
-    )
+    run = run_json(rates=["haptics"], files=["haptics.csv"])
+    (tmp_path / "run.json").write_text(json.dumps(run))
     assert recover(tmp_path) == {"haptics": Recovered(2, 1 / 8, 1)}
     assert recover(tmp_path) == {}
 

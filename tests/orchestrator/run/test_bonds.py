@@ -160,7 +160,7 @@ min = "1/8192"
         text += "".join(BACK.format(i) + PULL.format(i) + how for i in (1, 2))
         experiment = simulate(str(scene(tmp_path, text + head)), tmp_path / "out")
         assert experiment.outcome.fault is None
-        steps.append(experiment.outcome.steps["haptics"])
+        steps.append(experiment.outcome.details.controlled_steps["haptics"])
     assert steps[0] == steps[1]
     assert steps[0].shortest < 0.5 * steps[0].longest
 

@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
@@ -24,6 +25,8 @@ except Unavailable as why:
     pytest.skip(str(why), allow_module_level=True)
 
 SCENES = sorted(p.stem for p in (Path(__file__).parents[3] / "scenes").glob("*.toml"))
+NO_MATRICES = [f"holds.virtual_mechanism.{port}=zoh" for port in ("P_c", "Lambda_inv")]
+"""Extrapolated matrices agree to rounding, other values to the last bit."""
 OWN = ("timings", "in_python")
 """What run.json says of how a run was carried out."""
 
@@ -56,12 +59,23 @@ def test_every_shipped_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, na
 @pytest.mark.parametrize("hold", [*HOLDS.names()])
 def test_every_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str) -> None:
     kind = "downsampling" if HOLDS[hold].downsamples else "hold"
-    options = [f"{kind}={hold}", "graphics.rate=60", "duration=0.3"]
+    options = [f"{kind}={hold}", *NO_MATRICES, "graphics.rate=60", "duration=0.3"]
     run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options)
     assert hold in run["holds"].values()
     late = "delays.virtual_mechanism.x={ min = 0.001, max = 0.03, loss = 0.1, seed = 3 }"
     run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options, late)
     assert sum(link["lost"] for link in run["links"].values())
+
+
+def test_matrices_that_are_extrapolated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = []
+    for choice in ("python", "compiled"):
+        monkeypatch.setenv(CHOICE, choice)
+        options = ["hold=foh", "graphics.rate=60", "duration=0.3"]
+        ended = simulate("closed-loop-direct", tmp_path / choice, options)
+        assert {*ended.run["held_as"].values()} == {"semidefinite", "projector"}
+        tables.append(ended.results.haptics.rows)
+    assert np.abs(tables[0] - tables[1]).max() <= 1e-9 * np.abs(tables[0]).max()
 
 
 @pytest.mark.parametrize("hold", ["passive", "nepce"])
@@ -79,7 +93,7 @@ def test_a_tank_that_both_sides_share(
     "options",
     [
         ["coupling=jacobi"],
-        ["hold=foh"],
+        ["hold=foh", *(f"holds.virtual_environment.{p}=zoh" for p in ("P_c", "Lambda_inv"))],
         ["coupling=gauss-seidel-plants"],
         ["graphics.rate={ min = 20, max = 60, seed = 2 }"],
         ["graphics.align=tick", "graphics.rate=29.97", "graphics.phase=0.01"],

@@ -114,7 +114,7 @@ def test_what_was_iterated_is_counted(fmus: Fmus, tmp_path: Path) -> None:
         fmus, ROWS, "iterated", Fraction(1, 100), Fraction(1, 2), between="foh", substeps=3
     )
     outcome, _ = simulate(made, tmp_path)
-    found, calls = outcome.iterations, outcome.calls["two"]
+    found, calls = outcome.details.iterations, outcome.details.calls["two"]
     assert found is not None
     assert found.steps == 50
     assert found.rollbacks == found.iterations - found.steps > 0
@@ -135,7 +135,7 @@ def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus: Fmus, tmp_path:
         get_after_set=("one", "two"), iteration=NEWTON,
     )  # fmt: skip
     outcome, _ = simulate(made, tmp_path)
-    booked = outcome.energies["two.F -> one.F"]
+    booked = outcome.details.meters["two.F -> one.F"]
     assert abs(booked.held) > 1.0
     assert abs(booked.generated) < 1e-8
 

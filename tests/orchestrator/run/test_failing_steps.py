@@ -54,7 +54,7 @@ def test_a_step_that_fails_is_taken_back_and_shortened(
     made = replace(made, fmus=tuple(replace(u, isolate=isolate) for u in made.fmus))
     outcome, table = simulate(made, tmp_path)
     assert outcome.fault is None
-    steps = outcome.steps["haptics"]
+    steps = outcome.details.controlled_steps["haptics"]
     assert steps.failed > 0
     assert steps.longest > 2 * FINE
     whole, _ = simulate(controlled(tmp_path, native(tmp_path, "one")), tmp_path)
@@ -69,7 +69,7 @@ def test_iterated_steps_that_do_not_converge_for_it_are_shortened_too(tmp_path: 
     )  # fmt: skip
     outcome, table = simulate(made, tmp_path)
     assert outcome.fault is None
-    assert outcome.steps["haptics"].failed > 0
+    assert outcome.details.controlled_steps["haptics"].failed > 0
     assert error(table) < 0.002
 
 
@@ -80,14 +80,14 @@ def test_iterated_steps_that_do_not_converge_for_it_are_shortened_too(tmp_path: 
 def test_at_the_shortest_step_it_is_a_fault(tmp_path: Path, failure: int, message: str) -> None:
     outcome, table = simulate(controlled(tmp_path, brittle(tmp_path, failure), "1/500"), tmp_path)
     assert message in str(outcome.fault)
-    assert outcome.steps["haptics"].failed > 0
+    assert outcome.details.controlled_steps["haptics"].failed > 0
     assert 0 < outcome.end_time == table["time"][-1] < 0.3
 
 
 def test_a_fatal_error_is_a_fault_at_once(tmp_path: Path) -> None:
     outcome, _ = simulate(controlled(tmp_path, brittle(tmp_path, FATAL)), tmp_path)
     assert "fmi2DoStep returned fatal" in str(outcome.fault)
-    assert outcome.steps["haptics"].failed == 0
+    assert outcome.details.controlled_steps["haptics"].failed == 0
 
 
 def test_errors_are_measured_against_nominal_values(tmp_path: Path) -> None:

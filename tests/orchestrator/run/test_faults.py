@@ -217,7 +217,7 @@ def test_isolated_runs_give_the_same_bytes(tmp_path: Path) -> None:
     for out, options in (("a", []), ("b", ["isolate=true"]), ("c", ["fmu.two.isolate=true"])):
         ended = simulate(str(scene(tmp_path, text)), tmp_path / out, options)
         assert ended.outcome.fault is None
-        assert (out == "a") == (ended.outcome.isolated == {})
+        assert (out == "a") == (ended.outcome.details.isolated == {})
         for table in ("haptics.csv", "24hz.csv"):
             assert (tmp_path / out / table).read_bytes() == (tmp_path / "a" / table).read_bytes()
 

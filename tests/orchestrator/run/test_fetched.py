@@ -81,11 +81,11 @@ def test_calls_of_an_event(tmp_path: Path, loop: str) -> None:
     """One get, set and step of each FMU at each communication point; a checked step adds two half
     steps and two gets, with the state saved and restored."""
     outcome = ran(tmp_path).outcome
-    calls, ticks = outcome.calls, 256
+    calls, ticks = outcome.details.calls, 256
     assert calls["hand"] == {"get": ticks + 1, "step": ticks + 1}
     assert calls["controller"] == {"get": ticks + 1, "set": ticks + 1, "step": ticks + 1}
     for plant in ("haptic_device", "virtual_mechanism"):
-        checked = outcome.step_errors[plant].checked
+        checked = outcome.details.step_errors[plant].checked
         assert calls[plant] == {
             "get": ticks + 2 * checked,
             "rollback": checked,
@@ -117,7 +117,7 @@ def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(tmp_path: Path, loop
     found = simulate(str(path), tmp_path / "out")
     eaten = found.results.haptics["eats.y"]
     assert (eaten[2:] - eaten[1:-1] == 1.0).all()
-    assert found.outcome.calls["eats"]["set"] == found.outcome.calls["eats"]["step"]
+    assert found.outcome.details.calls["eats"]["set"] == found.outcome.details.calls["eats"]["step"]
 
 
 HELD = """
@@ -142,7 +142,7 @@ def test_unchanged_inputs_are_not_set_again(tmp_path: Path, loop: str) -> None:
     python_fmu(tmp_path, "Source")
     found = simulate(str(scene(tmp_path, HELD)), tmp_path / "out")
     assert found.outcome.fault is None
-    assert found.outcome.calls["wall"] == {"get": 33, "set": 5, "step": 33}
+    assert found.outcome.details.calls["wall"] == {"get": 33, "set": 5, "step": 33}
 
 
 def test_a_name_that_is_none(tmp_path: Path) -> None:

@@ -162,7 +162,7 @@ def test_energy_is_booked_with_the_mean(fmus: Fmus, tmp_path: Path) -> None:
         iteration=Iteration(method="newton", tolerance=1e-10),
     )  # fmt: skip
     outcome, _ = coupled.simulate(made, tmp_path)
-    booked = outcome.energies["two.F -> one.F"]
+    booked = outcome.details.meters["two.F -> one.F"]
     assert abs(booked.held) > 1.0
     assert abs(booked.generated) < 1e-8
 
@@ -243,6 +243,6 @@ def test_a_step_taken_again_in_halves_goes_on_along_the_polynomial(
     (path.parent / "two.fmu").write_bytes(fmus["two"].path.read_bytes())
     ended = simulate(str(path), tmp_path / "out", ["faults.discard=retry"])
     assert ended.outcome.fault is None
-    assert ended.outcome.smaller_steps["one"] > 40
+    assert ended.outcome.details.smaller_steps["one"] > 40
     for name in ("one.x", "one.v", "two.F"):
         np.testing.assert_allclose(ended.results.haptics[name], plain[name], rtol=0, atol=1e-10)

@@ -33,7 +33,7 @@ def test_a_run_of_1e5_s_has_rows(tmp_path: Path, options: list[str]) -> None:
 
 def test_ages_of_a_run_are_those_of_its_plan(tmp_path: Path) -> None:
     experiment = simulate("closed-loop-direct", tmp_path, ["duration=0.6"])
-    assert experiment.outcome.delays == delays(Plan(experiment.system))
+    assert experiment.outcome.details.delays == delays(Plan(experiment.system))
 
 
 def test_rates_that_are_drawn_before_the_run_have_a_bound(tmp_path: Path) -> None:

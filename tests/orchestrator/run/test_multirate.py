@@ -19,7 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.lifted_map import opened
+from hapticlink.analysis.stability.lifted_map import lifted_map
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.switching import joint_spectral_radius
 from hapticlink.analysis.stability.trajectory import trajectory
@@ -33,7 +33,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.event_loop import run
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed
 
@@ -160,7 +160,7 @@ def system(
         unit("linkage", linkage, "graphics"),
     )
     connections = connected(units, [*FAST, *ROWS[linkage]], timeline)[0]
-    return System(units, connections, timeline, "gauss-seidel")
+    return System(units, connections, timeline, Coupling("gauss-seidel"))
 
 
 @pytest.mark.parametrize(
@@ -187,7 +187,7 @@ def test_limit_of_the_coupling_to_one_percent(
 
 def radius(made: System) -> float:
     """The spectral radius of the lifted map, over a hyperperiod."""
-    with opened(made) as map_:
+    with lifted_map(made) as map_:
         found = modes(equilibrium(map_, trajectory(map_, 10.0)), map_.period)
     return max(abs(mode.z) for mode in found if not mode.neutral)
 

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -67,13 +68,15 @@ def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:
     assert list(summary.lines(found)) == [
         f'one: {held} outputs were not finite and held (faults.nan = "hold")'
     ]
-    found.run["links"]["a.y -> b.u"] = {"sent": 9, "lost": 2, "overtaken": 1}
-    found.run["iterations"] = {"unconverged": 2, "steps": 5}
-    found.run["smaller_steps"] = {"one": 7}
-    found.run["holds_that_did_not_fit"] = {
-        f"{a}.y -> b.u": {"hold": "passive", "reason": "no power"} for a in "ac"
+    changed = found.run | {
+        "links": {"a.y -> b.u": {"sent": 9, "lost": 2, "overtaken": 1}},
+        "iterations": {"unconverged": 2, "steps": 5},
+        "smaller_steps": {"one": 7},
+        "holds_that_did_not_fit": {
+            f"{a}.y -> b.u": {"hold": "passive", "reason": "no power"} for a in "ac"
+        },
     }
-    assert list(summary.lines(found))[1:] == [
+    assert list(summary.lines(replace(found, run=changed)))[1:] == [
         "one: 7 steps were discarded and repeated with smaller ones",
         "warning: 2 of 5 iterated steps did not converge",
         "a.y -> b.u: 2 of 9 samples were lost, 1 overtaken",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,9 +19,10 @@ from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.run.event_loop import Outcome
 from hapticlink.orchestrator.run.step_control import rounded
 from hapticlink.orchestrator.scene.records import StepControl
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import EnergyPorts, System
 from tests.orchestrator.coupled import POWER, ROWS, described, error, simulate, system
 from tests.orchestrator.native_mass import held
+from tests.orchestrator.systems import with_coupling
 from tests.shared_fixtures import clock
 
 Fmus = Mapping[str, Description]
@@ -112,12 +114,12 @@ def test_it_takes_fewer_steps_than_a_fixed_step_for_the_same_error(
     rate = 160
     fixed, uniform = solved(controlled(fmus, None, Fraction(1, rate), until=until), tmp_path)
     assert varied < uniform
-    assert outcome.calls["one"]["step"] < 0.8 * fixed.calls["one"]["step"]
+    assert outcome.details.calls["one"]["step"] < 0.8 * fixed.calls["one"]["step"]
 
 
 def test_what_was_done_is_counted(fmus: Fmus, tmp_path: Path) -> None:
     outcome, _ = solved(controlled(fmus, doubling(0.01)), tmp_path)
-    steps, calls = outcome.steps["haptics"], outcome.calls["one"]
+    steps, calls = outcome.details.controlled_steps["haptics"], outcome.details.calls["one"]
     assert steps.rejected > 0
     assert steps.shortest <= 4 / 50000 < steps.longest <= 0.02
     # Each try is a step and its two halves; the forced ones are of one tick, which has no halves.
@@ -145,8 +147,8 @@ def test_a_sampled_block_is_never_cut(tmp_path: Path) -> None:
     )  # fmt: skip
     outcome, table = simulate(made, tmp_path)
     assert outcome.fault is None
-    assert outcome.calls["law"]["step"] == 9
-    assert outcome.calls["plant"]["step"] > 8 * 12
+    assert outcome.details.calls["law"]["step"] == 9
+    assert outcome.details.calls["plant"]["step"] > 8 * 12
     np.testing.assert_array_equal(table["law.stamp"], table["time"])
     np.testing.assert_array_equal(table["law.seen_d"], table["time"])
     np.testing.assert_array_equal(table["plant.seen_f"][1:], table["time"][:-1])
@@ -165,23 +167,20 @@ def test_the_values_of_a_run_taken_back_leave_no_trace(fmus: Fmus, tmp_path: Pat
 
 def test_ecco_needs_power_energy_and_extrapolation(fmus: Fmus) -> None:
     made = controlled(fmus, ecco(1e-4))
-    for change, remedy in (
-        ({"power": ()}, r"\[\[power\]\]"),
-        ({"step_control": StepControl(method="ecco", tolerance=1.0, min=1e-3)}, "give energy"),
-        ({"coupling": "gauss-seidel-plants"}, "interpolates"),
+    without = StepControl(method="ecco", tolerance=1.0, min=1e-3)
+    for changed, remedy in (
+        (replace(made, energy=EnergyPorts()), r"\[\[power\]\]"),
+        (with_coupling(made, step_control=without), "give energy"),
+        (with_coupling(made, scheme="gauss-seidel-plants"), "interpolates"),
     ):
         with pytest.raises(InputFault, match=remedy):
-            list(delays(Plan(System(**{**vars_of(made), **change}))))  # type: ignore[arg-type]
+            delays(Plan(changed))
 
 
 def test_there_must_be_something_to_control(fmus: Fmus) -> None:
     made = controlled(fmus, doubling(0.1))
     with pytest.raises(InputFault, match="there are none"):
-        list(delays(Plan(System(**{**vars_of(made), "connections": ()}))))  # type: ignore[arg-type]
-
-
-def vars_of(made: System) -> dict[str, object]:
-    return {name: getattr(made, name) for name in made.__dataclass_fields__}
+        delays(Plan(replace(made, connections=())))
 
 
 @given(st.floats(0, 1e9))

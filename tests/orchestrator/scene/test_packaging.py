@@ -10,6 +10,7 @@ import pytest
 from hapticlink.fmus.native import compiler, host_platform
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.scene.blocks import blocks
 from tests.shared_fixtures import sets, status
 
 SHORT = ("duration=0.2", "graphics.rate=60")
@@ -111,7 +112,9 @@ def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(
     scene = open_scene.load("pendulum", ("packaging=native",))
 
     def built(*platforms: str) -> Path:
-        return fmu_files(scene, timeline(scene), tmp_path, platforms)["virtual_mechanism"]
+        return fmu_files(scene, blocks(scene), timeline(scene), tmp_path, platforms)[
+            "virtual_mechanism"
+        ]
 
     assert built("linux64") == built("linux64")
     paths = {built("linux64"), built("win64"), built("linux64", "win64")}

@@ -7,6 +7,7 @@ from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.scene import find_scene, load_scene
+from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.toml_keys import key_lines
 
@@ -138,9 +139,8 @@ def test_options_that_cannot_be_applied(option: str) -> None:
 
 
 def test_sensing_reaches_the_device() -> None:
-    device = load_scene.read(GOOD, ["sensing=encoders"]).device
-    assert device is not None
-    assert device.sensing == "encoders"
+    built = {b.name: b.settings for b in blocks(load_scene.read(GOOD, ["sensing=encoders"])).built}
+    assert built["haptic_device"]["encoders"]
 
 
 def test_every_shipped_scene_is_good_and_found_by_name() -> None:

@@ -8,9 +8,8 @@ import pytest
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Table
-from hapticlink.orchestrator.scene import blocks as scene_blocks
 from hapticlink.orchestrator.scene import requirements
-from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.blocks import FromGraphics, blocks
 
 SHORT = "duration=0.2"
 
@@ -35,8 +34,8 @@ def test_a_graphics_block_that_nothing_depends_on_changes_no_bit(
 ) -> None:
     options = ("controller.topology=false", "controller.impedance=false")
     without = haptics("closed-loop", tmp_path / "without", *options)
-    assert "graphics" not in {b.rate for b in blocks(open_scene.load("closed-loop", options))}
-    monkeypatch.setattr(scene_blocks, "graphics_block", lambda scene: ["to look at"])
+    assert "graphics" not in {b.rate for b in blocks(open_scene.load("closed-loop", options)).built}
+    monkeypatch.setattr(FromGraphics, "names", ["to look at"])
     shown = simulate("closed-loop", tmp_path / "with", [SHORT, *options])
     assert "virtual_environment.x[1]" in shown.results.graphics.columns
     same(without, shown.results.haptics)

@@ -12,22 +12,11 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.system.assemble import from_scene
-from hapticlink.orchestrator.system.fmu_files import fmu_files
-from hapticlink.orchestrator.system.system import System
-from hapticlink.orchestrator.system.timeline import timeline
 from tests.orchestrator.foreign_fmus import python_fmu, python_fmu_of, run, scene, with_units
+from tests.orchestrator.systems import system_of
 from tests.shared_fixtures import sets, status
-
-
-def system(path: object, folder: Path, *options: str) -> System:
-    read = open_scene.load(str(path), options)
-    time = timeline(read)
-    return from_scene(read, time, fmu_files(read, time, folder))
-
 
 # --- FMUs of others -----------------------------------------------------------------------
 
@@ -106,7 +95,7 @@ def test_nothing_is_guessed_from_the_name_of_a_foreign_port(
     wire = '[[connection]]\nfrom = "slow.x"\nto = "fast.F_hand"\n'
     text = rotating(tmp_path, "M") + wire + more
     with pytest.raises(SceneFault, match=why):
-        system(scene(tmp_path, text), tmp_path)
+        system_of(scene(tmp_path, text))
 
 
 NAMESAKE = """
@@ -181,7 +170,7 @@ def test_a_scene_says_which_output_is_a_derivative_and_its_ssp_too(tmp_path: Pat
     path = scene(tmp_path, DERIVATIVES.format('x = "v"'))
     assert status("export", path, "--out", tmp_path) == 0
     for made in (path, tmp_path / "scene.ssp"):
-        (wire,) = system(made, tmp_path).connections
+        (wire,) = system_of(made).connections
         assert wire.hold == "foh-derivative"
 
 
@@ -196,7 +185,7 @@ def test_a_scene_says_which_output_is_a_derivative_and_its_ssp_too(tmp_path: Pat
 def test_a_derivative_that_cannot_be_is_refused(tmp_path: Path, said: str, why: str) -> None:
     rotating(tmp_path, "M")
     with pytest.raises(SceneFault, match=why) as refused:
-        system(scene(tmp_path, DERIVATIVES.format(said)), tmp_path)
+        system_of(scene(tmp_path, DERIVATIVES.format(said)))
     assert "line 9: fmu[0] (slow).derivatives" in str(refused.value)
 
 
@@ -240,16 +229,16 @@ HOLDS = [
 
 
 def test_two_of_each_block_keep_what_their_ports_mean(tmp_path: Path) -> None:
-    made = system(twice(tmp_path, "start.K_pc = [5, 6, 7]\n"), tmp_path, *HOLDS)
+    made = system_of(twice(tmp_path, "start.K_pc = [5, 6, 7]\n"), *HOLDS)
     for side in ("left", "right"):
         kinds = {c.source_port: c.kind for c in made.connections if c.source.startswith(side)}
         assert {kinds.pop(m) for m in ("Lambda_inv", "M")} == {"semidefinite"}
         assert kinds.pop("P_c") == "projector"
         assert set(kinds.values()) == {None}
-    power = {p.effort: (p.displacement, p.sign) for p in made.power}
+    power = {p.effort: (p.displacement, p.sign) for p in made.energy.power}
     assert power["left_mechanism.F_drift"] == ("left_mechanism.x", -1.0)
     assert power["right_device.F_motor"] == ("right_device.x_true", 1.0)
-    gains = {s.set_position: (s.position, s.stiffness, s.damping) for s in made.springs}
+    gains = {s.set_position: (s.position, s.stiffness, s.damping) for s in made.energy.springs}
     damping = (20.0, 20.0, 0.02)
     assert gains == {
         "left_control.x_S": ("left_control.x_D", (100.0, 100.0, 0.1), damping),
@@ -262,9 +251,9 @@ def test_two_of_each_block_keep_what_their_ports_mean(tmp_path: Path) -> None:
 def test_the_derivative_is_the_blocks_own_too(tmp_path: Path) -> None:
     holds = [f'holds."left_mechanism.{port}"="foh-derivative"' for port in ("x", "Lambda_inv")]
     path = twice(tmp_path)
-    assert system(path, tmp_path, holds[0])
+    assert system_of(path, holds[0])
     with pytest.raises(SceneFault, match="does not put out the derivative of Lambda_inv"):
-        system(path, tmp_path, holds[1])
+        system_of(path, holds[1])
 
 
 @pytest.mark.parametrize(
@@ -280,7 +269,7 @@ def test_a_spring_of_gains_that_do_not_do_is_refused(tmp_path: Path, more: str, 
         wire = '[[connection]]\nfrom = "left_mechanism.x"\nto = "right_control.K_pc"\n'
         path.write_text(path.read_text() + wire + "convert = false\n")
     with pytest.raises(SceneFault, match=why):
-        system(path, tmp_path, *HOLDS)
+        system_of(path, *HOLDS)
 
 
 def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path: Path) -> None:
@@ -309,7 +298,7 @@ def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path: Pat
 def test_none_is_a_kind_too(tmp_path: Path) -> None:
     """Mobility, its entries held each for itself; P_c stays what it is."""
     option = 'kinds."virtual_environment.Lambda_inv"="none"'
-    made = system("closed-loop", tmp_path, "hold=foh", option)
+    made = system_of("closed-loop", "hold=foh", option)
     kinds = {c.source_port: c.kind for c in made.connections if c.source == "virtual_environment"}
     assert kinds == {"Lambda_inv": None, "P_c": "projector"}
 
@@ -321,5 +310,5 @@ def test_none_is_a_kind_too(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_a_kind_that_cannot_be_is_refused_at_its_key(tmp_path: Path, kind: str, why: str) -> None:
     with pytest.raises(SceneFault, match=why) as refused:
-        system("closed-loop", tmp_path, f'kinds."virtual_mechanism.x"="{kind}"')
+        system_of("closed-loop", f'kinds."virtual_mechanism.x"="{kind}"')
     assert "--set" in str(refused.value)

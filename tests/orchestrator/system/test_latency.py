@@ -86,8 +86,8 @@ def test_what_the_plan_says_is_what_the_fmus_see(
     # 3 ms are two ticks of 1/512 s, rounded up.
     seen = np.maximum(table["time"] - 2 / 512, 0.0)
     np.testing.assert_allclose(table["hand.seen_d"], seen, rtol=0, atol=1e-12)
-    link = outcome.links[LATE]
-    assert link["sent"] > link["lost"] > 0
+    link = outcome.details.links[LATE]
+    assert link.sent > link.lost > 0
 
 
 @pytest.mark.parametrize("rate", [60, 30, 24, 10])

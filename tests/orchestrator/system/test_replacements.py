@@ -41,9 +41,10 @@ INPUT, OUTPUT = "Fmi2Causality.input", "Fmi2Causality.output"
 PORTS = {"x_S": INPUT, "x_D": INPUT, "own": INPUT, "F_motor": OUTPUT}
 
 
-def spring(folder: Path, size: int = 3) -> Path:
+def spring(folder: Path, size: int = 3, output: str = "F_motor") -> Path:
     """A controller of a spring alone, with an input that the scene does not know."""
-    ports = ", ".join(f'("{name}", {causality})' for name, causality in PORTS.items())
+    names = {output if name == "F_motor" else name: given for name, given in PORTS.items()}
+    ports = ", ".join(f'("{name}", {causality})' for name, causality in names.items())
     script = folder / "spring.py"
     script.write_text(SPRING.format(ports=ports, size=size))
     return Path(FmuBuilder.build_FMU(script, dest=folder))
@@ -89,6 +90,29 @@ def test_a_port_of_another_size_is_refused_by_its_connection(tmp_path: Path) -> 
         hl.run("closed-loop", {**SHORT, **swap})
 
 
+@pytest.mark.parametrize("block", ["hand", "controller", "virtual_mechanism"])
+def test_an_fmu_that_fits_nothing_is_refused(
+    tmp_path: Path, block: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With what the block has and what the FMU has, as every command says it."""
+    swap = f"{block}={spring(tmp_path, output='z')}"
+    for command in ("run", "info"):
+        assert status(command, "closed-loop", "--swap", swap) == 2
+        told = " ".join(capsys.readouterr().err.split())
+        assert "none of its outputs reaches another FMU" in told
+        assert "the FMU has outputs z and inputs x_S, x_D, own." in told
+    assert "[[connection]]" in told
+    given = {"hand": "F[3]", "controller": "F_motor[3]", "virtual_mechanism": "x[3]"}
+    assert given[block] in told
+
+
+def test_an_fmu_of_other_names_fits_by_a_connection_of_the_scene(tmp_path: Path) -> None:
+    swap = {"replaces": "hand", "path": str(spring(tmp_path, output="z"))}
+    wire = {"from": "hand.z", "to": "haptic_device.F_hand"}
+    made = hl.run("closed-loop", {**SHORT, "fmu.+": swap, "connection.+": wire})
+    assert "hand.z -> haptic_device.F_hand" in made.run["connections"]
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [
@@ -124,6 +148,6 @@ def test_info_does_not_run_another_s_mechanism(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Its coordinates are its own, and it may hang."""
-    swap = f"virtual_mechanism={spring(tmp_path)}"
+    swap = f"virtual_mechanism={spring(tmp_path, output='x')}"
     assert status("info", "closed-loop", "--swap", swap) == 0
     assert "virtual_mechanism has no ports for" in capsys.readouterr().out

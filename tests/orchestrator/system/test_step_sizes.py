@@ -11,6 +11,7 @@ import hapticlink as hl
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
 from tests.blocks import Running
@@ -27,7 +28,7 @@ from tests.blocks import Running
 def test_every_rate_has_the_same_fmus(scene: str, options: tuple[str, ...], tmp_path: Path) -> None:
     def files(*rates: str) -> dict[str, Path]:
         read = open_scene.load(scene, (*options, *rates))
-        return fmu_files(read, timeline(read), tmp_path)
+        return fmu_files(read, blocks(read), timeline(read), tmp_path)
 
     graphics = ("graphics.rate=20",) if open_scene.load(scene).graphics else ()
     assert files("haptics.rate=500") == files("haptics.rate=1000", "duration=0.5", *graphics)

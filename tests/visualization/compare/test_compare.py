@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 import tomllib
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -16,7 +17,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.commands import main
-from hapticlink.orchestrator.results.checked_run import named
+from hapticlink.orchestrator.results.named_runs import named
 from hapticlink.orchestrator.results.scene_file import scene_file
 from hapticlink.visualization.compare import numbers, overlay, page, settings
 from hapticlink.visualization.figures.run_figures import figures as run_figures
@@ -44,7 +45,7 @@ def test_settings_that_differ_are_all_of_them(root: Path) -> None:
 
 def test_errors_are_compared_until_the_first_end(root: Path) -> None:
     runs = [hl.load(root / name) for name in ("slow", "fast")]
-    rows = {r.label: r.values for r in numbers.sections(runs)["How well, all until 0.699 s"]}
+    rows = {r.label: r.values for r in numbers.sections(runs)["Performance, all until 0.699 s"]}
     for run, said in zip(runs, rows["tracking error, largest (mm)"], strict=True):
         away = run["virtual_mechanism.x"] - run["haptic_device.x_true"]
         most = np.hypot(*away[run.time("haptic_device.x_true") < 0.7].T[:2]).max()
@@ -125,7 +126,7 @@ def test_the_page_answers_in_the_order_in_which_one_asks(root: Path) -> None:
     assert html == page.page(runs)
     found = Parsed(html)
     assert found.headings[1:] == [
-        "What ran", "Did it end well", "How well, all until 0.699 s", "Energies, of the whole run",
+        "What ran", "Outcome", "Performance, all until 0.699 s", "Energies, of the whole run",
         "Stability and steps", "Timing", "Settings that differ", "How to make it again",
     ]  # fmt: skip
     assert len(found.pictures) == 7
@@ -225,11 +226,13 @@ def test_a_run_without_a_finite_value_has_a_page(root: Path, tmp_path: Path) -> 
 
 
 def test_warnings_alone_are_red(root: Path) -> None:
-    found = named([root / "fast"])
-    found["fast"].run["warnings"] = ["one: 7 steps were repeated"]
-    assert 'class="bad"' not in page.page(found)
-    found["fast"].run["warnings"] += ["warning: a contact is too stiff"]
-    assert '<td class="bad">a contact is too stiff</td>' in page.page(found)
+    (run,) = named([root / "fast"]).values()
+    lines = ["one: 7 steps were repeated"]
+    noted = replace(run, run=run.run | {"warnings": lines})
+    assert 'class="bad"' not in page.page({"fast": noted})
+    lines = [*lines, "warning: a contact is too stiff"]
+    warned = replace(run, run=run.run | {"warnings": lines})
+    assert '<td class="bad">a contact is too stiff</td>' in page.page({"fast": warned})
 
 
 def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -> None:
@@ -237,7 +240,7 @@ def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -
     folder = shutil.copytree(root / "fast", tmp_path / "run")
     table = folder / "haptics.csv"
     table.write_text(table.read_text().partition("\n")[0] + "\n")
-    assert "How well" in page.page(named([folder]))
+    assert "Performance" in page.page(named([folder]))
 
 
 def test_a_run_without_a_linkage_and_one_that_failed_have_a_page(tmp_path: Path) -> None:

@@ -76,8 +76,8 @@ def test_nothing_is_left_of_a_map_that_nobody_waits_for(page: Served, end: str) 
     with page.window() as window:
         window.until(lambda new: "controls" in new)
         window.send(type="rate", value=31)  # takes long
-        server = _children(page.process.pid, "view.server")[0]
-        computing = _until(lambda: _children(server, "view.map_beside"))
+        server = _children(page.process.pid, "live.server")[0]
+        computing = _until(lambda: _children(server, "live.stability_process"))
         match end:
             case "overtaken":
                 window.send(type="rate", value=30)

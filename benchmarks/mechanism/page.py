@@ -14,8 +14,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.transforms import Bbox
 
-from benchmarks.mechanism import LOST, MACHINE, NATIVE, SLOW, advantage
+from benchmarks.mechanism.errors import LOST, MACHINE, NATIVE, SLOW, advantage
 from benchmarks.state import versions
 
 COLOURS = {
@@ -103,8 +104,8 @@ def _page(
     ]
     for case, rows in found.items():
         least = verdict(rows)
-        cells = (f"{least[c]:.1f}" if c in least else "-" for c in COLOURS if "ours" not in c)
-        lines.append(f"| {case} | {' | '.join(cells)} | within {rows[0]['floor']:.1e} m |")
+        ratios = (f"{least[c]:.1f}" if c in least else "-" for c in COLOURS if "ours" not in c)
+        lines.append(f"| {case} | {' | '.join(ratios)} | within {rows[0]['floor']:.1e} m |")
     lines += [
         "",
         "Times are the smallest of interleaved rounds, comparable within one run only. All codes",
@@ -192,10 +193,10 @@ def _error(ax: Axes, case: str, rows: list[dict]) -> None:
 def _spread(ax: Axes) -> None:
     """Moves names down until none covers another, and to the left where they leave the axes."""
     ax.figure.canvas.draw()
-    border, placed = ax.get_window_extent(), []
+    border, placed = ax.get_window_extent(), list[Bbox]()
     for text in sorted(ax.texts, key=lambda t: -t.get_window_extent().y0):
         if text.get_window_extent().x1 > border.x1:
-            text.set_ha("right")
+            text.set_horizontalalignment("right")
         for _ in range(30):
             box = text.get_window_extent()
             if not any(box.overlaps(other) for other in placed):

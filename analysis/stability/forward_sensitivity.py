@@ -32,10 +32,10 @@ from hapticlink.analysis.stability.state_vector import (
     Coordinate,
     StateVector,
     Template,
-    Vector,
     doubles,
     keepers,
 )
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.operations import (
     Blend,
@@ -52,7 +52,6 @@ from hapticlink.orchestrator.run.bind_operations import Instruction
 from hapticlink.orchestrator.run.parallel_steps import Finish
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 
-Matrix = NDArray[np.float64]
 Columns = dict[str, Matrix]
 """Perturbations by owner, a column each."""
 STEP = 1e-6
@@ -86,7 +85,7 @@ class Slopes:
     apart: frozenset[str] | None
 
 
-class Tangent:
+class ForwardSensitivity:
     """The slopes of the operations of a simulation; `closures` are those of its mechanism."""
 
     def __init__(self, simulation: Simulation, closures: Closures | None) -> None:

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.equilibrium_location import Whereabouts, whereabouts
-from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, opened
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.equilibrium_location import EquilibriumLocation, location
+from hapticlink.analysis.stability.forward_sensitivity import KINK
+from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
+from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.mode_frequency import traced
 from hapticlink.analysis.stability.modes import NEAR, Mode, counted, leading, modes, verdict
-from hapticlink.analysis.stability.tangent import KINK
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.orchestrator import open_scene
@@ -53,7 +52,7 @@ class Stability:
     frozen: tuple[str, ...]
     kinks: tuple[str, ...]
     linearised: dict[str, str]
-    where: Whereabouts
+    where: EquilibriumLocation
 
     @property
     def growth(self) -> float:
@@ -105,7 +104,7 @@ class Stability:
         neutral = "neutral modes"
         if self.neutral:
             most = max(min(mode.uncertainty, NEAR) for mode in self.neutral) / self.period
-            neutral += f", of which growth up to {most:.2g} 1/s cannot be told from none"
+            neutral += f", of which growth up to {most:.2g} 1/s cannot be distinguished from none"
         for title, found in (("modes", self.modes), (neutral, self.neutral)):
             if found:
                 yield f"{title}: growth rate (1/s), frequency (Hz), damping ratio, participation"
@@ -117,8 +116,8 @@ class Stability:
             yield "frozen:"
             yield from (f"  {line}" for line in self.frozen)
         if self.kinks:
-            yield "the map has two slopes at the equilibrium, so that the verdict is only of their"
-            yield f"mean, in: {', '.join(self.kinks)}"
+            yield "the lifted map has two slopes at the equilibrium, so that the verdict is only of"
+            yield f"their mean, in: {', '.join(self.kinks)}"
 
 
 def stability(
@@ -146,34 +145,33 @@ def at_rest(scene: Scene, whole: System, at: float, seconds: float) -> Stability
     """The stability of a scene's system around the equilibrium that is found within `seconds` of
     simulated time, as in `stability`."""
     system, removed = frozen_nonlinearities.without(whole)
-    with opened(long_enough(scene, system, at), at, Closures(scene)) as map_:
+    with lifted_map(long_enough(scene, system, at), at, scene) as map_:
         run = trajectory(map_, seconds)
-        found = equilibrium(map_, run)
-        where = whereabouts(scene, map_, found, run)
-        return _result(
-            scene.title, map_, found, [*removed, *frozen_nonlinearities.kept(system)], where
-        )
+        linear = equilibrium(map_, run)
+        where = location(scene, map_, linear, run)
+        frozen = [*removed, *frozen_nonlinearities.kept(system)]
+        return _result(scene.title, map_, linear, frozen, where)
 
 
 def _result(
-    title: str, map_: LiftedMap, at: Linear, lines: list[str], where: Whereabouts
+    title: str, map_: LiftedMap, linear: Linearisation, lines: list[str], where: EquilibriumLocation
 ) -> Stability:
-    found = [mode for mode in modes(at, map_.period) if abs(mode.z) > LOST]
-    neutral = [mode for mode in found if mode.neutral]
-    others = [mode for mode in found if not mode.neutral]
-    names = tuple(str(map_.coordinates[i]) for i in at.taken)
-    kinked = np.abs(at.V[:, at.kink > KINK]).max(axis=1, initial=0.0)
+    all_modes = [mode for mode in modes(linear, map_.period) if abs(mode.z) > LOST]
+    neutral = [mode for mode in all_modes if mode.neutral]
+    others = [mode for mode in all_modes if not mode.neutral]
+    names = tuple(str(map_.coordinates[i]) for i in linear.taken)
+    kinked = np.abs(linear.V[:, linear.kink > KINK]).max(axis=1, initial=0.0)
     kinks = tuple(str(c) for c, share in zip(map_.coordinates, kinked, strict=True) if share)
-    first = next(iter(counted(found)), None)
+    first = next(iter(counted(all_modes)), None)
     return Stability(
         title=title,
         period=map_.period,
         radius=abs(first.z) if first else 0.0,
         uncertainty=first.uncertainty if first else 0.0,
-        modes=tuple(traced(map_, at, mode) for mode in others[:SHOWN]),
+        modes=tuple(traced(map_, linear, mode) for mode in others[:SHOWN]),
         neutral=tuple(neutral),
         names=names,
-        equilibrium={n: float(at.point[i]) for n, i in zip(names, at.taken, strict=True)},
+        equilibrium={n: float(linear.point[i]) for n, i in zip(names, linear.taken, strict=True)},
         frozen=tuple(lines),
         kinks=kinks,
         linearised=map_.ways(),

@@ -2,10 +2,10 @@
 
     g = ln sigma_max(D^-1 A D)/t,   A = d z(t_0 + t)/d z(t_0)
 
-by the perturbations that a run carries with it (tangent.py); D are the scales that balance A, rows
-as large as columns, so that g does not depend on units. It says by how much the worst perturbation
-grows in that time, and nothing of what comes after: a stable system may grow at first, and an
-unstable one shrink.
+by the perturbations that a run carries with it (forward_sensitivity.py); D are the scales that
+balance A, rows as large as columns, so that g does not depend on units. It says by how much the
+worst perturbation grows in that time, and nothing of what comes after: a stable system may grow at
+first, and an unstable one shrink.
 """
 
 from __future__ import annotations
@@ -15,16 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.closure_directions import Closures
-from hapticlink.analysis.stability.lifted_map import behind_start, long_enough, opened
-from hapticlink.analysis.stability.linearise import Matrix, linearised
-from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.analysis.stability.lifted_map import behind_start, lifted_map, long_enough
+from hapticlink.analysis.stability.linearisable_scene import linearisable
+from hapticlink.analysis.stability.linearisation import linearised
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
 
 SWEEPS = 50
 
@@ -39,15 +36,13 @@ def finite_time_growth(
     """
     if not 0.0 < seconds < math.inf:
         raise InputFault(f"seconds = {seconds}: give a positive time")
-    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
-        read = open_scene.load(scene, options)
-        with built(read) as whole:
-            system = long_enough(read, frozen_nonlinearities.without(whole)[0], at + seconds)
-            with opened(system, 0.0, Closures(read)) as map_:
-                ticks = max(1, round(seconds / float(system.timeline.base)))
-                along = map_.over(system, (behind_start(system, at), ticks))
-                found = linearised(along, along.start)
-    size = np.linalg.norm(_balanced(found.A), 2)
+    with linearisable(scene, options) as (read, system, _):
+        system = long_enough(read, system, at + seconds)
+        with lifted_map(system, 0.0, read) as map_:
+            ticks = max(1, round(seconds / float(system.timeline.base)))
+            along = map_.over(system, (behind_start(system, at), ticks))
+            linear = linearised(along, along.start)
+    size = np.linalg.norm(_balanced(linear.A), 2)
     return float(np.log(size)) / (ticks * float(system.timeline.base))
 
 

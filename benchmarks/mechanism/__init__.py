@@ -6,17 +6,17 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import energy, growth, mechanism, report, state
+from benchmarks import state
 
 ROWS = ("runs.csv", "energy.csv", "growth.csv", "references.json")
 
 
-def mechanism_bench(
-    out: Path, quick: bool, told: Callable[[str, int, int], None], command: str
-) -> None:
+def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
     """Write README.md, table.csv and two figures to `out`."""
+    from benchmarks.mechanism import energy, errors, growth, page  # load Matplotlib
+
     state.begin(out, ROWS)
     drifts = energy.measure(out, told)
     sizes = growth.measure(out, quick, told)
-    report.write(out, *mechanism.measure(out, quick, told), drifts, sizes, command)
+    page.write(out, *errors.measure(out, quick, told), drifts, sizes, command)
     shutil.rmtree(out / ".compiled", ignore_errors=True)

@@ -1,10 +1,10 @@
 """The linearisation of the lifted map: A = V' dF/dz V, by perturbations that are carried through
-the operations of a period (tangent.py).
+the operations of a period (forward_sensitivity.py).
 
-V_j are the unit vectors of the coordinates, or directions within the closures (closures.py). A
-number that is overwritten before anything reads it has a zero column and is left out. A number that
-nothing changes, a gain that a hold keeps, is a parameter of the map: its row is that of the
-identity, and it is left out too.
+V_j are the unit vectors of the coordinates, or directions within the closures
+(closure_directions.py). A number that is overwritten before anything reads it has a zero column and
+is left out. A number that nothing changes, a gain that a hold keeps, is a parameter of the lifted
+map: its row is that of the identity, and it is left out too.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
-from hapticlink.analysis.stability.lifted_map import LiftedMap, Vector
-from hapticlink.analysis.stability.tangent import SAME, SMALL
+from hapticlink.analysis.stability.forward_sensitivity import SAME, SMALL
+from hapticlink.analysis.stability.lifted_map import LiftedMap
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 
-Matrix = NDArray[np.float64]
 ONE = 1e-7
 """Largest deviation from 1 of the diagonal entry of a parameter."""
 
 
 @dataclass(frozen=True)
-class Linear:
+class Linearisation:
     """The map around `point`: F(point) = image, with the Jacobian A (n, n) along the orthonormal
     directions V, the columns of a matrix; its error E (n, n) by slopes to one side, and per
     column the largest of them relative to the column (`kink`): of order 1 where the map is not
@@ -44,13 +44,11 @@ class Linear:
     @property
     def change(self) -> Vector:
         """Along each direction, F(point) - point."""
-        found: Vector = self.V.T @ (self.image - self.point)
-        return found
+        return self.V.T @ (self.image - self.point)
 
     def moved(self, by: Vector) -> Vector:
         """The point moved along the directions, with all that is overwritten as in the image."""
-        found: Vector = self.image + self.V @ (by - self.change)
-        return found
+        return self.image + self.V @ (by - self.change)
 
     @property
     def kink(self) -> Vector:
@@ -61,13 +59,12 @@ class Linear:
     @property
     def scales(self) -> Vector:
         """Scales d of the coordinates that balance A: rows of D^-1 A D as large as its columns."""
-        found: Vector = matrix_balance(self.A, permute=False, separate=True)[1][0]
-        return found
+        return matrix_balance(self.A, permute=False, separate=True)[1][0]
 
 
-def linearised(map_: LiftedMap, point: Vector, same: float = SAME) -> Linear:
+def linearised(map_: LiftedMap, point: Vector, same: float = SAME) -> Linearisation:
     """The Jacobian of the map at `point`, along the directions that act on it; `same` as in
-    tangent.py."""
+    forward_sensitivity.py."""
     V = np.stack(list(map_.directions(point)), axis=1)
     image, M, D = map_.slopes(point, V, same)
     taken = M.any(axis=0) | D.any(axis=0)
@@ -76,7 +73,7 @@ def linearised(map_: LiftedMap, point: Vector, same: float = SAME) -> Linear:
     V, M, D = V[:, taken], M[:, taken], D[:, taken]
     A, E = V.T @ M, V.T @ D
     kept = ~_constant(A, V.T @ (image - point) == 0.0)
-    return Linear(point, image, V[:, kept], A[kept][:, kept], E[kept][:, kept])
+    return Linearisation(point, image, V[:, kept], A[kept][:, kept], E[kept][:, kept])
 
 
 def _constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -84,5 +81,4 @@ def _constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
     n = len(A)
     own = np.abs(np.diag(A) - 1.0) < ONE
     alone = np.count_nonzero(A - np.diag(np.diag(A)), axis=1) == 0
-    found: NDArray[np.bool_] = own & alone & same if n else np.zeros(0, bool)
-    return found
+    return own & alone & same if n else np.zeros(0, bool)

@@ -8,11 +8,12 @@ of the mechanism stacked,
 
 x are the poses of the handle at the beginning of each haptic period, f the wrenches that the
 mechanism puts on the rendering over its steps. Perturbations are carried through the operations of
-a period as for the map (tangent.py); what the hand sends is set to u, and where the mechanism is
-cut off, its pose to y_{j+1} = y_j + d_j and its velocity to d_j/H, the mean over the step that ends
-there, of length H. Its other outputs stay as at the equilibrium. A velocity of the handle that is
-read directly is then the mean over the period before, too: a passive hand or mechanism is known by
-its mean velocities, whose products with the held forces are its energy, and not by the others.
+a period as for the lifted map (forward_sensitivity.py); what the hand sends is set to u, and where
+the mechanism is cut off, its pose to y_{j+1} = y_j + d_j and its velocity to d_j/H, the mean over
+the step that ends there, of length H. Its other outputs stay as at the equilibrium. A velocity of
+the handle that is read directly is then the mean over the period before, too: a passive hand or
+mechanism is known by its mean velocities, whose products with the held forces are its energy, and
+not by the others.
 """
 
 from __future__ import annotations
@@ -20,20 +21,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.analysis.stability.forward_sensitivity import Columns, Instruction
 from hapticlink.analysis.stability.lifted_map import LiftedMap
-from hapticlink.analysis.stability.linearise import Linear
+from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.state_vector import SIGNALS
-from hapticlink.analysis.stability.tangent import Columns, Instruction
+from hapticlink.orchestrator.base.arrays import Complex, Matrix
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.loop_names import HAND, MECHANISM
 from hapticlink.orchestrator.plan.operations import Get, Set, Step
 from hapticlink.orchestrator.run.energy.bonds import bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import System
 
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 LARGEST = 600
 """Entries of the stacked force, of which each frequency takes an eigenvalue problem."""
 
@@ -72,7 +72,7 @@ def hand_port(system: System) -> HandPort:
     """Raises InputFault where no hand pushes on an FMU."""
     signals = SignalVector(system)
     for c in system.connections:
-        found = bond(c, system, signals) if system.block(c.source) == "hand" else None
+        found = bond(c, system, signals) if system.block(c.source) == HAND else None
         if found:
             inputs = tuple(c.inputs[i].name for i in found.entries)
             forces = tuple(found.of(signals.sources(c)))
@@ -84,7 +84,7 @@ def mechanism_port(system: System, hand: HandPort) -> MechanismPort | None:
     """The port of the virtual mechanism, at which the coupling acts; None where the hand holds the
     mechanism itself."""
     signals = SignalVector(system)
-    fmu = next((f.name for f in system.fmus if system.block(f.name) == "virtual_mechanism"), None)
+    fmu = next((f.name for f in system.fmus if system.block(f.name) == MECHANISM), None)
     if fmu is None or fmu == hand.handle:
         return None
     bonds = [(c, b) for c in system.into(fmu) if (b := bond(c, system, signals))]
@@ -95,8 +95,8 @@ def mechanism_port(system: System, hand: HandPort) -> MechanismPort | None:
         tuple(
             (c.inputs[i].name, float(work))
             for c, b in bonds
-            for i, at, work in zip(b.entries, b.moved, b.work, strict=True)
-            if at == place
+            for i, index, work in zip(b.entries, b.moved, b.work, strict=True)
+            if index == place
         )
         for place in point[0]
     )
@@ -126,8 +126,7 @@ class Response:
         y: Complex = self.C.astype(complex) @ free + self.D.astype(complex)
         x = y[:k]
         after = np.concatenate([x[self.m :], turn * x[: self.m]])
-        found: Complex = np.concatenate([after - x, y[k:]])
-        return found
+        return np.concatenate([after - x, y[k:]])
 
     @property
     def radius(self) -> float:
@@ -149,7 +148,7 @@ def require_size(map_: LiftedMap, hand: HandPort, mechanism: MechanismPort | Non
 
 def response(
     map_: LiftedMap,
-    at: Linear,
+    linear: Linearisation,
     hand: HandPort,
     mechanism: MechanismPort | None = None,
     *,
@@ -159,8 +158,8 @@ def response(
     `alone`: of the handle's FMU with its other inputs held."""
     N = map_.count(Set, hand.handle)
     n = map_.count(Step, mechanism.fmu) if mechanism else 0
-    cut = _Cut(map_, at, hand, mechanism, N, n, alone)
-    _, M, _ = map_.slopes(at.point, cut.start, after=cut)
+    cut = _Cut(map_, linear, hand, mechanism, N, n, alone)
+    _, M, _ = map_.slopes(linear.point, cut.start, after=cut)
     return cut.response(M)
 
 
@@ -172,18 +171,18 @@ class _Cut:
     def __init__(
         self,
         map_: LiftedMap,
-        at: Linear,
+        linear: Linearisation,
         hand: HandPort,
         mechanism: MechanismPort | None,
         N: int,
         n: int,
         alone: bool,
     ) -> None:
-        self._hand, self._mechanism, self._alone, self._at = hand, mechanism, alone, at
+        self._hand, self._mechanism, self._alone, self._linear = hand, mechanism, alone, linear
         self._m, self._N, self._n = len(hand.moved), N, n
         self._p = p = len(mechanism.moved) if mechanism else 0
         self._T, self._H = map_.period / N, map_.period / n if n else 1.0
-        self._k = k = at.V.shape[1]
+        self._k = k = linear.V.shape[1]
         self._u = k + (self._m if p else 0) + 2 * p
         self._d = self._u + self._m * N
         self._x: list[Matrix] = []
@@ -195,7 +194,7 @@ class _Cut:
             self._rows[fmu] = {c.variable: i for i, c in enumerate(listed)}
             self._inputs[fmu] = {s.name for c in map_.system.into(fmu) for s in c.inputs}
         self._outputs = {fmu: map_.outputs(fmu) for fmu in self._rows}
-        self.start = np.hstack([at.V, np.zeros((len(at.V), self._d + p * n - k))])
+        self.start = np.hstack([linear.V, np.zeros((len(linear.V), self._d + p * n - k))])
         if mechanism:
             own = [i for i, c in enumerate(map_.coordinates) if c.owner == mechanism.fmu]
             self.start[own] = 0.0
@@ -269,7 +268,7 @@ class _Cut:
     def response(self, M: Matrix) -> Response:
         if (len(self._x), len(self._f)) != (self._N, self._n):
             raise AssertionError("operations of a period that were not counted")
-        ends = [self._at.V.T @ M]
+        ends = [self._linear.V.T @ M]
         if self._mechanism:
             pose = np.zeros((self._p, M.shape[1]))
             pose[:, self._u - 2 * self._p : self._u - self._p] = np.eye(self._p)

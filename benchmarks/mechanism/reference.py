@@ -28,8 +28,8 @@ def _relative(ours: Ours, end: float) -> np.ndarray:
     def f(_: float, x: np.ndarray) -> np.ndarray:
         return np.r_[x[n:], ours.outputs(x)["qdd"]]
 
-    x = solve_ivp(f, (0, end), ours.start, **TOLERANCE).y[:, -1]
-    return ours.outputs(x)["x"][:2]
+    last = solve_ivp(f, (0, end), ours.start, **TOLERANCE).y[:, -1]
+    return ours.outputs(last)["x"][:2]
 
 
 def _maximal(ours: Ours, end: float) -> np.ndarray:
@@ -40,10 +40,10 @@ def _maximal(ours: Ours, end: float) -> np.ndarray:
     def f(_: float, y: np.ndarray) -> np.ndarray:
         z, zd = y[:n], y[n:]
         G, gamma = joined.closures(z, zd)
-        _, J, _ = joined.point(z, zd, bodies.tip)
+        J = joined.point(z, zd, bodies.tip)[1]
         force = bodies.weight.ravel() + J.T @ wrench
         return np.r_[zd, joined.accelerations(G, gamma[:, None], force[:, None])[:, 0]]
 
-    start = np.concatenate(bodies.start(*np.split(ours.start, 2)))
-    y = solve_ivp(f, (0, end), start, **TOLERANCE).y[:, -1]
-    return joined.point(y[:n], y[n:], bodies.tip)[0][:2]
+    first = np.concatenate(bodies.start(*np.split(ours.start, 2)))
+    last = solve_ivp(f, (0, end), first, **TOLERANCE).y[:, -1]
+    return joined.point(last[:n], last[n:], bodies.tip)[0][:2]

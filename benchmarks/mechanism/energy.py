@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import mechanisms
-from benchmarks.mechanism import ALL, setting
+from benchmarks.mechanism.errors import ALL, setting
 from benchmarks.ours import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.specs.linkage import Mechanism

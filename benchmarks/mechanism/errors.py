@@ -13,12 +13,13 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks import mechanisms, reference
+from benchmarks import mechanisms
+from benchmarks.mechanism import reference
 from benchmarks.ours import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.integrators import METHODS
@@ -129,22 +130,21 @@ def tasks(
     def ours(integrator: str, stabilization: str, rate: int) -> Ours:
         return Ours(case.linkage, case.wrench, setting(integrator, stabilization), 1 / rate)
 
+    def native(integrator: str, stabilization: str, rate: int) -> Run:
+        return ours(integrator, stabilization, rate).native(folder)
+
+    def machine(integrator: str, stabilization: str, rate: int) -> Run:
+        return ours(integrator, stabilization, rate).virtual_machine()
+
     for rate in case.rates:
-        for integrator, stabilization in case.settings:
-            name, key = f"{integrator}, {stabilization}", (integrator, stabilization, rate)
-            yield NATIVE, name, rate, lambda k=key: ours(*k).native(folder)
-            yield MACHINE, name, rate, lambda k=key: ours(*k).virtual_machine()
+        for chosen in case.settings:
+            yield NATIVE, ", ".join(chosen), rate, partial(native, *chosen, rate)
+            yield MACHINE, ", ".join(chosen), rate, partial(machine, *chosen, rate)
         for peer in codes:
             for method in peer.METHODS:
                 if (peer.NAME, method) not in case.skip:
-                    yield (
-                        peer.NAME,
-                        method,
-                        rate,
-                        lambda p=peer, m=method, r=rate: p.prepare(
-                            case.linkage, np.array(case.wrench), q, qd, m, 1 / r
-                        ),
-                    )
+                    arguments = case.linkage, np.array(case.wrench), q, qd, method, 1 / rate
+                    yield peer.NAME, method, rate, partial(peer.prepare, *arguments)
 
 
 def measure(

@@ -1,0 +1,84 @@
+"""Two runs into one folder: the second gets an error at once, and nothing of the first is lost."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import folder_lock, tables
+from tests.shared_fixtures import status
+
+RUN = "import hapticlink as hl; print(hl.run('pendulum', out={!r}, figures=False).folder)"
+
+
+def test_a_second_run_is_refused_at_once(tmp_path: Path) -> None:
+    refusals: list[str] = []
+
+    def second(time: float) -> None:
+        if refusals:
+            return
+        command = [sys.executable, "-c", RUN.format(str(tmp_path / "out"))]
+        said = subprocess.run(command, capture_output=True, text=True, check=False).stderr
+        refusals.append(said.splitlines()[-1])
+
+    first = hl.run("pendulum", {"duration": 20}, out=tmp_path / "out", progress=second)
+    assert f"--out {tmp_path / 'out'}: another run writes there, in process" in refusals[0]
+    assert first.run["end"]["reason"] == "duration"
+    assert tables.load(tmp_path / "out").haptics["time"][-1] == first.run["end"]["time"] == 20
+    assert status("run", "pendulum", "--out", tmp_path / "out", "--no-figures") == 0  # afterwards
+
+
+def test_a_thread_of_this_process_is_refused_too(tmp_path: Path) -> None:
+    outcomes: list[object] = []
+
+    def run() -> None:
+        try:
+            outcomes.append(simulate("pendulum", tmp_path / "out").outcome.reason)
+        except InputFault as fault:
+            outcomes.append(str(fault))
+
+    with folder_lock.held(tmp_path / "out"):
+        thread = threading.Thread(target=run)
+        thread.start()
+        thread.join()
+        assert "another run writes there" in str(outcomes[0])
+        assert simulate("pendulum", tmp_path / "out").outcome.reason == "duration"  # this thread's
+
+
+@pytest.mark.parametrize("wrong", [{"duration": -1}, {"stop_when": "no.such > 1"}])
+def test_a_refused_run_leaves_no_folder(tmp_path: Path, wrong: dict[str, object]) -> None:
+    with pytest.raises(InputFault):
+        hl.run("pendulum", wrong, out=tmp_path / "runs" / "out")
+    assert not [*tmp_path.iterdir()]
+
+
+def test_a_killed_run_leaves_no_lock(tmp_path: Path) -> None:
+    lines = (
+        "from pathlib import Path; import os",
+        "from hapticlink.orchestrator.results.folder_lock import held",
+        f"held(Path({str(tmp_path)!r})).__enter__(); os.kill(os.getpid(), 9)",
+    )
+    killed = subprocess.run([sys.executable, "-c", "\n".join(lines)], check=False)
+    assert killed.returncode == -9
+    with folder_lock.held(tmp_path):
+        assert not [*tmp_path.iterdir()]
+
+
+def test_many_at_once_leave_one_whole_run(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hapticlink", "run", "pendulum", "--out", str(tmp_path / "o")]
+    started = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(3)]
+    ends = [(process.communicate()[1], process.returncode) for process in started]
+    assert all(code in (0, 2) for _, code in ends), ends
+    assert all("another run writes there" in said for said, code in ends if code == 2)
+    assert any(code == 0 for _, code in ends)
+    story = json.loads((tmp_path / "o" / "run.json").read_text())
+    assert {p.name for p in (tmp_path / "o").iterdir()} == set(story["files"])
+    assert tables.load(tmp_path / "o").haptics["time"][-1] == story["end"]["time"]
