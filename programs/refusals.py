@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.machine import too_long
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
@@ -13,7 +14,12 @@ from hapticlink.orchestrator.system.system import System
 
 
 def of_scene(scene: Scene) -> None:
-    """Raises InputFault for FMUs that are given as files, and for what only Python does."""
+    """Raises InputFault for FMUs that are given as files, for what only Python does, and where
+    there is no compiled loop, on whose structures a program is resolved."""
+    try:
+        load()
+    except Unavailable as why:
+        _refuse(scene.title, [f"there is no compiled loop here: {why}"])
     given = [fmu for fmu in scene.fmu if fmu.path]
     reasons = [f"{fmu.name} ({fmu.path}) is an FMU that exists already" for fmu in given]
     if reasons:

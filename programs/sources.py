@@ -166,9 +166,9 @@ def _at(place: str) -> str:
 
 def _table(declared: str, entries: Iterable[str]) -> str:
     """A C array with an additional entry of zeros at its end, since a C array must not be empty."""
-    return "\n".join(
-        [f"static const {declared}[] = {{", *(f"    {e}," for e in entries), "    {0}};"]
-    )
+    rows = [f"    {entry}," for entry in entries]
+    zero = "{0}" if any(row.endswith("},") for row in rows) else "0"
+    return "\n".join([f"static const {declared}[] = {{", *rows, f"    {zero}}};"])
 
 
 def _variable(port: Port) -> str:
