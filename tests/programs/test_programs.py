@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import random
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +17,12 @@ from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.programs.build import build_program, program_files
-from tests.programs.built import needs_compiler, program
+from tests.programs.built import COMPILER, FLAGS, needs_compiler, program
 from tests.programs.comparison import differing, outputs, run
 
 pytestmark = needs_compiler
 
+DISCARD, LAST_SUCCESSFUL_TIME, IS_TERMINATED = 2, 2, 3
 HALF = "duration=0.5"
 DELAYED = (
     HALF,
@@ -244,3 +248,57 @@ def test_the_fmu_that_is_built_has_the_bits_of_the_run(tmp_path: Path) -> None:
     path = build_program(scene, "single-body", out=tmp_path)
     haptic = experiment.system.timeline.clocks[0].longest
     assert [*differing(outputs(path, experiment, 16 * haptic), experiment)] == []
+
+
+def test_a_condition_to_stop_ends_the_simulation(tmp_path: Path) -> None:
+    """The doStep that finds it returns discard, the FMU is terminated, and stands where the run
+    ends."""
+    options = ("duration=0.5", "stop_when=virtual_mechanism.v[1] < -0.3")
+    experiment = run("pendulum", options, tmp_path)
+    assert experiment.outcome.reason == "stop_when"
+    with session(program("pendulum", options)) as opened:
+        slave = opened.instance()
+        initialize(slave)
+        with pytest.raises(FMICallException) as ended:
+            slave.doStep(0.0, 0.5)
+        assert ended.value.status == DISCARD
+        names = {v.name: v.valueReference for v in opened.description.modelVariables}
+        columns = experiment.results.haptics.columns[1:]
+        values = slave.getReal([names[column] for column in columns])
+        assert values == experiment.results.haptics.rows[-1, 1:].tolist()
+        time, terminated = ctypes.c_double(), ctypes.c_int()
+        slave.fmi2GetRealStatus(slave.component, LAST_SUCCESSFUL_TIME, ctypes.byref(time))
+        slave.fmi2GetBooleanStatus(slave.component, IS_TERMINATED, ctypes.byref(terminated))
+        assert time.value == experiment.outcome.end_time
+        assert terminated.value
+
+
+def test_it_has_the_outputs_that_the_scene_records(tmp_path: Path) -> None:
+    options = (HALF, 'record.signals=["virtual_mechanism.x"]')
+    experiment = run("closed-loop", options, tmp_path)
+    found = outputs(program("closed-loop", options), experiment, 240)
+    assert found.names == [f"virtual_mechanism.x[{i}]" for i in (1, 2, 3)]
+    assert [*differing(found, experiment)] == []
+
+
+def test_its_memory_is_its_own(tmp_path: Path) -> None:
+    """The life of two instances under the sanitizers for addresses and undefined behaviour."""
+    scene = open_scene.load("closed-loop-direct", ("graphics.rate=30", "hold=passive"))
+    files = program_files(scene, "program")
+    xml = files["modelDescription.xml"].decode()
+    for name, content in files.items():
+        if name.startswith("sources/"):
+            (tmp_path / Path(name).name).write_bytes(content)
+    shutil.copy(Path(__file__).with_name("life.c"), tmp_path)
+    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", *FLAGS]
+    life = tmp_path / "life"
+    command = [COMPILER, *flags, "-o", life, *tmp_path.glob("*.c"), "-lm"]
+    made = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "cannot find" in made.stderr:
+        pytest.skip("the compiler has no sanitizers")
+    assert made.returncode == 0, made.stderr
+    guid = re.search(r'guid="(.*?)"', xml)
+    assert guid
+    lived = [life, guid[1], str(xml.count("<ScalarVariable")), repr(1 / 512)]
+    done = subprocess.run(lived, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
