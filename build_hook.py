@@ -9,6 +9,7 @@ import runpy
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -25,26 +26,33 @@ class Build(BuildHookInterface):
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if self.target_name != "wheel":
             return
-        if library := self._compiled():
-            build_data["artifacts"].append(str(library.as_posix()))
+        if version == "editable":
+            for older in Path(self.root, LOOP).glob("loop-*"):
+                older.unlink()
+            self._compiled(Path(self.root, LOOP))
+            self._link()
+            return
+        self._room = tempfile.TemporaryDirectory()  # `finalize` removes it: nothing is left here
+        if library := self._compiled(Path(self._room.name)):
+            build_data["force_include"][str(library)] = str(Path("hapticlink", LOOP, library.name))
             build_data["pure_python"] = False
             platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
             build_data["tag"] = f"py3-none-{platform}"
-        if version == "editable":
-            self._link()
 
-    def _compiled(self) -> Path | None:
-        """The compiled loop; None where it cannot be compiled here. It is then compiled at its
-        first use, or runs in Python."""
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        if self.target_name == "wheel" and version != "editable":
+            self._room.cleanup()
+
+    def _compiled(self, folder: Path) -> Path | None:
+        """The compiled loop, in `folder`; None where it cannot be compiled here. It is then
+        compiled at its first use, or runs in Python."""
         build = runpy.run_path(str(Path(self.root, LOOP, "build.py")))
-        library = LOOP / build["name"]()
-        for older in Path(self.root, LOOP).glob(f"loop-*{library.suffix}"):
-            older.unlink()
+        library = folder / build["name"]()
         try:
-            build["compile_loop"](Path(self.root, library), build["zig"]())
+            build["compile_loop"](library, build["zig"]())
         except (subprocess.CalledProcessError, OSError) as error:
-            said = getattr(error, "stderr", None) or str(error).encode()
-            self.app.display_warning(f"no compiled loop: {said.decode(errors='replace')}")
+            message = getattr(error, "stderr", None) or str(error).encode()
+            self.app.display_warning(f"no compiled loop: {message.decode(errors='replace')}")
             return None
         return library
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base.faults import InputFault
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ def frame(columns: Mapping[str, Any], index: str | None = None) -> pd.DataFrame:
     try:
         import pandas as pd
     except ImportError:
-        message = "frame() needs pandas: pip install pandas, or hapticlink with the extra `pandas`"
-        raise InputFault(message) from None
+        raise InputFault(f"frame() needs pandas: {install_command('pandas')}") from None
     made = pd.DataFrame(dict(columns))
     return made.set_index(index) if index else made

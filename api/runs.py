@@ -24,18 +24,19 @@ from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_axes
 
-MOST = 2**30
-"""Bytes of tables that a run in a folder reads back; as numbers they take half of that."""
+MAX_TABLE_BYTES = 2**30
+"""Larger tables of a run in a folder are not read back; as numbers they take half of that."""
 
 
 class RunInterrupted(Interrupted):
     """A run was interrupted by Ctrl-C; `run` are its results up to then."""
 
     def __init__(self, run: Run) -> None:
-        super().__init__(run.run["end"]["time"])
+        super().__init__(run.record.end.time)
         self.run = run
 
 
+@interrupt.held()
 def run(
     scene: str | Path | Scene,
     options: Options = (),
@@ -58,12 +59,11 @@ def run(
     results up to then. Ctrl-C raises RunInterrupted, with the results so far as its `run`. Tables
     of more than 1 GiB in `out` are not read back; use `load` for them.
     """
-    with interrupt.held():
-        read = open_scene.load(scene, options)
-        paced = RealTimeRun() if real_time else None
-        return run_paced(read, out, paced, figures, progress)
+    read = open_scene.load(scene, options)
+    return run_paced(read, out, RealTimeRun() if real_time else None, figures, progress)
 
 
+@interrupt.held()
 def run_paced(
     scene: Scene,
     out: str | Path | None,
@@ -73,22 +73,31 @@ def run_paced(
     tables: bool = True,
 ) -> Run:
     """As `run`; without `out` and `tables` the results have no tables."""
-    with interrupt.held():
-        if out is None:
-            with temporary_folders.room() as room:
-                ended = simulate(scene, room, (), progress, csv=tables, real_time=real_time)
-                found = ended.results if tables else None
-            told = ended.run | _told(found) if found else ended.run
-            made = Run(None, told, found.tables if found else {})
-        else:
-            with folder_lock.held(Path(out)):
-                made = _in_folder(scene, Path(out), progress, figures, real_time)
-        if interrupt.came() or made.run["end"]["reason"] == "interrupted":
-            raise RunInterrupted(made)
-    return made
+    if out is None:
+        ended = _in_memory(scene, progress, real_time, tables)
+    else:
+        with folder_lock.held(Path(out)):
+            ended = _in_folder(scene, Path(out), progress, figures, real_time)
+    if interrupt.came() or ended.record.end.reason == "interrupted":
+        raise RunInterrupted(ended)
+    return ended
 
 
-def _told(results: Results) -> dict[str, Any]:
+def _in_memory(
+    scene: Scene,
+    progress: Callable[[float], None] | None,
+    real_time: RealTimeRun | None,
+    tables: bool,
+) -> Run:
+    with temporary_folders.room() as folder:
+        ended = simulate(scene, folder, (), progress, csv=tables, real_time=real_time)
+        if not tables:
+            return Run(None, ended.run, {})
+        results = ended.results
+    return Run(None, ended.run | _findings(results), results.tables)
+
+
+def _findings(results: Results) -> dict[str, Any]:
     """What run.json says of the results: warnings, and the energy at the user's port."""
     port = Measures(results).port
     return {"user_port": port and content(port), "warnings": list(summary.lines(results))}
@@ -102,27 +111,27 @@ def _in_folder(
     real_time: RealTimeRun | None,
 ) -> Run:
     ended = simulate(scene, folder, (), progress, real_time=real_time)
-    if ended.too_large(MOST):
-        said = "%s: tables of more than %d bytes are not read back and drawn; load them yourself"
-        logging.getLogger(__name__).warning(said, folder, MOST)
+    if ended.too_large(MAX_TABLE_BYTES):
+        message = "%s: tables of more than %d bytes are not read back and drawn; load them yourself"
+        logging.getLogger(__name__).warning(message, folder, MAX_TABLE_BYTES)
         return Run(folder, ended.run, {})
-    found = ended.results
+    results = ended.results
     if not ended.outcome.published:
-        return Run(None, found.run, found.tables)
-    told = _told(found)
-    run = found.run | told
+        return Run(None, results.run, results.tables)
+    findings = _findings(results)
+    run = results.run | findings
     try:
-        run = folders.add(folder, (), told)
+        run = folders.add(folder, (), findings)
         if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
             run = folders.add(folder, _explained(ended))
-            run = folders.add(folder, _drawn(ended, found) if figures else ())
+            run = folders.add(folder, _drawn(ended, results) if figures else ())
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None
     except OSError as error:  # a full disk; the rows are there, and why the run ended is told
-        said = "%s has the results of the run, not all of its figures: %s"
-        logging.getLogger(__name__).warning(said, folder, error.strerror or error)
-    return Run(folder, run, found.tables)
+        message = "%s has the results of the run, not all of its figures: %s"
+        logging.getLogger(__name__).warning(message, folder, error.strerror or error)
+    return Run(folder, run, results.tables)
 
 
 def _explained(ended: Experiment) -> list[str]:
@@ -135,14 +144,14 @@ def _explained(ended: Experiment) -> list[str]:
     return ["plan.txt"]
 
 
-def _drawn(ended: Experiment, found: Results) -> list[str]:
+def _drawn(ended: Experiment, results: Results) -> list[str]:
     """Writes the figures; returns their names. Raises Interrupted and OSError."""
     from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
 
-    return figure_axes.write(run_figures.pngs(found), ended.folder)
+    return figure_axes.write(run_figures.pngs(results), ended.folder)
 
 
 def load(folder: str | Path) -> Run:
     """Read the results of a run from its folder. Raises InputFault if it contains no run."""
-    found = tables.load(folder)
-    return Run(found.folder, found.run, found.tables)
+    results = tables.load(folder)
+    return Run(results.folder, results.run, results.tables)

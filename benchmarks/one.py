@@ -1,9 +1,10 @@
 """A scene as one FMU beside its run through FMUs: time for a haptic tick, size, and time to build.
 
-Forms take turns in rounds, and the least time of each counts, processor time of the process, so that
-what other processes take is no part of it. `run` is the loop of `hapticlink run` alone, with native FMUs, all outputs recorded. One
-FMU is stepped by FMPy from Python, as other tools step it, without reading outputs, by 1 or 16
-ticks a doStep. It is built without a cache of FMUs, and has the bits of the run (tests/programs).
+Forms take turns in rounds, and the least time of each counts: processor time of the process, so
+that what other processes take is no part of it. `run` is the loop of `hapticlink run` alone, with
+native FMUs, all outputs recorded. One FMU is stepped by FMPy from Python, as other tools step it,
+without reading outputs, by 1 or 16 ticks a doStep. It is built without a cache of FMUs, and has the
+bits of the run (tests/programs).
 """
 
 from __future__ import annotations

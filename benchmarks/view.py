@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import hapticlink as hl
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.live_run import LiveRun
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.live.link import Link
@@ -127,6 +128,8 @@ def page(session: Measured, found: dict[str, Any], seconds: int, load: float, co
     before, after = session.before, session.after
     ticks, missed = (after[k] - before[k] for k in ("ticks", "deadlines_missed"))
     rows = latencies(session, found)
+    if missing := [name for name, values in rows.items() if not values]:
+        raise InputFault(f"nothing was measured of {', '.join(missing)}: is the machine busy?")
     felt, shown = (1e3 * float(np.median(rows[k])) for k in ("mouse to force", "step to screen"))
     taken = len(rows["mouse to force"])
     lines = [

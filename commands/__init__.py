@@ -32,13 +32,13 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
         "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
         "info": "Describe a scene, or list the shipped scenes.",
         "schema": "Print the keys of a scene, as a JSON schema or as a page.",
-        "stability": "Judge the stability of a scene by its linearised map over a period.",
+        "stability": "Analyse the stability of a scene by its linearised map over a period.",
         "tune": "Find gains up to a margin of stability, at the start pose and at a contact.",
         "sweep": "Run many variants of a scene in parallel: one table and figure.",
         "study": "Study which hold suits which rate: tables, figures and a page.",
         "bench": "Measure run time against error, beside other codes.",
-        "doctor": "Tell which optional parts are there, and check that FMUs build and run.",
-        "recover": "Make the CSVs of a run that was killed.",
+        "doctor": "Report versions and optional packages, and check that FMUs build and run.",
+        "recover": "Write the CSVs of a run that was killed.",
         "reproduce": "Reproduce the report's figures, with a page of the findings.",
     },
     no_function,
@@ -48,7 +48,8 @@ called; or a function itself. Its arguments and docstring define the command, an
 exit status."""
 
 app.register_install_completion_command(
-    help="Write the script that completes commands, options, scenes and keys in your shell."
+    add_to_startup=False,  # nobody has asked for a change of ~/.bashrc
+    help="Write the script that completes commands, options, scenes and keys in your shell.",
 )
 
 Plugin = Annotated[
@@ -131,7 +132,9 @@ def _status(arguments: Sequence[str] | None) -> int:
             say(f"hapticlink: {told}", file=sys.stderr)
             return InputFault.exit_status
         if isinstance(error, ModuleNotFoundError) and error.name != "hapticlink":
-            say(f"hapticlink: {error}: `hapticlink doctor` tells what is missing", file=sys.stderr)
+            say(
+                f"hapticlink: {error}: `hapticlink doctor` reports what is missing", file=sys.stderr
+            )
             return 1
         from hapticlink.orchestrator.base import internal_error  # slow to load
 

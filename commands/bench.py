@@ -61,10 +61,10 @@ def bench(
     with timed(command), Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(what)
 
-        def tell(text: str, done: int, total: int) -> None:
+        def report(text: str, done: int, total: int) -> None:
             interrupt.check()
             bar.update(task, description=text, completed=done, total=total)
 
-        page = make(folder, quick, tell, command)
+        page = make(folder, quick, report, command)
     print(page or folder / "README.md")
     return 0

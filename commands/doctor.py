@@ -10,14 +10,16 @@ from importlib import metadata
 from typing import Any
 
 from hapticlink.commands.options import Json, tell
+from hapticlink.fmus.versions import install_command
 
 HIDDEN = ("test",)
 """Extras for those who change the project, not for those who use it."""
 
 
 def doctor(*, json: Json = False) -> int:
-    """Tell versions, optional parts that are missing and how to install them, and the cache; build
-    a small FMU of each packaging that is there, and run it. The exit status is 1 if that fails."""
+    """Report versions, optional packages that are missing and how to install them, and the cache;
+    build a small FMU of each packaging that is available, and run it. The exit status is 1 if that
+    fails."""
     found = _found()
     tell(_lines(found), found, quiet=False, as_json=json)
     return 0 if all(state == "works" for state in found["runs"].values()) else 1
@@ -110,10 +112,12 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
     for packaging, state in found["runs"].items():
         yield f"FMUs, packaging = {packaging!r}: {state}"
     if "native" not in found["runs"]:
-        yield "FMUs, packaging = 'native': no compiler, pip install 'hapticlink[native]'"
+        yield f"FMUs, packaging = 'native': no compiler: {install_command('native')}"
     for extra, packages in found["extras"].items():
         missing = [name for name, version in packages.items() if version is None]
-        state = f"pip install 'hapticlink[{extra}]' ({', '.join(missing)})" if missing else "there"
+        state = (
+            f"missing {', '.join(missing)}: {install_command(extra)}" if missing else "installed"
+        )
         yield f"extra {extra}: {state}"
     kept = found["cache"]
     if kept["folder"] is None:

@@ -35,8 +35,8 @@ def progress(
 
 @contextmanager
 def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> Iterator[None]:
-    """Says before a long command how many minutes it took at most on this machine, or `guess`, and
-    keeps how many it takes. Raises Fault where it is interrupted."""
+    """Prints before a long command how many minutes it took at most on this machine, or `guess`,
+    and records how many it takes. Raises Fault where it is interrupted."""
     from hapticlink.fmus import cache
     from hapticlink.fmus.atomic_file import atomic_file
 
@@ -45,16 +45,15 @@ def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> I
         with suppress(OSError, ValueError):
             known = json.loads((folder / DURATIONS).read_text(encoding="utf-8"))
     took = known.get(command)
-    told = f"duration {guess}"
     if took is not None:
-        told = f"duration up to {took:.1f} minutes here, less what is done already"
+        guess = f"up to {took:.1f} minutes here, less if partly finished before"
     if not hidden:
-        say(f"{command}: {told}", file=sys.stderr)
+        say(f"{command}: duration {guess}", file=sys.stderr)
     begun = monotonic()
     try:
         yield
     except Interrupted:
-        raise Fault("interrupted; what was finished is kept") from None
+        raise Fault("interrupted; finished runs are kept") from None
     if folder:
         folder.mkdir(parents=True, exist_ok=True)
         known[command] = max((monotonic() - begun) / 60, took or 0.0)

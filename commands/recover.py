@@ -13,7 +13,7 @@ Folder = Annotated[Path, Parameter(help="Folder of a run that was killed.")]
 
 
 def recover(folder: Folder, /) -> int:
-    """Make the CSVs of a run that was killed, and say up to where its rows are there.
+    """Write the CSVs of a run that was killed, and report the time of its last row.
 
     For example:
 

@@ -15,8 +15,8 @@ Out = Annotated[Path | None, Parameter(help="File to write; by default reports/R
 
 
 def report(runs: Runs, /, *, out: Out = None) -> int:
-    """Write a page of a run, or of several beside each other: what ran, how it ended, how well it
-    did, energies, timing, what was set differently, and how to make it again.
+    """Write a page of a run, or of several beside each other: what ran, outcome,
+    performance, energies, timing, settings that differ, and the commands that repeat it.
 
     For example:
 

@@ -30,10 +30,12 @@ Growth = Annotated[
     ),
 ]
 UserPort = Annotated[
-    bool, Parameter(negative="", help="Tell as well whether any hand could be given energy.")
+    bool,
+    Parameter(negative="", help="Report, too, whether any hand could be given energy."),
 ]
 Check = Annotated[
-    int, Parameter(help="Points of the map to be checked by runs, near the boundary and away.")
+    int,
+    Parameter(help="Points of the map to be checked by runs, near the boundary and far away."),
 ]
 Seed = Annotated[int, Parameter(help="Seed of the choice of these points.")]
 
@@ -55,7 +57,8 @@ def stability(
     quiet: Quiet = False,
     json: Json = False,
 ) -> int:
-    """Tell whether small motions of a scene around its rest decay, how fast, and who takes part.
+    """Analyse whether small motions of a scene about an equilibrium decay, how fast, and which
+    parts take part.
 
     The scene needs a hand that holds the mechanism and does not move, such as an arm. Prints the
     result, which docs/stability.md explains line by line, and writes stability.json to OUT
@@ -74,8 +77,8 @@ def stability(
     name = default_folder("runs", scene).name
     if vary:
         folder = out or default_folder("maps", scene, chosen)
-        lines, record = _map(scene, folder, options(set, swap), vary, check, seed, jobs, quiet)
-        tell((f"{name}: {next(lines)}", *lines), record, quiet, json)
+        points, record = _map(scene, folder, options(set, swap), vary, check, seed, jobs, quiet)
+        tell((f"{name}: {next(points)}", *points), record, quiet, json)
         return 0
     import hapticlink as hl
     from hapticlink.orchestrator.results import folders
@@ -84,20 +87,24 @@ def stability(
     given = options(set, swap)
     if growth is not None:
         rate = hl.finite_time_growth(scene, given, at=at, seconds=growth)
-        said = (
+        growth_lines = (
             f"{name}: over {growth:g} s from {at:g} s on, the worst",
             f"  perturbation grows at {rate:.5g} 1/s: no verdict on stability",
         )
-        tell(said, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json)
+        tell(growth_lines, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json)
         return 0
     with waiting(f"{name}: equilibrium and linearisation, which can take a minute", quiet):
-        user = hl.passivity(scene, given, at=at) if port else None  # refuses many forces at once
-        found = hl.stability(scene, given, at=at)
+        passivity = hl.passivity(scene, given, at=at) if port else None
+        result = hl.stability(scene, given, at=at)
     folder = folders.ensure(out or default_folder("runs", scene, chosen))
-    record = found.record() | ({"port": user.record()} if user else {})
+    record = result.record() | ({"port": passivity.record()} if passivity else {})
     write_json(folder / "stability.json", record)
-    told = (*found.lines(), *(user.lines() if user else ()), f"{folder}/stability.json")
-    tell((f"{name}: {found.verdict}", *(f"  {line}" for line in told)), record, quiet, json)
+    report = [
+        *result.lines(),
+        *(passivity.lines() if passivity else ()),
+        f"{folder}/stability.json",
+    ]
+    tell((f"{name}: {result.verdict}", *(f"  {line}" for line in report)), record, quiet, json)
     return 0
 
 
@@ -115,25 +122,25 @@ def _map(
 
     command = f"hapticlink stability {scene} --vary {' --vary '.join(vary)}"
     with timed(command, hidden=quiet), counted(scene, hidden=quiet) as count:
-        made = hl.stability_map(
+        points = hl.stability_map(
             scene, vary, options, out=folder, check=check, seed=seed, jobs=jobs, progress=count
         )
-    verdicts = [row["verdict"] for row in made.of("grid")]
-    said = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+    verdicts = [row["verdict"] for row in points.of("grid")]
+    counts = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
     lines = [
-        f"{len(verdicts)} points, {said}",
-        f"  {len(made.of('boundary'))} points of the boundary",
+        f"{len(verdicts)} points, {counts}",
+        f"  {len(points.of('boundary'))} points of the boundary",
     ]
-    reasons = [row["message"] for row in made.of("grid") if row["verdict"] == "refused"]
+    reasons = [row["message"] for row in points.of("grid") if row["verdict"] == "refused"]
     lines += [f"  refused, the first one: {reason}" for reason in reasons[:1]]
     if check:
-        runs = made.of("check")
-        other = [row for row in runs if not row.get("agree")]
-        lines.append(f"  {len(runs) - len(other)} of {len(runs)} runs agree with the map")
+        runs = points.of("check")
+        differing = [row for row in runs if not row.get("agree")]
+        lines.append(f"  {len(runs) - len(differing)} of {len(runs)} runs agree with the map")
         keys = [text.partition("=")[0] for text in vary]
-        for row in other:
+        for row in differing:
             point = ", ".join(f"{key}={row[key]}" for key in keys)
-            run = row.get("run_verdict", "not judged")
-            lines.append(f"  not at {point}: map {row['verdict']}, run {run}")
+            run = row.get("run_verdict", "without a verdict")
+            lines.append(f"  they differ at {point}: map {row['verdict']}, run {run}")
     lines.append(f"  {folder}/: map.csv, map.png")
-    return iter(lines), {"folder": str(folder), "rows": made.rows}
+    return iter(lines), {"folder": str(folder), "rows": points.rows}

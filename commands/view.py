@@ -16,6 +16,7 @@ from cyclopts import Parameter, validators
 
 from hapticlink.commands import completion
 from hapticlink.commands.options import Out, Set, Swap, default_folder, options
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
@@ -23,7 +24,7 @@ from hapticlink.visualization.live.link import Link
 
 Host = Annotated[
     str,
-    Parameter(help="Address to serve on; others than this let in who knows the URL."),
+    Parameter(help="Address to serve on; any other than this one admits whoever knows the URL."),
 ]
 Port = Annotated[
     int | None,
@@ -79,13 +80,13 @@ def view(
     if Path(scene).is_dir() and (second or export or not _is_scene(scene)):
         if set or swap or out:
             raise InputFault(
-                f"{scene} is the folder of a run: --set, --swap and --out are of scenes"
+                f"{scene} is the folder of a run: --set, --swap and --out apply to scenes only"
             )
         return _replayed([scene, *([second] if second else [])], host, port, browser, export)
     if second or export:
-        what = second or f"--export {export}"
+        given = second or f"--export {export}"
         raise InputFault(
-            f"{what}: {scene} is no folder of a run; run it first: `hapticlink run {scene}`, then "
+            f"{given}: {scene} is not the folder of a run; first `hapticlink run {scene}`, then "
             f"`hapticlink view {default_folder('runs', scene)}`"
         )
     import hapticlink as hl
@@ -156,11 +157,8 @@ def _shown(title: str, host: str, port: int, token: str, browser: bool) -> None:
 
 
 def _refused(host: str, port: int | None, why: object) -> str:
-    return (
-        f"--host {host}"
-        + (f" --port {port}" if port is not None else "")
-        + f": {why}: take another"
-    )
+    asked = f"--host {host}" if port is None else f"--host {host} --port {port}"
+    return f"{asked}: {why}: choose another"
 
 
 def _has_screen() -> bool:
@@ -173,7 +171,7 @@ def _has_screen() -> bool:
 def _served(host: str, port: int | None, token: str) -> Link:
     """The server, on the port asked for. Raises InputFault where it cannot start."""
     if not find_spec("websockets"):
-        raise InputFault("the page needs the package websockets: pip install 'hapticlink[view]'")
+        raise InputFault(f"the page needs the package websockets: {install_command('view')}")
     module = "hapticlink.visualization.live.server"
     made = Link(module, host, str(PORT if port is None else port), token)
     if port is None and made.first and "error" in made.first:

@@ -34,25 +34,28 @@ Variability = Literal["fixed", "tunable"]
 class Variable:
     """A named scalar, vector or matrix signal, stored row by row.
 
-    unit: an SI unit in FMI's notation ("m", "N.m", "rad/s", "1/kg"; "1" for none), or one for each
-    entry. start: one value for all entries or one for each. variability: of parameters. kind: of
-    outputs. derivative_of: the output of which this output is the time derivative. max: the
-    magnitude of an output above which the run has diverged, or of `step_size` the longest that the
-    equations suit; None without such a bound. power: of inputs, their power port.
-
-    `starts`, `units` and `names` raise ValueError where sizes do not agree.
+    `starts` and `units` raise ValueError where sizes do not agree.
     """
 
     name: str
     shape: tuple[int, ...] = ()
     unit: str | tuple[str, ...] = "1"
+    """An SI unit in FMI's notation ("m", "N.m", "rad/s", "1/kg"; "1" for none), or one for each
+    entry, or for each entry of a row."""
     start: float | tuple[float, ...] = 0.0
+    """One value for all entries, or one for each."""
     description: str = ""
     variability: Variability = "tunable"
+    """Of parameters."""
     kind: Kind | None = None
+    """Of outputs."""
     derivative_of: str | None = None
+    """The output of which this output is the time derivative."""
     power: Power | None = None
+    """The power port of an input."""
     max: float | None = None
+    """The magnitude of an output above which the run has diverged, or of `step_size` the longest
+    that the equations suit; None without such a bound."""
 
     @property
     def size(self) -> int:
@@ -100,8 +103,7 @@ MOBILITY = ("1/kg", "1/kg", "1/(kg.m)") * 2 + ("1/(kg.m)", "1/(kg.m)", "1/(kg.m2
 
 class Signals(Mapping[str, ca.SX]):
     """CasADi symbols of a list of variables, by name and as one flat column `vector`, and names for
-    expressions of them. Raises
-    ValueError for a name that is declared twice."""
+    expressions of them. Raises ValueError for a name that is declared twice."""
 
     def __init__(self, prefix: str, variables: Iterable[Variable]) -> None:
         self.variables = tuple(variables)
@@ -156,10 +158,7 @@ def pack(variables: Iterable[Variable], values: Mapping[str, ca.SX]) -> ca.SX:
 
 @dataclass(frozen=True)
 class Component:
-    """A complete block. `step` is called `substeps` times for each communication step; where there
-    is a `substep`, which leaves discrete memory as it is, it replaces all but the last. springs:
-    spring-dampers whose set positions are inputs. look_ups: those that the functions
-    call. state_notes: by the name of a state, the cause to report if it is not finite."""
+    """A complete block."""
 
     name: str
     description: str
@@ -169,14 +168,22 @@ class Component:
     states: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
     initialize: ca.Function
+    """(u, p) -> x_0."""
     step: ca.Function
+    """(x_k, u_k, p, t_k, h) -> x_{k+1}, called `substeps` times for each communication step."""
     output: ca.Function
+    """(x_k, u_k, p, t_k) -> y_k."""
     substeps: int = 1
     substep: ca.Function | None = None
+    """Replaces `step` in all substeps but the last, and leaves discrete memory as it is; None where
+    there is no such memory."""
     documentation: str = ""
     springs: tuple[Spring, ...] = ()
+    """Spring-dampers whose set positions are inputs."""
     look_ups: tuple[LookUp, ...] = ()
+    """The look-ups of tables that the functions call."""
     state_notes: Mapping[str, str] = field(default_factory=dict)
+    """By the name of a state: the cause to report if it is not finite."""
 
     @cached_property
     def state_texts(self) -> tuple[str, ...]:
@@ -249,7 +256,7 @@ class Block:
         x, u, p, t, h = self.x.vector, self.u.vector, self.p.vector, self.t, self.h
         x1 = pack(self.x.variables, step) if isinstance(step, Mapping) else ca.densify(step)
         is_memory = [v.name in memory for v in self.x.variables for _ in range(v.size)]
-        kept = ca.vertcat(*(x[i] if held else x1[i] for i, held in enumerate(is_memory)))
+        without_memory = ca.vertcat(*(x[i] if held else x1[i] for i, held in enumerate(is_memory)))
         once, options = {"cse": not shared}, {"cse": True}
         names = ["x", "u", "p", "t", "h"]
         return Component(
@@ -273,7 +280,7 @@ class Block:
                 options,
             ),
             substeps=substeps,
-            substep=ca.Function("substep", [x, u, p, t, h], [kept], names, ["x1"], once)
+            substep=ca.Function("substep", [x, u, p, t, h], [without_memory], names, ["x1"], once)
             if substeps > 1 and memory
             else None,
             documentation=documentation,

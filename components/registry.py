@@ -111,20 +111,22 @@ def origins(*kinds: str) -> list[str]:
     return sorted({module for registry in chosen for module in registry.origins.values()})
 
 
-MOST = 100
+MAX_SHOWN = 100
 """Largest number of names that are searched and shown, and of characters of a name."""
 
 
 def near(name: str, known: Iterable[str]) -> str:
     """A hint with the known name nearest to `name`, or else with the known names."""
     known = list(known)
-    found = difflib.get_close_matches(name[:MOST], known[:MOST], 1)
-    more = f" and {len(known) - MOST} more" if len(known) > MOST else ""
-    there = ", ".join(each[:MOST] for each in known[:MOST]) or "none"
-    return f"did you mean {found[0]!r}?" if found else f"there are {there}{more}"
+    # No word of twice the length is a slip of the pen.
+    alike = [k for k in known[:MAX_SHOWN] if abs(len(k) - len(name)) <= max(len(name) / 2, 2)]
+    nearest = difflib.get_close_matches(name[:MAX_SHOWN], alike, 1)
+    more = f" and {len(known) - MAX_SHOWN} more" if len(known) > MAX_SHOWN else ""
+    there = ", ".join(each[:MAX_SHOWN] for each in known[:MAX_SHOWN]) or "none"
+    return f"did you mean {nearest[0]!r}?" if nearest else f"there are {there}{more}"
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     """The message that there is no `kind` of this name, with the hint of `near`."""
-    shown = repr(name) if len(name) <= MOST else f"{name[:MOST]!r}..."
+    shown = repr(name) if len(name) <= MAX_SHOWN else f"{name[:MAX_SHOWN]!r}..."
     return f"no {kind} {shown}; {near(name, known)}"

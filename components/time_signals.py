@@ -94,12 +94,12 @@ def over(signals: Iterable[TimeSignal], t: ca.SX, h: ca.SX) -> ca.SX:
 
 def within(signals: Iterable[TimeSignal], over: ca.SX, t: ca.SX) -> ca.SX:
     """(y, y') of each signal at t, stacked, from `over` of the step that contains t."""
-    found, place = [], 1
+    values, place = [], 1
     for signal in signals:
         end = place + signal.size_over
-        found.append(signal.within(over[place:end], over[0], t))
+        values.append(signal.within(over[place:end], over[0], t))
         place = end
-    return ca.vertcat(*found)
+    return ca.vertcat(*values)
 
 
 def size_over(signals: Iterable[TimeSignal]) -> int:

@@ -1,6 +1,6 @@
 """The documentation site, of the Markdown files in docs/ and results/:
 
-pip install '.[docs]'
+pip install "hapticlink[docs]"
 sphinx-build -W -c docs . site
 
 Then open site/index.html, from the disk or a server: search works in both, and no page fetches

@@ -5,8 +5,11 @@ python docs/make_api.py
 
 from __future__ import annotations
 
+import ast
 import inspect
+import textwrap
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -43,10 +46,23 @@ def page() -> str:
         if thing is hl.Scene:
             lines += [f"### {name}", "A checked scene. Its keys are those of [scenes](scenes.md)."]
         elif name not in functions and name not in raised:
-            lines += [f"### {name}", _doc(thing), *_members(thing)]
+            lines += [f"### {name}", _doc(thing), *_fields(thing), *_members(thing)]
     lines.append("## Exceptions")
     lines += [_item(f"{n}({t.__base__.__name__})", t) for n, t in raised.items()]
     return "\n\n".join(lines) + "\n"
+
+
+def _fields(thing: type) -> Iterator[str]:
+    """The attributes of a record, each with the text that stands under it."""
+    (record,) = ast.parse(textwrap.dedent(inspect.getsource(thing))).body
+    assert isinstance(record, ast.ClassDef)
+    for field, text in pairwise(record.body):
+        match field, text:
+            case (
+                ast.AnnAssign(target=ast.Name(id=name)),
+                ast.Expr(value=ast.Constant(value=str(about))),
+            ):
+                yield f"- `.{name}`: {inspect.cleandoc(about)}".replace("\n", "\n  ")
 
 
 def _members(thing: type) -> Iterator[str]:

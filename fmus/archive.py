@@ -121,15 +121,8 @@ def check_functions(component: Component) -> None:
     declared variables, or a variable is declared twice."""
     if not component.name.isidentifier() or not component.name.isascii():
         raise FmuError(f"`{component.name}` is no C identifier; an FMU is named by one")
-    u, p, x, y = (
-        sum(v.size for v in variables)
-        for variables in (
-            component.inputs,
-            component.parameters,
-            component.states,
-            component.outputs,
-        )
-    )
+    columns = component.inputs, component.parameters, component.states, component.outputs
+    u, p, x, y = (sum(v.size for v in column) for column in columns)
     expected = {"initialize": [u, p, x], "step": [x, u, p, 1, 1, x], "output": [x, u, p, 1, y]}
     for role, sizes in expected.items():
         function: ca.Function = getattr(component, role)
@@ -142,8 +135,7 @@ def check_functions(component: Component) -> None:
                 f"`{component.name}`: {function} does not fit the declared variables; expected "
                 f"dense columns of {sizes[:-1]} to {sizes[-1]}"
             )
-    known = [n for v in (*component.inputs, *component.parameters, *component.outputs)
-             for n in v.names]  # fmt: skip
+    known = _names((*component.inputs, *component.parameters, *component.outputs))
     if len(set(known)) != len(known):
         twice = sorted({name for name in known if known.count(name) > 1})
         raise FmuError(f"`{component.name}`: declared twice: {', '.join(twice)}")

@@ -25,21 +25,21 @@ def component(name: str, settings: Settings, starts: Starts = MappingProxyType({
     """The component of the block `name` with `settings`; `starts` replace start values of its
     parameters. Raises FmuError if the settings give no component."""
     try:
-        made = BLOCKS[name](**settings)
+        result = BLOCKS[name](**settings)
     except (ValueError, ArithmeticError) as error:
         raise FmuError(f"{name}: {error}") from error
     from hapticlink.components.component import Component  # loads casadi, as the block has done
 
-    if not isinstance(made, Component):
-        raise FmuError(f"{name}: the block gives {made!r}, no Component")
-    parameters = tuple(replace(p, start=starts.get(p.name, p.start)) for p in made.parameters)
-    return replace(made, parameters=parameters)
+    if not isinstance(result, Component):
+        raise FmuError(f"{name}: the block gives {result!r}, no Component")
+    parameters = tuple(replace(p, start=starts.get(p.name, p.start)) for p in result.parameters)
+    return replace(result, parameters=parameters)
 
 
 def build_block(
     name: str,
     settings: Settings,
-    room: Path,
+    build_folder: Path,
     *,
     experiment: Mapping[str, float] = MappingProxyType({}),
     packaging: Packaging = "python",
@@ -47,22 +47,22 @@ def build_block(
     starts: Starts = MappingProxyType({}),
     poll: Callable[[], object] = lambda: None,
 ) -> Path:
-    """The path of the block's FMU: in the cache, or built in `room` where the cache is off.
+    """The path of the block's FMU: in the cache, or built in `build_folder` where the cache is off.
 
     settings: the block's own, by name; starts: start values that replace those of its parameters.
     experiment: stop_time and step_size (s) of the default experiment. platforms: those of a native
     FMU, by default this machine's. poll: called while another process builds it. Raises FmuError if
-    the settings give no FMU,
-    CompilerError if it cannot be compiled.
+    the settings give no
+    FMU, CompilerError if it cannot be compiled.
     """
 
     def make(folder: Path) -> Path:
         from hapticlink.fmus.build import build, build_native
 
-        made = component(name, settings, starts)
+        block = component(name, settings, starts)
         if packaging == "python":
-            return build(made, folder, **experiment)
-        return build_native(made, folder, platforms=platforms, **experiment)
+            return build(block, folder, **experiment)
+        return build_native(block, folder, platforms=platforms, **experiment)
 
     material: dict[str, Any] = {
         "block": name,
@@ -76,4 +76,4 @@ def build_block(
 
         material["compiler"] = compiler_version()
         material["platforms"] = list(platforms) or [host_platform()]
-    return cache.cached(material, make, room, poll)
+    return cache.cached(material, make, build_folder, poll)

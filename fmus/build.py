@@ -51,14 +51,14 @@ def build_native(
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    made = archive.entries(
+    files = archive.entries(
         component,
         folder,
         stop_time=stop_time,
         step_size=step_size,
         platforms=tuple(platforms) or (host_platform(),),
     )
-    return _publish(component, made, folder)
+    return _publish(component, files, folder)
 
 
 def _publish(component: Component, files: Mapping[str, bytes], folder: Path | str) -> Path:

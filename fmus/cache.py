@@ -25,7 +25,7 @@ from hapticlink.components import registry
 from hapticlink.fmus import lock
 from hapticlink.fmus.versions import version
 
-LONGEST = 3600.0
+MAX_BUILD_TIME = 3600.0
 """Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
 VERSIONS = ("hapticlink", "casadi", "pythonfmu")
 
@@ -48,6 +48,13 @@ def user_folder() -> Path:
     else:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "hapticlink"
+
+
+def private(folder: Path) -> None:
+    """Creates a folder of the cache where it is missing, open to its user alone: what lies in it
+    is loaded as code. Raises OSError."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
 
 
 def key(material: Mapping[str, Any]) -> str:
@@ -84,17 +91,17 @@ def sources(*packages: ModuleType) -> str:
 def source(module: str) -> str:
     """SHA-256 of the package of an imported module, or of its file. A module without a file (in a
     notebook) has another hash in every process, since it cannot be known whether it has changed."""
-    found = sys.modules[module]
-    if found.__package__:
-        return sources(sys.modules[found.__package__])
-    file = getattr(found, "__file__", None)
+    loaded = sys.modules[module]
+    if loaded.__package__:
+        return sources(sys.modules[loaded.__package__])
+    file = getattr(loaded, "__file__", None)
     return hashlib.sha256(Path(file).read_bytes() if file else os.urandom(32)).hexdigest()
 
 
 def cached(
     key_material: Mapping[str, Any],
     build_function: Callable[[Path], Path],
-    room: Path,
+    build_folder: Path,
     poll: Callable[[], object] = lambda: None,
 ) -> Path:
     """The cached FMU for `key_material`, built by `build_function(folder) -> path` if necessary.
@@ -102,21 +109,21 @@ def cached(
     Processes of a machine that need the same one wait for the first to build it, which is logged as
     a warning; `poll` is called meanwhile. Those of several machines each build their own, and the
     last rename wins, with the same bytes. A damaged file in the cache is built again. It is built
-    in `room`, which the caller has to remove, and stays there if the cache is off or cannot be
-    written; the latter is logged as a warning.
+    in `build_folder`, which the caller has to remove, and stays there if the cache is off or
+    cannot be written; the latter is logged as a warning.
     """
     root = folder()
     if root is None:
-        return _made(build_function, room, None, Path())
-    place = root / key(key_material)
-    if found := _found(place):
-        return found
-    with _alone(place, str(key_material.get("block", "the same FMU")), poll):
-        return _found(place) or _made(build_function, room, root, place)
+        return _built(build_function, build_folder, None, Path())
+    entry = root / key(key_material)
+    if cached_file := _whole_file(entry):
+        return cached_file
+    with _exclusively(entry, str(key_material.get("block", "the same FMU")), poll):
+        return _whole_file(entry) or _built(build_function, build_folder, root, entry)
 
 
-def _found(place: Path) -> Path | None:
-    for path in place.glob("[!.]*.fmu"):
+def _whole_file(entry: Path) -> Path | None:
+    for path in entry.glob("[!.]*.fmu"):
         stat = path.stat()
         if is_whole(path, stat.st_mtime_ns, stat.st_size):
             return path
@@ -127,20 +134,22 @@ _held: set[Path] = set()
 
 
 @contextmanager
-def _alone(place: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
-    """No other process of this machine builds for `place` within the context."""
-    told = False
+def _exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
+    """No other process of this machine builds for `entry` within the context."""
+    warned = False
 
     def wait() -> None:
-        nonlocal told
-        if not told:
+        nonlocal warned
+        if not warned:
             logging.getLogger(__name__).warning("waiting for another process that builds %s", name)
-        told = True
+        warned = True
         poll()
 
-    path = Path(tempfile.gettempdir()) / f"hapticlink-{sha(str(place.absolute()))[:32]}.lock"
+    path = entry.parent / "locks" / f"{entry.name}.lock"
     with ExitStack() as stack:
-        with suppress(PermissionError):  # the file of another user, who has another cache
+        with suppress(OSError):  # a cache that cannot be written: reported when it is
+            private(entry.parent)
+            private(path.parent)
             stack.enter_context(lock.held(path, wait))
             _held.add(path)
         try:
@@ -158,38 +167,38 @@ def remove_locks() -> None:
             _held.pop().unlink()
 
 
-def _made(
-    build_function: Callable[[Path], Path], room: Path, root: Path | None, place: Path
+def _built(
+    build_function: Callable[[Path], Path], build_folder: Path, root: Path | None, entry: Path
 ) -> Path:
-    room.mkdir(parents=True, exist_ok=True)
-    making = Path(tempfile.mkdtemp(dir=room))
-    built = build_function(making)
+    build_folder.mkdir(parents=True, exist_ok=True)
+    own_folder = Path(tempfile.mkdtemp(dir=build_folder))
+    built = build_function(own_folder)
     if root is None:
         return built
     try:
-        kept = _kept(built, root, place)
+        stored = _stored(built, root, entry)
     except OSError as error:
         logging.getLogger(__name__).warning(
             "the cache %s cannot be written (%s): %s is not kept; name another by HAPTICLINK_CACHE",
             root, error.strerror or error, built.name,
         )  # fmt: skip
         return built
-    shutil.rmtree(making, ignore_errors=True)
-    return kept
+    shutil.rmtree(own_folder, ignore_errors=True)
+    return stored
 
 
-def _kept(built: Path, root: Path, place: Path) -> Path:
-    """A copy of `built` in `place`: from its first instant there it is whole."""
-    root.mkdir(parents=True, exist_ok=True)
+def _stored(built: Path, root: Path, entry: Path) -> Path:
+    """A copy of `built` in `entry`: from its first instant there it is whole."""
+    private(root)
     _clear(root)
-    beside = root / f".{uuid.uuid4().hex}"
+    unfinished = root / f".{uuid.uuid4().hex}"
     try:
-        shutil.copyfile(built, beside)
-        place.mkdir(exist_ok=True)
-        os.replace(beside, place / built.name)
+        shutil.copyfile(built, unfinished)
+        entry.mkdir(exist_ok=True)
+        os.replace(unfinished, entry / built.name)
     finally:
-        beside.unlink(missing_ok=True)
-    return place / built.name
+        unfinished.unlink(missing_ok=True)
+    return entry / built.name
 
 
 def _clear(root: Path) -> None:
@@ -197,7 +206,7 @@ def _clear(root: Path) -> None:
     cache."""
     for left in root.glob(".*"):
         with suppress(OSError):  # another process has removed it
-            if time.time() - left.stat().st_mtime > LONGEST:
+            if time.time() - left.stat().st_mtime > MAX_BUILD_TIME:
                 left.unlink()
 
 

@@ -83,17 +83,17 @@ def initialize(slave: FMU2Slave) -> None:
     slave.exitInitializationMode()
 
 
-def run(slave: FMU2Slave, at: Session, first: int = 0, count: int = STEPS) -> Trace:
+def run(slave: FMU2Slave, session: Session, first: int = 0, count: int = STEPS) -> Trace:
     """Set inputs, step, get all reals; steps `first` to `first + count - 1`."""
-    references = [v.valueReference for v in at.inputs]
+    references = [v.valueReference for v in session.inputs]
     trace = []
     for k in range(first, first + count):
         # Small values, all different and changing, so that lost or swapped ones are found.
-        nudged = [float(v.start or 0.0) + 1e-4 * (i + 1 + k) for i, v in enumerate(at.inputs)]
+        nudged = [float(v.start or 0.0) + 1e-4 * (i + 1 + k) for i, v in enumerate(session.inputs)]
         if references:
             slave.setReal(references, nudged)
-        slave.doStep(k * at.step_size, at.step_size)
-        trace.append(array("d", slave.getReal(at.reals)).tobytes())
+        slave.doStep(k * session.step_size, session.step_size)
+        trace.append(array("d", slave.getReal(session.reals)).tobytes())
     return trace
 
 
@@ -102,22 +102,22 @@ def check_fmu(path: Path | str) -> list[str]:
     findings = [f"validation: {finding}" for finding in validate_fmu(str(path))]
     if findings:
         return findings
-    with session(path) as at:
-        slave = at.instance()
+    with session(path) as opened:
+        slave = opened.instance()
         initialize(slave)
         try:
-            reference = run(slave, at)
+            reference = run(slave, opened)
         except FMICallException as error:
-            return [f"run: {error}; {' | '.join(at.messages)}"]
-        at.free(slave)
+            return [f"run: {error}; {' | '.join(opened.messages)}"]
+        opened.free(slave)
         for check in CHECKS:
             try:
-                finding = check(at, reference)
+                finding = check(opened, reference)
             except FMICallException as error:
-                finding = f"{error}; {' | '.join(at.messages)}"
+                finding = f"{error}; {' | '.join(opened.messages)}"
             if finding:
                 findings.append(f"{check.__name__.strip('_')}: {finding}")
-    findings += _alone(path, at.step_size)
+    findings += _alone(path, opened.step_size)
     return findings
 
 
@@ -132,66 +132,66 @@ def _alone(path: Path | str, step_size: float) -> list[str]:
     return [f"alone: not finite from its own start values: {', '.join(bad)}"] if bad else []
 
 
-def _inputs_read_back(at: Session, _: Trace) -> str | None:
-    slave = at.instance()
+def _inputs_read_back(session: Session, _: Trace) -> str | None:
+    slave = session.instance()
     initialize(slave)
-    references = [v.valueReference for v in at.inputs]
-    values = [float(v.start or 0.0) + 0.1 * (i + 1) for i, v in enumerate(at.inputs)]
+    references = [v.valueReference for v in session.inputs]
+    values = [float(v.start or 0.0) + 0.1 * (i + 1) for i, v in enumerate(session.inputs)]
     if references:
         slave.setReal(references, values)
     read = slave.getReal(references) if references else []
-    at.free(slave)
+    session.free(slave)
     return None if read == values else f"set {values}, read {read}"
 
 
-def _load_again(at: Session, reference: Trace) -> str | None:
-    slave = at.instance()
+def _load_again(session: Session, reference: Trace) -> str | None:
+    slave = session.instance()
     initialize(slave)
-    return _compare(run(slave, at), reference)
+    return _compare(run(slave, session), reference)
 
 
-def _reset(at: Session, reference: Trace) -> str | None:
-    slave = at.instance()
+def _reset(session: Session, reference: Trace) -> str | None:
+    slave = session.instance()
     initialize(slave)
-    run(slave, at)
+    run(slave, session)
     slave.reset()
     initialize(slave)
-    return _compare(run(slave, at), reference)
+    return _compare(run(slave, session), reference)
 
 
-def _two_instances(at: Session, reference: Trace) -> str | None:
-    one, two = at.instance("one"), at.instance("two")
+def _two_instances(session: Session, reference: Trace) -> str | None:
+    one, two = session.instance("one"), session.instance("two")
     initialize(one)
     initialize(two)
-    run(one, at, count=1)
-    trace = run(two, at)
-    rest = run(one, at, first=1, count=STEPS - 1)
+    run(one, session, count=1)
+    trace = run(two, session)
+    rest = run(one, session, first=1, count=STEPS - 1)
     return _compare(trace, reference) or _compare(rest, reference[1:])
 
 
-def _save_and_restore(at: Session, reference: Trace) -> str | None:
-    slave = at.instance()
+def _save_and_restore(session: Session, reference: Trace) -> str | None:
+    slave = session.instance()
     initialize(slave)
-    run(slave, at, count=2)
+    run(slave, session, count=2)
     state = slave.getFMUState()
     saved = slave.serializeFMUstate(state)
-    run(slave, at, first=2, count=STEPS - 2)
+    run(slave, session, first=2, count=STEPS - 2)
     slave.setFMUState(state)
     slave.freeFMUState(state)
-    trace = run(slave, at, first=2, count=STEPS - 2)
-    return _compare(trace, reference[2:]) or _deserialize(at, saved, reference)
+    trace = run(slave, session, first=2, count=STEPS - 2)
+    return _compare(trace, reference[2:]) or _deserialize(session, saved, reference)
 
 
-def _deserialize(at: Session, saved: bytes, reference: Trace) -> str | None:
+def _deserialize(session: Session, saved: bytes, reference: Trace) -> str | None:
     """A state restored into another instance has to continue as the first one did."""
-    slave = at.instance("other")
+    slave = session.instance("other")
     initialize(slave)
     state = slave.deSerializeFMUstate(saved)
     if slave.serializeFMUstate(state) != saved:
         return "serialised, read and serialised again, the bytes differ"
     slave.setFMUState(state)
     slave.freeFMUState(state)
-    return _compare(run(slave, at, first=2, count=STEPS - 2), reference[2:])
+    return _compare(run(slave, session, first=2, count=STEPS - 2), reference[2:])
 
 
 CHECKS: tuple[Callable[[Session, Trace], str | None], ...] = (

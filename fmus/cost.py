@@ -22,11 +22,11 @@ class Cost:
 
 def cost(name: str, settings: Mapping[str, Any]) -> Cost:
     """The cost of the block `name` with `settings`. Raises FmuError if they give no component."""
-    made = component(name, settings)
-    parts = one_pass(made)
+    block = component(name, settings)
+    parts = one_pass(block)
     before = (parts.substeps - 1) * parts.substep.n_instructions()
     return Cost(
         step=before + parts.advance.n_instructions(),
-        inputs={v.name: v.size for v in made.inputs},
-        outputs={v.name: v.size for v in made.outputs},
+        inputs={v.name: v.size for v in block.inputs},
+        outputs={v.name: v.size for v in block.outputs},
     )

@@ -53,8 +53,8 @@ def _surviving(method: typing.Callable) -> typing.Callable:
         try:
             return method(self, *arguments)
         except Exception:
-            for kept in (type(self), self, self.log_queue):
-                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            for referenced in (type(self), self, self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(referenced))
             raise
 
     return surviving
@@ -232,19 +232,19 @@ class HapticlinkSlave(Fmi2Slave):
         """The value references as a slice, None if they are not consecutive, and the largest one;
         cached. Raises ValueError for an unknown value reference."""
         key = tuple(vrs)
-        found = self._blocks.get(key)
-        if found is None:
+        run_and_last = self._blocks.get(key)
+        if run_and_last is None:
             last = max(key, default=-1)
             # pythonfmu passes those of more than 31 bits as negative numbers.
             if wrong := [vr for vr in key if not 0 <= vr < len(self._values)]:
-                said = f"unknown value reference {wrong[0] % 2**32}"
-                raise ValueError(f"{said}; {len(self._values)} are known")
+                message = f"unknown value reference {wrong[0] % 2**32}"
+                raise ValueError(f"{message}; {len(self._values)} are known")
             run = key == tuple(range(last + 1 - len(key), last + 1))
-            found = (slice(last + 1 - len(key), last + 1) if run else None, last)
+            run_and_last = (slice(last + 1 - len(key), last + 1) if run else None, last)
             if len(self._blocks) >= 1000:
                 self._blocks.clear()
-            self._blocks[key] = found
-        return found
+            self._blocks[key] = run_and_last
+        return run_and_last
 
     def _refuse_unsettable(self, vrs: list) -> None:
         for vr in vrs:
@@ -302,8 +302,8 @@ class HapticlinkSlave(Fmi2Slave):
         if self._sampled:
             if not all(map(math.isfinite, self._new_outputs)):
                 message = self._not_finite(self._new_outputs, start, outputs=True)
-                said = f"{message}; state and outputs stay as before the step"
-                self.log(said, enums.Fmi2Status.error)
+                text = f"{message}; state and outputs stay as before the step"
+                self.log(text, enums.Fmi2Status.error)
                 return False
             self._outputs[:] = self._new_outputs
         x[:], self._shared[:] = trial, self._next_shared
@@ -311,12 +311,12 @@ class HapticlinkSlave(Fmi2Slave):
         self._output_due = False
         return True
 
-    def _not_finite(self, found: memoryview, time: float, outputs: bool = False) -> str:
+    def _not_finite(self, values: memoryview, time: float, outputs: bool = False) -> str:
         """The message which state, or with `outputs` which output, is not finite, with the likely
         cause."""
         about = self._about
         names = about["names"][self._settable :] if outputs else about["states"]
-        i = next(i for i, value in enumerate(found) if not math.isfinite(value))
+        i = next(i for i, value in enumerate(values) if not math.isfinite(value))
         known = zip(about["names"], self._values[: self._settable])  # noqa: B905 - outputs left out
         bad = [f"{name} = {value}" for name, value in known if not math.isfinite(value)]
         cause = (
@@ -326,7 +326,7 @@ class HapticlinkSlave(Fmi2Slave):
             if outputs
             else "inputs and parameters are finite; take a smaller step or more substeps"
         )
-        return f"{names[i]} became {found[i]} at t = {time!r}; {cause}"
+        return f"{names[i]} became {values[i]} at t = {time!r}; {cause}"
 
     # --- FMU state: bytes, so that saving and serialising are the same, bit for bit -------
 

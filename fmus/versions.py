@@ -1,4 +1,4 @@
-"""Versions of installed distributions, each read from its metadata once."""
+"""Versions of installed distributions, each read from its metadata once, and how to add extras."""
 
 from __future__ import annotations
 
@@ -7,3 +7,12 @@ from importlib import metadata
 
 version = cache(metadata.version)
 """The version of a distribution by its name. Raises importlib.metadata.PackageNotFoundError."""
+
+
+def install_command(extra: str) -> str:
+    """The shell command that installs the packages of an extra of hapticlink.
+
+    It is the same for a wheel and for a checkout, from any folder: pip takes the hapticlink that is
+    installed, and adds what its extra requires. Double quotes are understood by every shell.
+    """
+    return f'pip install "hapticlink[{extra}]"'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import current_directory, interrupt
 from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.record import content
@@ -78,6 +80,7 @@ def _left_out(every: System, system: System) -> list[str]:
     return [*dict.fromkeys(left_out)]
 
 
+@interrupt.held()
 def simulate(
     scene: str | Path | Scene,
     folder: Path | str,
@@ -94,23 +97,9 @@ def simulate(
     rows of this one are written. Without `csv` the tables stay in the binary form in which a run
     writes them.
     """
-    with interrupt.held():
-        begin = perf_counter()
-        read = open_scene.load(scene, options)
-        with folder_lock.held(Path(folder)):
-            return _simulated(read, Path(folder), progress, csv, real_time, begin)
-
-
-def _simulated(
-    read: Scene,
-    folder: Path,
-    progress: Progress | None,
-    csv: bool,
-    real_time: RealTimeRun | None,
-    begin: float,
-) -> Experiment:
-    """begin: when the scene began to be read (s)."""
-    with built(read) as every:
+    begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
+    read = open_scene.load(scene, options)
+    with folder_lock.held(folder), built(read) as every:
         system = with_fetched(every)
         plan = Plan(system)
         plan.check()
@@ -121,11 +110,18 @@ def _simulated(
             sides = dict.fromkeys(beside(plan)[0].values())
             tables += [f"{clock}_{SAMPLES}" for clock in sides]
         before = setup(read, plan, tables, _left_out(every, system))
+        for fmu in system.fmus:
+            if offered := capabilities.unused(fmu.description):
+                said = "%s offers %s, which is not used: its events act at ends of steps"
+                logging.getLogger(__name__).warning(said, fmu.name, offered)
         alone = isolated(system.fmus)
-        risky = any(fmu.path and fmu.name not in alone for fmu in read.fmu)
         csv = csv and read.record.format == "csv"
+        foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         with RunFolder(folder, before, csv) as results:
-            with crash_monitor.watched(folder) if risky else nullcontext():
+            with (
+                crash_monitor.watched(folder) if foreign else nullcontext(),
+                current_directory.restored(*foreign),
+            ):
                 outcome = run(plan, results, progress, real_time)
             try:
                 results.end(outcome.ending(build_time), columns)

@@ -9,14 +9,15 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.faults import InputFault, shortened, unknown
 from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import varies_step
@@ -27,6 +28,7 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.scene.scene import Scene
@@ -58,7 +60,7 @@ class LiveRun:
     ) -> Result:
         """What `run` returns, which runs `scene` with the pace that it is given; called again after
         each `reset`. Turns come about `every` so many seconds."""
-        self._called, self._every = turn, round(1e9 * every)
+        self._called, self._every = turn, round(1e9 * require("every", every, Elapsed))
         while True:
             self._until: int | None = None
             self._again = False
@@ -74,18 +76,22 @@ class LiveRun:
 
     @property
     def time(self) -> float:
-        """The simulated time of the newest haptic event (s)."""
+        """The simulated time of the newest haptic event (s). Raises InputFault before `run`, as
+        does all that reads or changes what runs."""
+        self._require_running()
         haptics = self._simulation.system.timeline.clocks[0].name
         return self._simulation.seconds(self._loop.events.previous(haptics))
 
     @property
     def system(self) -> System:
         """The FMUs, connections and clocks that run, as they were at the start."""
+        self._require_running()
         return self._simulation.system
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """The newest sample of an output, `fmu.port`, that the haptic loop has: its entries in the
         order of their indices. Raises InputFault for an unknown name."""
+        self._require_running()
         if name not in self._places:
             fmu, place = name.partition(".")[0], self._simulation.signals.scalar
             self._places[name] = [place(fmu, s.name) for s in self._scalars(name, "output")]
@@ -93,10 +99,12 @@ class LiveRun:
 
     def energies(self) -> dict[str, Energy]:
         """The energies (J) of each connection that carries power, until now."""
+        self._require_running()
         return self._simulation.meters.energies()
 
     def report(self) -> dict[str, Any]:
         """Step times, lateness, deadlines missed and late samples until now, as in run.json."""
+        self._require_running()
         return self._run.report()
 
     # --- to change --------------------------------------------------------------------------
@@ -106,6 +114,7 @@ class LiveRun:
         step on; entries in the order of their indices, in the FMU's units. Raises InputFault for
         other names, for gains of a spring whose energy `pspm` limits, and for values of another
         number or that are not finite."""
+        self._require_running()
         fmu = name.partition(".")[0]
         if name not in self._settings:
             scalars = [*self._scalars(name, "input", "parameter")]
@@ -113,17 +122,26 @@ class LiveRun:
             instance = self._simulation.instances[fmu]
             self._settings[name] = scalars, instance.connect(scalars, range(len(scalars)))
         scalars, set_from = self._settings[name]
-        values = np.array(value, np.float64).ravel()
+        try:
+            values = np.array(value, np.float64).ravel()
+        except (TypeError, ValueError):
+            values = np.empty(0)
         if len(values) != len(scalars) or not np.isfinite(values).all():
-            raise InputFault(f"{name} = {values.tolist()}: give {len(scalars)} finite numbers")
+            raise InputFault(
+                f"{name} = {shortened(repr(value))}: give {len(scalars)} finite numbers"
+            )
         self._simulation.instances[fmu].before_step(lambda: set_from(values))
 
     def hold(self, name: str, hold: str | None = None, delay: float | None = None) -> None:
         """Give connections another hold, or another constant latency `delay` (s); they are named
         as in [holds] of a scene. A hold begins anew with the newest sample of its source. Raises
-        InputFault where it does not fit, or cannot be changed while the scene runs."""
+        InputFault where it does not fit, or cannot be changed while the scene runs, and for a delay
+        that no scene may have."""
+        self._require_running()
         if hold is not None and hold not in HOLDS:
-            raise InputFault(unknown("hold", hold, HOLDS))
+            raise InputFault(unknown("hold", str(hold), HOLDS))
+        if delay is not None:
+            delay = require(f"delay of {name}", delay, Elapsed)
         system = self._simulation.system
         found = [c for c in system.connections if name in names(c) and c.hold]
         if not found:
@@ -142,6 +160,7 @@ class LiveRun:
     def holds(self) -> dict[str, list[str]]:
         """By connection that has a hold, the holds that `hold` can give it, its present one
         first."""
+        self._require_running()
         found: dict[str, list[str]] = {}
         for c in self.system.connections:
             if c.hold:
@@ -160,6 +179,7 @@ class LiveRun:
         the step's number. Raises InputFault where an FMU cannot vary its step or has a spring whose
         energy `pspm` limits, for a rate that is not between 0 and the haptic one, and for a jitter
         that leaves no haptic tick between two ends."""
+        self._require_running()
         timeline = self._simulation.system.timeline
         haptics, *others = timeline.clocks
         if clock not in [c.name for c in others]:
@@ -173,6 +193,9 @@ class LiveRun:
                 f"rate of {clock}: `pspm` limits the energy of a spring of {limited[0]} over the "
                 "steps of the start: change the scene, with `reset`"
             )
+        rate = require(f"rate of {clock}", rate, Annotated[float, Quantity("Hz", gt=0)])
+        jitter = require(f"jitter of {clock}", jitter, Annotated[float, Quantity("1", ge=0)])
+        seed = int(require("seed", seed, Seed))
         period = 1 / (exact(rate) * timeline.base) if SLOWEST <= rate < math.inf else Fraction(0)
         if period < haptics.longest:
             limits = f"from {SLOWEST:g} Hz up to that of the haptics"
@@ -206,17 +229,21 @@ class LiveRun:
         self.paused, self._until = False, None
 
     def step(self, ticks: int = 1) -> None:
-        """Go on for a number of haptic ticks, then pause."""
+        """Go on for a number of haptic ticks, then pause. Raises InputFault for less than one."""
+        self._require_running()
+        ticks = int(require("ticks", ticks, Annotated[int, Quantity("1", ge=1, le=2**53)]))
         self.paused, self._until = True, self._run.pace.c.ticks + ticks
 
     def reset(self, options: Options = ()) -> None:
         """Begin anew at t = 0, with the scene changed by `options`. Raises what `hl.scene` does."""
+        self._require_running()
         self.scene = open_scene.load(self.scene, options)
         self._again = True
         raise Ended("reset")
 
     def stop(self) -> None:
         """End the run."""
+        self._require_running()
         raise Ended("stopped")
 
     # ------------------------------------------------------------------------------------------
@@ -236,6 +263,10 @@ class LiveRun:
         loop.events.patience(self._every if self._until is None else 0)
         if self.paused or stepping:
             pace.c.origin += pace.now() - begun
+
+    def _require_running(self) -> None:
+        if not hasattr(self, "_simulation"):
+            raise InputFault("the scene does not run yet: ask within the `turn` that `run` calls")
 
     def _scalars(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
         fmu, _, port = name.partition(".")
@@ -266,7 +297,7 @@ class LiveRun:
         system = self._simulation.system
         new = held_by(c, hold, delay)
         why = misfit(new.hold or "", new, system.fmu, system.energy.power, False)
-        if system.coupling.scheme == "iterated" or system.coupling.step_control:
+        if system.coupling.scheme == "iterated":
             why = "steps are repeated"
         spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
         on_force = spring and any(

@@ -25,8 +25,6 @@ def of_scene(scene: Scene) -> None:
     if reasons:
         reasons.append("only blocks of this project are compiled into a program; FMUs that contain "
                        "their sources are not yet")  # fmt: skip
-    if scene.step_control:
-        reasons.append("step_control: steps are repeated by Python")
     if scene.coupling == "iterated":
         reasons.append("coupling = 'iterated': steps are repeated by Python")
     if scene.faults.discard == "retry":

@@ -178,7 +178,7 @@ def _resolved(
     for name in simulation.meters.of:
         samples += [Sample(name, 0), Move(name, 0)]
     start = machine.block([(instruction, _nothing) for instruction in samples])
-    binder = Binder(simulation, lambda part: (), machine.joined)
+    binder = Binder(simulation, machine.joined)
     kinds = {}
     for event in _kinds(system.timeline):
         bound = binder.instructions(plan.block(event))
@@ -234,7 +234,8 @@ def _as_before_the_start(simulation: Simulation, outside: str | None) -> None:
     for instance in simulation.instances.values():
         ctypes.memset(ctypes.addressof(instance.place), 0, ctypes.sizeof(instance.place))
     for check in simulation.step_checks.values():
-        check.found, check.times = check.found[:STEP_CHECKS], check.times[:STEP_CHECKS]
+        check.estimates = check.estimates[:STEP_CHECKS]
+        check.times, check.weights = check.times[:STEP_CHECKS], check.weights[:STEP_CHECKS]
     for connection, meter in simulation.meters.of.items():
         rows = max(METER_ROWS, 4 * _steps_apart(simulation.system, connection))
         for name in ("stamps", "samples", "ticks", "moves", "efforts"):

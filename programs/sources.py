@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import json
 import re
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -18,7 +20,6 @@ from hapticlink.fmus.native.source import component_source, number
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.run.compiled import build as loop
-from hapticlink.orchestrator.run.compiled.fmus import address
 from hapticlink.programs.ports import Port
 from hapticlink.programs.regions import Regions
 from hapticlink.programs.resolved import Resolved
@@ -26,7 +27,7 @@ from hapticlink.programs.typed_data import TypedData
 
 HERE = Path(__file__).parent
 OWN = ("program.h", "program.c", "platform.c", "latencies.c", "energies.c")
-REPLACED = ("platform.c", "python_errors.c")
+REPLACED = ("platform.c", "process_state.c", "python_errors.c")
 """Files of the loop in whose place a program has its own platform.c."""
 HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 FUNCTIONS = {
@@ -84,7 +85,7 @@ def _scene(
     members = [*ids]
     handles = {_component(resolved.instance(fmu)): i for i, fmu in enumerate(members)}
     functions = {
-        address(resolved.instance(fmu).slave.dll[name]) or 0: name
+        _address(resolved.instance(fmu).slave.dll[name]): name
         for fmu in members
         for name in FUNCTIONS
     }
@@ -158,6 +159,10 @@ def _scene(
 def _component(instance: InProcess) -> int:
     component: int = instance.slave.component
     return component
+
+
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 def _at(place: str) -> str:

@@ -1,7 +1,30 @@
 """A component evaluated by names, for tests."""
 
+from functools import wraps
+
 import casadi as ca
 import numpy as np
+
+from hapticlink.components.blocks import virtual_environment as environment_block
+from hapticlink.components.blocks import virtual_mechanism as mechanism_block
+
+
+def once(build):
+    """`build`, whose component is built once for the same arguments: it has no state."""
+    components = {}
+
+    @wraps(build)
+    def built(*arguments, **named):
+        key = repr((arguments, named))
+        if key not in components:
+            components[key] = build(*arguments, **named)
+        return components[key]
+
+    return built
+
+
+virtual_mechanism = once(mechanism_block.virtual_mechanism)
+virtual_environment = once(environment_block.virtual_environment)
 
 
 class Running:

@@ -8,9 +8,8 @@ test_controller.py, (B.14)'s rows of U in test_constrained_directions.py.
 import numpy as np
 import pytest
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.linkage import Directions, Mechanism
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.components import appendix_a
 from tests.mechanisms import Q0, TABLE_6_1, WRENCH, five_bar, open_arm, terms
 

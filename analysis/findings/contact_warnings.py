@@ -1,4 +1,5 @@
-"""Warnings of contacts that are deeper than their geometry means, or too stiff for the steps."""
+"""Warnings of contacts that are deeper than their geometry means, too stiff for the steps, or not
+rendered."""
 
 from __future__ import annotations
 
@@ -12,7 +13,12 @@ from hapticlink.components.contact.depth import depths, middle, overlaps
 from hapticlink.components.contact.stiffness import STABLE, poles, sticking_poles
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage, Mechanism
-from hapticlink.orchestrator.base.loop_names import CONTACT_GAP, JOINT_COORDINATES
+from hapticlink.orchestrator.base.loop_names import (
+    CONTACT_GAP,
+    CONTROLLER,
+    ENVIRONMENT_WRENCH,
+    JOINT_COORDINATES,
+)
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.scene_part import scene_part
 from hapticlink.orchestrator.results.tables import Results, Table
@@ -28,6 +34,7 @@ def lines(results: Results) -> Iterator[str]:
     table = of_block(results, CONTACT_GAP)
     if table is None or not len(table["time"]) or not scene["linkage"] or not scene["contacts"]:
         return
+    yield from _unrendered(results, table)
     linkage = scene_part(results, "linkage", Linkage)
     contacts = scene_part(results, "contacts", Contacts)
     if JOINT_COORDINATES in table:  # both are recorded
@@ -38,6 +45,20 @@ def lines(results: Results) -> Iterator[str]:
         step_s = record.clocks[rate].longest / mechanism.substeps
         implicit = mechanism.integrator == "linearly-implicit"
         yield from _stiff(linkage, contacts, step_s, implicit)
+
+
+def _unrendered(results: Results, table: Table) -> Iterator[str]:
+    """A line where contacts act on the mechanism and its own controller does not pass them on."""
+    record = results.record
+    sent = any(name.startswith(f"{ENVIRONMENT_WRENCH} -> ") for name in record.connections)
+    closed = table["time"][np.asarray(table[CONTACT_GAP]) < 0]
+    if sent or not len(closed) or not record.scene["controller"] or CONTROLLER in record.replaced:
+        return
+    yield (
+        f"warning: contacts act on the mechanism from {closed[0]:.4g} s on and are not rendered to "
+        "the hand: the handle is led to where the mechanism cannot follow; take "
+        "controller.contact = true"
+    )
 
 
 def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.forces import torques, touching
-from hapticlink.analysis.findings.limits import EPISODES, FELT, FULL
+from hapticlink.analysis.findings.limits import EPISODES, FULL_TORQUE, NOTICEABLE_J
 from hapticlink.analysis.findings.tracking import COPY_BRANCH_OK, constrained, of_block
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
@@ -59,7 +59,7 @@ def _states(results: Results) -> Iterator[State]:
         yield "folded", branch["time"], branch[COPY_BRANCH_OK] == 0, ""
     yield from _saturated(results)
     if port := user_port(results):
-        yield "energy", port.time_s, port.generated_J > FELT, ""
+        yield "energy", port.time_s, port.generated_J > NOTICEABLE_J, ""
     if counted := constrained(results):
         table, name = counted
         values, counts = np.unique(table[name], return_counts=True)
@@ -78,4 +78,4 @@ def _saturated(results: Results) -> Iterator[State]:
         if driven := torques(results, device, user):
             most = np.abs(driven[1]).max(axis=1)
             said = f"{EPISODES['saturated']}: {user}" if user else ""
-            yield "saturated", driven[0], most >= FULL * device.torque_limit, said
+            yield "saturated", driven[0], most >= FULL_TORQUE * device.torque_limit, said

@@ -12,7 +12,7 @@ EPISODES = {
     "outside": "outside the device's workspace",
 }
 """Kinds of episodes and their meaning."""
-FELT = 1e-3
+NOTICEABLE_J = 1e-3
 """Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
-FULL = 1 - 1e-6
+FULL_TORQUE = 1 - 1e-6
 """Share of their largest torque from which on motors are at their limit."""

@@ -40,22 +40,27 @@ class Gap:
 
 @dataclass(frozen=True)
 class EquilibriumLocation:
-    """Where an equilibrium is. pose: x, y (m) and theta (rad) of the operational point, () without
-    one. from_start: how far that is from the start of the scene. contacts: depths (m) of what
-    presses, by body and obstacle. run: what the run from the start does, "rests there",
-    "approaches", "rests elsewhere" or "passes", at the `time` (s) from which on it is there, or
-    at which it is nearest (by its operational point, if it passes); and how far it is from there
-    at that time and at its `end` (s)."""
+    """Where an equilibrium is, and whether the run from the start comes there."""
 
     pose: tuple[float, ...]
+    """x, y (m) and theta (rad) of the operational point, () without one."""
     from_start: Gap
+    """Its distance from the start of the scene."""
     contacts: dict[str, float]
+    """Depths (m) of what presses, by body and obstacle."""
     run: str
+    """What the run does: "rests there", "approaches", "rests elsewhere" or "passes"."""
     time: float
+    """The time (s) from which on the run is there, or at which it is nearest: by its operational
+    point, if it passes."""
     nearest: Gap
+    """The distance at that time."""
     end: float
+    """The end (s) of the run."""
     at_end: Gap
+    """The distance at the end."""
     ended: str
+    """What ended the run before its time."""
 
     def record(self) -> dict[str, Any]:
         """The entry `where` of stability.json."""

@@ -50,7 +50,7 @@ class Hybrid:
 
     def harmonic(self, h: int) -> Hybrid:
         """That of one harmonic of the hand, and the one of the mechanism that it is seen as: with
-        terminations that let all others go by."""
+        terminations that pass all other frequencies."""
         steps = len(self.own) // self.r
         i = slice(h * self.r, (h + 1) * self.r)
         j = slice((h % steps) * self.r, (h % steps + 1) * self.r) if steps else slice(0, 0)

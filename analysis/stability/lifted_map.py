@@ -27,11 +27,11 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.plan.operations import Event, Operation, Part, Record, StopWhen
+from hapticlink.orchestrator.plan.operations import Event, Operation, Record, StopWhen
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.bind_operations import Binder, Bound
-from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
@@ -78,9 +78,9 @@ class LiftedMap:
         window: tuple[int, int] | None = None,
     ) -> None:
         self._simulation, time = simulation, plan.system.timeline
-        self._bound: dict[Event | Part, Bound] = {}
+        self._bound: dict[Event, Bound] = {}
         self._plan, self.system = plan, plan.system
-        self._binder = Binder(simulation, self._calls)
+        self._binder = Binder(simulation)
         self._sensitivity = sensitivity
         self._state = StateVector(simulation)
         length = window[1] if window else hyperperiod(time)
@@ -209,10 +209,7 @@ class LiftedMap:
         for _, call in self._instructions(event):
             call(tick)
 
-    def _calls(self, kind: Event | Part) -> list[Call]:
-        return [call for _, call in self._instructions(kind)]
-
-    def _instructions(self, kind: Event | Part) -> Bound:
+    def _instructions(self, kind: Event) -> Bound:
         """The operations of a kind of event, without those that write rows or end a run, and their
         calls."""
         if kind not in self._bound:
@@ -246,11 +243,9 @@ def lifted_map(system: System, at: float = 0.0, scene: Scene | None = None) -> I
     """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; the state is
     perturbed within the loop closures of `scene`.
 
-    Raises InputFault where there is none: adaptive step sizes, rates and latencies that vary, an
+    Raises InputFault where there is none: rates and latencies that vary, an
     FMU whose state cannot be read.
     """
-    if system.coupling.step_control:
-        raise InputFault("step_control adapts the steps to the state: the map needs fixed ones")
     for c in system.connections:
         if c.latency and (c.latency.loss or c.latency.max not in (None, c.latency.min)):
             raise InputFault(

@@ -43,29 +43,35 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class HandPort:
-    """The user's port: the FMUs of the hand and of the handle, the inputs of the handle that take
-    the force, and the indices of the signals that hold that force, and the pose and velocity of the
-    handle."""
+    """The user's port."""
 
     hand: str
+    """The FMU of the hand."""
     handle: str
+    """The FMU of the handle."""
     inputs: tuple[str, ...]
+    """The inputs of the handle that take the force."""
     forces: tuple[int, ...]
+    """Indices of the signals that hold that force."""
     moved: tuple[int, ...]
+    """Those of the pose of the handle."""
     moving: tuple[int, ...]
+    """Those of its velocity."""
 
 
 @dataclass(frozen=True)
 class MechanismPort:
-    """The port of the virtual mechanism: its inputs with the factor by which each adds to the
-    entries of the wrench on it, the indices of the signals of its pose and velocity, and the ports
-    whose outputs others read besides, which stay as at the equilibrium."""
+    """The port of the virtual mechanism."""
 
     fmu: str
     wrench: tuple[tuple[tuple[str, float], ...], ...]
+    """By entry of the wrench on it, its inputs with the factor by which each adds to that entry."""
     moved: tuple[int, ...]
+    """Indices of the signals of its pose."""
     moving: tuple[int, ...]
+    """Those of its velocity."""
     kept: tuple[str, ...] = ()
+    """The ports whose outputs others read besides, which stay as at the equilibrium."""
 
 
 def hand_port(system: System) -> HandPort:

@@ -35,27 +35,35 @@ LOST = 1e-6
 
 @dataclass(frozen=True)
 class Stability:
-    """The result of an analysis. period: the hyperperiod (s). radius: the spectral radius over it,
-    without neutral modes, and its uncertainty. growth: ln(radius)/period (1/s). modes: the leading
-    ones. neutral: those with z = 1. frozen: lines of text. kinks: coordinates in which the map has
-    no slope. linearised: by FMU, whether its slopes are those of its graph or differences.
-    equilibrium: by coordinate. where: its pose, and whether the run from the start rests there."""
+    """The stability of a scene around its equilibrium."""
 
     title: str
     period: float
+    """The hyperperiod (s)."""
     radius: float
+    """The spectral radius over the hyperperiod, without neutral modes."""
     uncertainty: float
+    """Of the spectral radius."""
     modes: tuple[Mode, ...]
+    """The leading modes."""
     neutral: tuple[Mode, ...]
+    """Modes with z = 1."""
     names: tuple[str, ...]
+    """The coordinates that the modes move."""
     equilibrium: dict[str, float]
+    """By coordinate."""
     frozen: tuple[str, ...]
+    """Lines of text on what is removed or stays as at the equilibrium."""
     kinks: tuple[str, ...]
+    """The coordinates in which the lifted map has no slope."""
     linearised: dict[str, str]
+    """By FMU, whether its slopes are those of its graph or differences."""
     where: EquilibriumLocation
+    """The pose of the equilibrium, and whether the run from the start rests there."""
 
     @property
     def growth(self) -> float:
+        """The growth rate (1/s), ln(radius)/period."""
         return float(np.log(self.radius)) / self.period if self.radius else -np.inf
 
     @property

@@ -42,21 +42,26 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class VaryingStability:
-    """The result for a rate that varies. frames: the periods that may occur (ticks of `tick` s).
-    bounds: of the joint spectral radius, per frame. worst: the periods of its fastest sequence.
-    second_moment: spectral radius of the map of second moments, per frame. exponent: Lyapunov's
-    (1/s), with the half-width of its 95 % confidence interval on a sequence drawn with `seed`."""
+    """The stability of a scene with a rate that varies."""
 
     title: str
     frames: tuple[int, ...]
+    """The periods that may occur (ticks)."""
     tick: float
+    """(s)"""
     bounds: Bounds
+    """Of the joint spectral radius, per frame."""
     worst: tuple[int, ...]
+    """The periods of the sequence that grows fastest (ticks)."""
     second_moment: float
+    """The spectral radius of the map of second moments, per frame."""
     exponent: float
+    """The Lyapunov exponent (1/s) of a sequence that is drawn with `seed`."""
     confidence: float
+    """The half-width of its 95 % confidence interval (1/s)."""
     seed: int
     frozen: tuple[str, ...]
+    """Lines of text on what is removed or stays as at the equilibrium."""
 
     @property
     def any_sequence(self) -> str:

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from hapticlink.analysis.sweep import cluster, job, pool, table
-from hapticlink.analysis.sweep.job import Job
+from hapticlink.analysis.sweep import cluster, pool, table
+from hapticlink.analysis.sweep.job import Job, key
 from hapticlink.analysis.sweep.row import DIED, INTERRUPTED, REFUSED, Row, failed, measure
 from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, Interrupted
@@ -30,19 +30,20 @@ class Unfinished(Fault):
         )
 
 
-def work(each: Job, room: Path | None = None, measure: Measure = measure) -> Row:
-    """Runs one job and returns its row; results are kept in `room` (by default the machine's folder
-    for temporary files) until they are measured."""
-    assert each.scene is not None
+def work(job: Job, folder: Path | None = None, measure: Measure = measure) -> Row:
+    """Runs one job and returns its row; results are kept below `folder` (by default the machine's
+    one for temporary files) until they are measured."""
+    assert job.scene is not None
     try:
-        plugins.load(each.plugins)
+        plugins.load(job.plugins)
     except Fault as missing:
         return failed(DIED, str(missing))
-    if job.key(each.scene) != each.key:
+    if key(job.scene) != job.key:
         return failed(DIED, "this worker has another version of hapticlink or of what it uses")
-    with tempfile.TemporaryDirectory(dir=room) if room else temporary_folders.room() as folder:
+    temporary = tempfile.TemporaryDirectory(dir=folder) if folder else temporary_folders.room()
+    with temporary as results:
         try:
-            experiment = simulate(each.scene, folder, csv=False)
+            experiment = simulate(job.scene, results, csv=False)
             row, fault = measure(experiment), experiment.outcome.fault
             return row if fault is None or _of_scene(fault) else row | {"end": _retried(fault)}
         except Fault as fault:
@@ -63,6 +64,7 @@ def _retried(fault: Fault) -> str:
     return INTERRUPTED if isinstance(fault, Interrupted) else DIED
 
 
+@interrupt.held()
 def sweep(
     jobs: Sequence[Job],
     folder: Path,
@@ -78,62 +80,49 @@ def sweep(
     failed for a reason other than its scene. Raises Unfinished if the sweep is interrupted, after
     writing table.csv with the rows so far, and Fault if the disk is full.
     """
-    with interrupt.held():
-        return _rows(jobs, folder, processes, scheduler, tell, measure)
-
-
-def _rows(
-    jobs: Sequence[Job],
-    folder: Path,
-    processes: int,
-    scheduler: str | None,
-    tell: Tell,
-    measure: Measure,
-) -> list[Row]:
     try:
-        rows = table.Rows(folder / "rows")
-        found = {j.key: kept for j in jobs if j.scene and (kept := rows.find(j.key))}
+        stored = table.Rows(folder / "rows")
+        rows = {j.key: row for j in jobs if j.scene and (row := stored.find(j.key))}
         # Points that give the same scene are run once.
-        missing = list({j.key: j for j in jobs if j.scene and j.key not in found}.values())
-        refused = sum(j.scene is None for j in jobs)
+        missing = list({j.key: j for j in jobs if j.scene and j.key not in rows}.values())
 
-        def done() -> int:
-            return refused + sum(j.key in found for j in jobs if j.scene)
+        def done() -> list[Job]:
+            return [j for j in jobs if not j.scene or j.key in rows]
 
-        tell(done())
+        tell(len(done()))
         try:
-            for each, made in _finished(missing, folder, processes, scheduler, measure):
-                if made["end"] == INTERRUPTED:  # a signal reached the worker too
+            for job, row in _finished(missing, folder, processes, scheduler, measure):
+                if row["end"] == INTERRUPTED:  # a signal reached the worker too
                     continue
-                if made["end"] != DIED:  # the next sweep repeats those
-                    rows.keep(each.key, made)
-                found[each.key] = made
-                tell(done())
+                if row["end"] != DIED:  # the next sweep repeats those
+                    stored.keep(job.key, row)
+                rows[job.key] = row
+                tell(len(done()))
         except Interrupted:
             pass
-        known = [
-            {**j.point, **(found[j.key] if j.scene else failed(REFUSED, j.refusal))}
-            for j in jobs
-            if not j.scene or j.key in found
+        finished = [
+            {**j.point, **(rows[j.key] if j.scene else failed(REFUSED, j.refusal))} for j in done()
         ]
-        table.write(folder / "table.csv", known)
+        table.write(folder / "table.csv", finished)
     except OSError as error:
         raise Fault(f"{folder}: {error}") from error
-    if len(known) < len(jobs):
-        raise Unfinished(len(known), len(jobs), folder)
-    return known
+    if len(finished) < len(jobs):
+        raise Unfinished(len(finished), len(jobs), folder)
+    return finished
 
 
 def _finished(
     jobs: Sequence[Job], folder: Path, processes: int, scheduler: str | None, measure: Measure
 ) -> Iterator[pool.Done]:
+    """Each job with its row, as they finish."""
     if scheduler:
         yield from cluster.on_cluster(partial(work, measure=measure), jobs, scheduler)
         return
-    room = folder / ".running"
-    shutil.rmtree(room, ignore_errors=True)  # left by a sweep that was killed
-    room.mkdir(parents=True)
+    running = folder / ".running"
+    shutil.rmtree(running, ignore_errors=True)  # left by a sweep that was killed
+    running.mkdir(parents=True)
     try:
-        yield from pool.in_processes(partial(work, room=room, measure=measure), jobs, processes)
+        of_job = partial(work, folder=running, measure=measure)
+        yield from pool.in_processes(of_job, jobs, processes)
     finally:
-        shutil.rmtree(room, ignore_errors=True)
+        shutil.rmtree(running, ignore_errors=True)

@@ -12,6 +12,7 @@ from contextlib import suppress
 from hapticlink.analysis.sweep.job import Job
 from hapticlink.analysis.sweep.pool import Done, Work
 from hapticlink.analysis.sweep.row import DIED, failed
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault
 
@@ -22,9 +23,7 @@ def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
     try:
         from dask.distributed import Client, wait
     except ImportError:
-        raise InputFault(
-            "--scheduler needs Dask; pip install '.[distributed]' in the checkout"
-        ) from None
+        raise InputFault(f"--scheduler needs Dask: {install_command('distributed')}") from None
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as error:

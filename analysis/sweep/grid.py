@@ -24,11 +24,11 @@ Point = dict[str, str]
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?:\.\.({_NUMBER})|:(\d+))?")
-MOST = 100_000
-"""Largest number of values of one axis, and of runs; more are taken for a mistake."""
-LONGEST = 15
+MAX_RUNS = 100_000
+"""Of a sweep, and values of one of its axes; more are taken for a mistake."""
+MAX_DIGITS = 15
 """Digits of the ends of a range on either side of the point: their differences are exact."""
-LARGEST = 2**24
+MAX_LIST_BYTES = 2**24
 """Bytes of a list of runs."""
 
 
@@ -50,10 +50,10 @@ def parse(text: str) -> Axis:
     key = key.strip()
     if not equals or not key:
         raise InputFault(f"--vary {text}: write key=values, e.g. --vary graphics.rate=10..60..10")
-    found = [value for item in _items(values) for value in _values(item, shortened(text))]
-    if not found:
+    listed = [value for item in _items(values) for value in _values(item, shortened(text))]
+    if not listed:
         raise InputFault(f"--vary {text}: no value; give some, e.g. {key}=1,2,3")
-    return Axis(key, tuple(dict.fromkeys(found)))
+    return Axis(key, tuple(dict.fromkeys(listed)))
 
 
 def grid(axes: Sequence[Axis]) -> list[Point]:
@@ -63,21 +63,21 @@ def grid(axes: Sequence[Axis]) -> list[Point]:
     twice = next((k for k in keys if keys.count(k) > 1), None)
     if twice:
         raise InputFault(f"--vary {twice}: given twice; write all its values with commas")
-    if (count := math.prod(len(a.values) for a in axes)) > MOST:
-        raise InputFault(f"--vary: {count} runs; at most {MOST} are made: take fewer values")
+    if (count := math.prod(len(a.values) for a in axes)) > MAX_RUNS:
+        raise InputFault(f"--vary: {count} runs; at most {MAX_RUNS} are made: take fewer values")
     return [dict(zip(keys, values, strict=True)) for values in product(*(a.values for a in axes))]
 
 
 def listed(path: Path) -> list[Point]:
     """The runs of a file: a CSV with one column per key (an empty cell keeps the scene's value), or
     a TOML file of [[run]] tables. Raises InputFault if it cannot be read or has no run."""
-    text = text_files.read(path, "a list of runs", LARGEST, "utf-8-sig")
+    text = text_files.read(path, "a list of runs", MAX_LIST_BYTES, "utf-8-sig")
     try:
         points = list(_toml(path, text) if path.suffix == ".toml" else _csv(path, text))
     except csv.Error as error:
         raise InputFault(f"--runs {path}: not CSV: {error}") from error
-    if len(points) > MOST:
-        raise InputFault(f"--runs {path}: {len(points)} runs; at most {MOST} are made")
+    if len(points) > MAX_RUNS:
+        raise InputFault(f"--runs {path}: {len(points)} runs; at most {MAX_RUNS} are made")
     if not points:
         form = "[[run]] table" if path.suffix == ".toml" else "row under its header"
         raise InputFault(f"--runs {path}: no runs; give one {form} a run")
@@ -108,14 +108,16 @@ def _values(item: str, option: str) -> Iterable[str]:
         return [item] if item else []
     first, last = Decimal(match[1]), Decimal(match[2])
     numbers = [first, last, Decimal(match[3] or 1)]
-    if any(not n.is_zero() and not -LONGEST < n.adjusted() < LONGEST for n in numbers):
-        raise InputFault(f"--vary {option}: {item} has numbers beyond 1e{LONGEST}; list the values")
+    if any(not n.is_zero() and not -MAX_DIGITS < n.adjusted() < MAX_DIGITS for n in numbers):
+        raise InputFault(
+            f"--vary {option}: {item} has numbers beyond 1e{MAX_DIGITS}; list the values"
+        )
     if last < first:
         raise InputFault(f"--vary {option}: {item} ends below its start; write {last}..{first}")
     if match[4]:
         count = int(match[4][:9])
-        if not 2 <= count <= MOST:
-            raise InputFault(f"--vary {option}: {item} has {match[4]} points; give 2 to {MOST}")
+        if not 2 <= count <= MAX_RUNS:
+            raise InputFault(f"--vary {option}: {item} has {match[4]} points; give 2 to {MAX_RUNS}")
         return [f"{first + (last - first) * i / (count - 1):.6g}" for i in range(count)]
     step = Decimal(match[3]) if match[3] else Decimal(1)
     if not match[3] and (first % 1 or last % 1):
@@ -123,7 +125,7 @@ def _values(item: str, option: str) -> Iterable[str]:
             f"--vary {option}: {item} is every whole number, but an end is none; write "
             f"{item}..STEP or {item}:POINTS"
         )
-    if step <= 0 or (last - first) / step >= MOST:
+    if step <= 0 or (last - first) / step >= MAX_RUNS:
         raise InputFault(f"--vary {option}: {item} goes in steps of {step}; take a larger one")
     return [_plain(first + i * step) for i in range(int((last - first) / step) + 1)]
 

@@ -45,20 +45,20 @@ def jobs(
     A point without a valid scene is a refused job. Raises InputFault if all points are refused,
     Interrupted for a signal.
     """
-    made = []
+    checked = []
     for point in points:
         interrupt.check()  # 100,000 points take minutes
-        made.append(job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point))
-    if made and all(each.scene is None for each in made):
-        raise InputFault(made[0].refusal)
-    return made
+        checked.append(job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point))
+    if checked and all(one.scene is None for one in checked):
+        raise InputFault(checked[0].refusal)
+    return checked
 
 
 def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, str]) -> Job:
     """The job of `scene` with `options`, listed in the table as `point`."""
     try:
-        found = open_scene.load(scene, options)
-        return Job(point, found, key(found), plugins=tuple(plugins.loaded()))
+        loaded = open_scene.load(scene, options)
+        return Job(point, loaded, key(loaded), plugins=tuple(plugins.loaded()))
     except Fault as fault:
         return Job(point, None, refusal=str(fault))
 
@@ -66,8 +66,8 @@ def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, s
 def key(scene: Scene) -> str:
     """SHA-256 of everything that a run depends on: the resolved scene, its FMU files, versions and
     sources, also those of plugins. Raises InputFault for an FMU file that cannot be read."""
-    made_with = [*_made_with(), plugins.loaded()]
-    whole: dict[str, Any] = {"scene": scene.tables(), "made_with": made_with}
+    computed_with = [*_computed_with(), plugins.loaded()]
+    whole: dict[str, Any] = {"scene": scene.tables(), "made_with": computed_with}
     try:
         paths = [Path(f.path) for f in scene.fmu if f.path]
         files = [sha256(path.read_bytes()).hexdigest() for path in paths]
@@ -77,7 +77,7 @@ def key(scene: Scene) -> str:
 
 
 @cache
-def _made_with() -> list[str]:
+def _computed_with() -> list[str]:
     """What computes a row: Python, packages and sources, in C too, but nothing that only draws."""
     code = sources(
         hapticlink.components, hapticlink.fmus, hapticlink.orchestrator, hapticlink.analysis

@@ -21,8 +21,8 @@ def points(vary: Vary, runs: Runs) -> list[Point]:
     of them is given, and for values that cannot be read."""
     if bool(vary) == bool(runs):
         raise InputFault("sweep: give either --vary key=values (repeatable) or --runs FILE")
-    if found := axes(vary):
-        return grid(found)
+    if vary:
+        return grid(axes(vary))
     if isinstance(runs, str | Path):
         return listed(Path(runs))
     return [{key: text(value, key) for key, value in run.items()} for run in runs]
@@ -34,16 +34,16 @@ def axes(vary: Vary) -> list[Axis]:
         raise InputFault(f"vary {vary!r}: give a mapping, or a list of key=values")
     if isinstance(vary, Mapping):
         return [_axis(key, values) for key, values in vary.items()]
-    return [parse(each) for each in vary]
+    return [parse(text) for text in vary]
 
 
 def _axis(key: str, values: Iterable[Any]) -> Axis:
     if isinstance(values, str):
         return parse(f"{key}={values}")
     try:
-        found = tuple(dict.fromkeys(text(value, key) for value in values))
+        texts = tuple(dict.fromkeys(text(value, key) for value in values))
     except TypeError:
         raise InputFault(f"{key}: {values!r} is one value; give a list of them") from None
-    if not found:
+    if not texts:
         raise InputFault(f"{key}: no value; give some, e.g. [1, 2, 3]")
-    return Axis(key, found)
+    return Axis(key, texts)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 from hapticlink.analysis.sweep.row import Row
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.files import write_json
 
-LAST = "run_time_s"
+NOT_REPRODUCIBLE = "run_time_s"
 
 
 class Rows:
@@ -25,10 +26,10 @@ class Rows:
     def find(self, key: str) -> Row | None:
         """The row of an earlier sweep; None if there is none or it cannot be read."""
         try:
-            found = json.loads((self._folder / f"{key}.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            row = json_file.read(self._folder / f"{key}.json", "a row")
+        except InputFault:
             return None
-        return found if isinstance(found, dict) else None
+        return row if isinstance(row, dict) else None
 
     def keep(self, key: str, row: Row) -> None:
         write_json(self._folder / f"{key}.json", row)
@@ -37,8 +38,8 @@ class Rows:
 def columns(rows: Sequence[Row]) -> list[str]:
     """The columns of all rows, in the order of their first occurrence; the run time, which is not
     reproducible, comes last."""
-    found = dict.fromkeys(name for row in rows for name in row)
-    return [n for n in found if n != LAST] + [n for n in found if n == LAST]
+    names = dict.fromkeys(name for row in rows for name in row)
+    return sorted(names, key=lambda name: name == NOT_REPRODUCIBLE)
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:

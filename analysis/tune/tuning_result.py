@@ -23,25 +23,32 @@ EQUAL = 0.03
 
 @dataclass
 class Tuned:
-    """run: of the scene with its own gains, without its tables. asked: the margin. poses: where
-    gains were judged; felt_at: the one where stiffness is felt, along unit wrenches: "constraint",
-    "contact". With the gains of the "scene" and the "tuned" ones, margins: g, also at neighbouring
-    rates, once judged; felt: stiffness (N/m) along each wrench; motion: along the run, the largest
-    "distance" of handle and operational point (m), and "energy_peak", the largest energy generated
-    at the user's port (J). gains: the tuned ones, as options of the scene. compliance: (3, 3) of
-    the handle with them. limited_by: why larger gains do not hold."""
+    """The result of a tuning. Margins, felt stiffnesses and motion are those of the "scene" and of
+    the "tuned" gains."""
 
     run: Results
+    """The run of the scene with its own gains, without its tables."""
     asked: float
+    """The margin that was asked for."""
     poses: Sequence[Pose]
+    """Where gains were judged."""
     felt_at: str
+    """The name of the pose in which stiffness is felt."""
     along: Mapping[str, Vector]
+    """The unit wrenches along which it is felt: "constraint", "contact"."""
     margins: dict[str, float]
+    """Also at neighbouring rates, once judged."""
     felt: dict[str, dict[str, float]]
+    """Stiffness (N/m) along each wrench."""
     motion: dict[str, dict[str, float]]
+    """Along the run: the largest "distance" of handle and operational point (m), and "energy_peak",
+    the largest energy generated at the user's port (J)."""
     gains: dict[str, float | list[float]] = field(default_factory=dict)
+    """The tuned ones, as options of the scene."""
     compliance: Complex | None = None
+    """Of the handle (3, 3) with the tuned gains."""
     limited_by: str | None = None
+    """Why larger gains do not hold."""
 
     @property
     def title(self) -> str:

@@ -95,6 +95,17 @@ def _gains(spec: Controller, law: Topology | None, length_scale: float) -> list[
     return gains
 
 
+def _outputs(spec: Controller, law: Topology | None) -> list[Variable]:
+    outputs = [Variable("F_motor", (3,), WRENCH, description="u, desired wrench of the motors")]
+    if spec.teleoperation:
+        text = "virtual coupling, + on the device, - on the mechanism"
+        outputs += [Variable("F_drift", (3,), WRENCH, description=text)]
+    if law:
+        text = "F_T, wrench of the topology controller"
+        outputs += [Variable("F_constraint", (3,), WRENCH, description=text)]
+    return outputs
+
+
 def controller(spec: Controller, length_scale: float) -> Component:
     """The parts of `spec` that are on; the others have no term, no input and no parameter.
 
@@ -111,31 +122,37 @@ def controller(spec: Controller, length_scale: float) -> Component:
             "is false: turn impedance on, or take bias = 'none'"
         )
     law = Topology() if spec.topology is True else (spec.topology or None)
-    outputs = [Variable("F_motor", (3,), WRENCH, description="u, desired wrench of the motors")]
-    if spec.teleoperation:
-        outputs += [
-            Variable(
-                "F_drift",
-                (3,),
-                WRENCH,
-                description="virtual coupling, + on the device, - on the mechanism",
-            )
-        ]
-    if law:
-        outputs += [
-            Variable(
-                "F_constraint", (3,), WRENCH, description="F_T, wrench of the topology controller"
-            )
-        ]
     guard = Passivity() if spec.passivity is True else (spec.passivity or None)
-    parameters, states = _gains(spec, law, length_scale), []
+    outputs, parameters = _outputs(spec, law), _gains(spec, law, length_scale)
+    states: list[Variable] = []
     if guard:
         parameters += [*passivity.parameters(guard), passivity.PERIOD]
         states = passivity.states(guard, POSE, WRENCH)
         outputs += passivity.OUTPUTS
     block = Block(inputs=_signals(spec, law), parameters=parameters, states=states, outputs=outputs)
-    u, p = block.u, block.p
+    output = _wrenches(spec, law, block)
+    initial: dict[str, ca.SX] = {}
+    step: dict[str, ca.SX] = {}
+    if guard:
+        u, F = block.u, output["F_motor"]
+        guarded = passivity.passive(F, u["x_D"], u["M"], block.x, block.p)
+        initial, step = guarded.initial, guarded.step
+        output |= guarded.output | {"F_motor": guarded.wrench}
+    return block.component(
+        "controller",
+        "Impedance, four-channel teleoperation and topology controller",
+        "sampled",
+        initial=initial,
+        step=step,
+        output=output,
+        documentation=controller.__doc__ or "",
+        springs=[_DRIFT] if spec.teleoperation else [],
+    )
 
+
+def _wrenches(spec: Controller, law: Topology | None, block: Block) -> dict[str, ca.SX]:
+    """u of the motors, before the passivity controller, with F_drift and F_T where they are."""
+    u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
     force = ca.SX.zeros(3)
     if spec.teleoperation:
@@ -160,21 +177,4 @@ def controller(spec: Controller, length_scale: float) -> Component:
             pull, u["M"], u["P_c"], p["length_scale"]
         )
         motor += output["F_constraint"]
-    initial: dict[str, ca.SX] = {}
-    step: dict[str, ca.SX] = {}
-    if guard:
-        guarded = passivity.passive(motor, u["x_D"], u["M"], block.x, p)
-        motor, initial, step = guarded.wrench, guarded.initial, guarded.step
-        output |= guarded.output
-    output["F_motor"] = motor
-
-    return block.component(
-        "controller",
-        "Impedance, four-channel teleoperation and topology controller",
-        "sampled",
-        initial=initial,
-        step=step,
-        output=output,
-        documentation=controller.__doc__ or "",
-        springs=[_DRIFT] if spec.teleoperation else [],
-    )
+    return output | {"F_motor": motor}

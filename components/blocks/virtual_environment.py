@@ -55,7 +55,6 @@ def virtual_environment(
     """
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
-    units = coordinate_units(linkage)
     counts = further_points.counts(users) if directions else []
     block = Block(
         inputs=follow_mechanism.inputs(linkage, copy),
@@ -67,16 +66,9 @@ def virtual_environment(
             *(contact_forces.detection_parameters(linkage, contacts) if contacts else []),
         ],
         states=[*states(linkage), *(Variable(name) for name in counts)],
-        outputs=[
-            *_outputs(linkage, units),
-            *([mobility_output()] if mobility else []),
-            *(direction_outputs() if directions else []),
-            *(further_points.mobility_output(name) for name in users if mobility),
-            *(further_points.direction_outputs(users) if directions else []),
-            *_branch_outputs(linkage),
-            *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
-            *(held_matrices.ports(linkage) if local_model else []),
-        ],
+        outputs=_outputs(
+            linkage, directions, contacts, users, mobility=mobility, local_model=local_model
+        ),
     )
     model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
     q1, qd1 = follow_mechanism.step(block, model, copy)
@@ -88,9 +80,9 @@ def virtual_environment(
         output["Lambda_inv"] = space.Lambda_inv
         output |= further_points.mobilities(space, users)
     if directions:
-        for name, found in further_points.directions(block, space, users, q0, q1).items():
-            initial[name], step[name] = found.first, found.after
-            output |= found.output
+        for name, directed in further_points.directions(block, space, users, q0, q1).items():
+            initial[name], step[name] = directed.first, directed.after
+            output |= directed.output
     if linkage.closed:
         output |= _branch(block, model)
     if contacts:
@@ -118,11 +110,27 @@ def _direction_parameters(linkage: Linkage, directions: Directions) -> list[Vari
     return [length, *direction_parameters(directions)]
 
 
-def _outputs(linkage: Linkage, units: tuple[str, ...]) -> list[Variable]:
+def _outputs(
+    linkage: Linkage,
+    directions: Directions | None,
+    contacts: Contacts | None,
+    users: further_points.Users,
+    *,
+    mobility: bool,
+    local_model: bool,
+) -> list[Variable]:
+    units = coordinate_units(linkage)
     return [
         Variable("x", (3,), POSE, description="pose of the copy's operational point"),
         Variable("v", (3,), TWIST, description="its velocity", derivative_of="x"),
         Variable("q", (len(units),), units, description="the copy's coordinates"),
+        *([mobility_output()] if mobility else []),
+        *(direction_outputs() if directions else []),
+        *(further_points.mobility_output(name) for name in users if mobility),
+        *(further_points.direction_outputs(users) if directions else []),
+        *_branch_outputs(linkage),
+        *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
+        *(held_matrices.ports(linkage) if local_model else []),
     ]
 
 

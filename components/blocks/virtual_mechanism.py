@@ -247,7 +247,7 @@ class _Equations:
         """All states at t = 0."""
         initial = dict(zip(("q", "qd"), self._start, strict=True)) | self._initial_deflections()
         initial |= dict.fromkeys(self._parts.method.counters, ca.SX(0))
-        return initial | {name: found.first for name, found in self._directions.items()}
+        return initial | {name: directed.first for name, directed in self._directions.items()}
 
     def _initial_deflections(self) -> dict[str, ca.SX]:
         """The deflections of friction at the start pose and rates: contacts have none."""
@@ -273,7 +273,7 @@ class _Equations:
             carried(self.model, moved[:n], moved[n : 2 * n], self._block.h),
             moved[n:],
             ca.vertcat(ca.SX(0, 1), *counted) + growth,
-            *(found.after for found in self._directions.values()),
+            *(directed.after for directed in self._directions.values()),
         )
 
     def output(self) -> dict[str, ca.SX]:
@@ -309,8 +309,8 @@ class _Equations:
         output |= {name: block.x[name] for name in parts.method.counters}
         if parts.directions:
             output["Lambda_inv"] = space.Lambda_inv
-        for found in self._directions.values():
-            output |= found.output
+        for directed in self._directions.values():
+            output |= directed.output
         if not self.signals:
             return output
         now = ca.densify(time_signals.at(self.signals, block.t))

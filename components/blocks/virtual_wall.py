@@ -23,6 +23,9 @@ from hapticlink.components.control import passivity as observer
 from hapticlink.components.quantisation import quantised
 from hapticlink.components.specs.control import Passivity
 
+PERIOD = 1e-3
+"""Where `step_size` (s) starts, which a run sets."""
+
 
 def virtual_wall(
     stiffness: float,
@@ -34,7 +37,6 @@ def virtual_wall(
     measured_velocity: bool,
     pulse: tuple[float, float] | None = None,
     passivity: float | None = None,
-    step_s: float = 1e-3,
 ) -> Component:
     """The FMU `virtual_wall`, sampled: F of t_k from the inputs at t_k.
 
@@ -42,8 +44,8 @@ def virtual_wall(
     the encoder (m), whose reading is rounded down to a whole number of them; None reads x exactly,
     and so does the parameter 0. pulse: M (kg) and D (s), None without; D is rounded to whole
     periods, at least one. The backward difference starts with v = 0; its T is the parameter
-    `step_size`, which starts at step_s (s). passivity: m (kg) of the device, with which a passivity
-    controller of default settings (control/passivity.py) bounds its damping; None without.
+    `step_size`. passivity: m (kg) of the device, with which a passivity controller of default
+    settings (control/passivity.py) bounds its damping; None without.
     """
     moved = damping is not None or pulse is not None
     differenced = moved and not measured_velocity
@@ -64,7 +66,7 @@ def virtual_wall(
             Variable("pulse_duration", (), "s", pulse[1], "duration of the impulse"),
         ]
     if differenced or pulse is not None or passivity is not None:
-        parameters += [Variable(STEP_SIZE, (), "s", step_s, "period T", "fixed")]
+        parameters += [Variable(STEP_SIZE, (), "s", PERIOD, "period T", "fixed")]
     states = [Variable("x_last", (), "m")] if differenced else []
     if pulse is not None:
         states += [Variable("inside"), Variable("pulse_force", (), "N"), Variable("samples_left")]
@@ -77,35 +79,32 @@ def virtual_wall(
         states += observer.states(Passivity(), ("m",), ("N",))
         outputs += observer.OUTPUTS
     block = Block(inputs=inputs, parameters=parameters, states=states, outputs=outputs)
+    return _component(block, unilateral)
+
+
+def _component(block: Block, unilateral: bool) -> Component:
+    """The block with the parts whose variables it has."""
     u, p = block.u, block.p
-    x = quantised(u["x"], p["quantum"]) if quantum is not None else u["x"]
-    F = -p["stiffness"] * (x - p["position"])
-    if differenced:
+    x = quantised(u["x"], p["quantum"]) if "quantum" in p else u["x"]
+    v = ca.SX(0)
+    if "x_last" in block.x:
         v = (x - block.x["x_last"]) / p[STEP_SIZE]
-    elif moved:
+    elif "v" in u:
         v = u["v"]
-    if damping is not None:
+    F = -p["stiffness"] * (x - p["position"])
+    if "damping" in p:
         F -= p["damping"] * v
     if unilateral:
         F = ca.if_else(x > p["position"], ca.fmin(F, 0.0), 0.0)
-    initial: dict[str, ca.SX] = {"x_last": x} if differenced else {}
-    after = dict(initial)
-    if pulse is not None:
+    initial: dict[str, ca.SX] = {"x_last": x} if "x_last" in block.x else {}
+    after, output = dict(initial), dict[str, ca.SX]()
+    if "pulse" in p:
         inside = x > p["position"]
-        samples = ca.fmax(ca.floor(p["pulse_duration"] / p[STEP_SIZE] + 0.5), 1.0)
-        begun = ca.logic_and(inside, ca.logic_not(block.x["inside"]))
-        strength = -p["pulse"] * ca.fmax(v, 0.0) / (samples * p[STEP_SIZE])
-        force = ca.if_else(begun, strength, block.x["pulse_force"])
-        left = ca.if_else(begun, samples, block.x["samples_left"])
-        F += ca.if_else(left > 0.0, force, 0.0)
+        pulse, states = _pulse(block, inside, v)
+        F += pulse
         initial |= {"inside": inside, "pulse_force": ca.SX(0), "samples_left": ca.SX(0)}
-        after |= {
-            "inside": inside,
-            "pulse_force": force,
-            "samples_left": ca.fmax(left - 1.0, 0.0),
-        }
-    output: dict[str, ca.SX] = {}
-    if passivity is not None:
+        after |= states
+    if "mass" in p:
         guarded = observer.passive(F, x, p["mass"], block.x, p)
         F, output = guarded.wrench, guarded.output
         initial, after = initial | guarded.initial, after | guarded.step
@@ -118,3 +117,19 @@ def virtual_wall(
         output={"F": F, **output},
         documentation=__doc__ or "",
     )
+
+
+def _pulse(block: Block, inside: ca.SX, v: ca.SX) -> tuple[ca.SX, dict[str, ca.SX]]:
+    """The force of the pulse (N), and its states at the next sample."""
+    p, x = block.p, block.x
+    samples = ca.fmax(ca.floor(p["pulse_duration"] / p[STEP_SIZE] + 0.5), 1.0)
+    begun = ca.logic_and(inside, ca.logic_not(x["inside"]))
+    strength = -p["pulse"] * ca.fmax(v, 0.0) / (samples * p[STEP_SIZE])
+    force = ca.if_else(begun, strength, x["pulse_force"])
+    left = ca.if_else(begun, samples, x["samples_left"])
+    states = {
+        "inside": inside,
+        "pulse_force": force,
+        "samples_left": ca.fmax(left - 1.0, 0.0),
+    }
+    return ca.if_else(left > 0.0, force, 0.0), states

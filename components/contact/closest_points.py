@@ -14,48 +14,48 @@ TINY = 1e-300
 def edges(corners: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
     """Start, end and outward normal (to the right) of each edge."""
     number = corners.shape[0]
-    found = []
+    sides = []
     for k in range(number):
         a, b = corners[k, :].T, corners[(k + 1) % number, :].T
         span = b - a
-        found.append((a, b, ca.vertcat(span[1], -span[0]) / ca.norm_2(span)))
-    return found
+        sides.append((a, b, ca.vertcat(span[1], -span[0]) / ca.norm_2(span)))
+    return sides
 
 
 def select(condition: ca.SX, one: list[ca.SX], other: list[ca.SX]) -> list[ca.SX]:
     return [ca.if_else(condition, a, b) for a, b in zip(one, other, strict=True)]
 
 
-def nearest_on_point(point: ca.SX, at: ca.SX) -> list[ca.SX]:
+def nearest_on_point(point: ca.SX, position: ca.SX) -> list[ca.SX]:
     """A point, and the direction from it to a given one; any if they coincide."""
-    away = at - point
+    away = position - point
     distance = ca.norm_2(away)
     return [point, ca.if_else(distance > 0, away / (distance + TINY), ca.SX([0.0, 1.0]))]
 
 
-def nearest_on_segment(ends: ca.SX, at: ca.SX, back: ca.SX | int = 0) -> list[ca.SX]:
+def nearest_on_segment(ends: ca.SX, position: ca.SX, back: ca.SX | int = 0) -> list[ca.SX]:
     """The segment's point nearest to a given one, and the normal there: of the segment on that
     side, or to the right (back = 1) or left (-1) of it; or from an end to the given point."""
     a, b = ends[0, :].T, ends[1, :].T
     span = b - a
     right = ca.vertcat(span[1], -span[0]) / ca.norm_2(span)
-    s = ca.dot(at - a, span) / ca.dot(span, span)
+    s = ca.dot(position - a, span) / ca.dot(span, span)
     point = a + ca.fmin(ca.fmax(s, 0), 1) * span
-    away = at - point
+    away = position - point
     side = ca.if_else(ca.dot(away, right) >= 0, 1, -1)
     side = ca.if_else(back == 0, side, back)
     beside = ca.logic_and(s >= 0, s <= 1)
     return [point, ca.if_else(beside, side * right, away / (ca.norm_2(away) + TINY))]
 
 
-def nearest_on_boundary(walls: list[tuple[ca.SX, ca.SX, ca.SX]], at: ca.SX) -> list[ca.SX]:
+def nearest_on_boundary(walls: list[tuple[ca.SX, ca.SX, ca.SX]], position: ca.SX) -> list[ca.SX]:
     """The boundary's point nearest to a given one, and its normal: that of the edge, or from a
     corner to the given point."""
     best: list[ca.SX] = []
     for a, b, outward in walls:
-        s = ca.dot(at - a, b - a) / ca.dot(b - a, b - a)
+        s = ca.dot(position - a, b - a) / ca.dot(b - a, b - a)
         point = a + ca.fmin(ca.fmax(s, 0), 1) * (b - a)
-        away = at - point
+        away = position - point
         distance = ca.norm_2(away)
         on_edge = ca.logic_and(s >= 0, s <= 1)
         normal = ca.if_else(on_edge, outward, away / (distance + TINY))
@@ -86,6 +86,6 @@ def _way_out(
     under = -ca.mmax(ca.vertcat(*heights))
     best = select(under > best[0], [under, right], best)
     for a, _, outward in edges(corners):
-        least = ca.fmin(*(ca.dot(at - a, outward) for at in ends))
+        least = ca.fmin(*(ca.dot(end - a, outward) for end in ends))
         best = select(least > best[0], [least, outward], best)
     return best[0], best[1]

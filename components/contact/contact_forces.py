@@ -81,8 +81,8 @@ def detection_parameters(
 ) -> list[Variable]:
     """Radii of the links, and the obstacles in the block that detects contacts."""
     radii = {b.name: b.radius or 0.0 for b in linkage.body}
-    found = shape_parameters(near(linkage, contacts), radii)
-    return found + (obstacle_parameters(contacts) if obstacles else [])
+    variables = shape_parameters(near(linkage, contacts), radii)
+    return variables + (obstacle_parameters(contacts) if obstacles else [])
 
 
 def gap_output() -> Variable:
@@ -92,8 +92,8 @@ def gap_output() -> Variable:
 
 def gap(model: LinkageModel, touch: Touch) -> ca.SX:
     """Gap g (m)."""
-    at = model.frames[touch.body].point(touch.point)
-    return ca.dot(touch.normal, at - touch.plane) - model.p[f"{touch.body}.radius"]
+    point = model.frames[touch.body].point(touch.point)
+    return ca.dot(touch.normal, point - touch.plane) - model.p[f"{touch.body}.radius"]
 
 
 def detected(model: LinkageModel, contacts: Contacts) -> ca.SX:
@@ -109,14 +109,14 @@ def detected(model: LinkageModel, contacts: Contacts) -> ca.SX:
 
 def held(model: LinkageModel, contacts: Contacts, rows: ca.SX) -> list[Touch]:
     """The places given by the rows of the `contacts` port, whose planes move with their bodies."""
-    found = []
+    touching = []
     pairs = [pair for pair in near(model.linkage, contacts) for _ in range(pair.places)]
     for pair, row in zip(pairs, ca.vertsplit(rows), strict=True):
         name = pair.obstacle if pair.kind == "body" else "ground"
         other = model.frames[name]
         plane, normal = other.point(row[3:5].T), other.rotation @ row[5:7].T
-        found.append(Touch(pair.body, name, row[0] > 0.5, row[1:3].T, plane, normal))
-    return found
+        touching.append(Touch(pair.body, name, row[0] > 0.5, row[1:3].T, plane, normal))
+    return touching
 
 
 class ContactForces(OneSidedForces):
@@ -129,14 +129,14 @@ class ContactForces(OneSidedForces):
         model: LinkageModel,
         contacts: Contacts,
         p: Signals,
-        found: list[Touch],
+        touching: list[Touch],
         deflection: ca.SX | None = None,
     ) -> None:
-        self._model, self._p, self._touches, self._z = model, p, found, deflection
+        self._model, self._p, self._touches, self._z = model, p, touching, deflection
         self._arms: list[dict[str, ca.SX]] = []
         slides: list[ca.SX] = []
         self.sides = []
-        for touch in found:
+        for touch in touching:
             frame, other = model.frames[touch.body], model.frames[touch.other]
             arm = frame.rotation @ touch.point - model.p[f"{touch.body}.radius"] * touch.normal
             arms = {touch.body: arm, touch.other: frame.origin + arm - other.origin}

@@ -3,9 +3,9 @@
 Beyond the middle of the thinner one of two shapes the nearest side is another one than that on
 which they met: the force changes its direction, and a corner that has sunk past the axis of a
 capsule can lose or gain its spring (detection.py), and with it energy. Two polygons that go right
-through each other, and shapes that cross with no corner in the other, have no deep corner that says
-so: `overlaps` tells by separating axes. The walls of the enclosure are half planes, in which any
-depth is meaningful.
+through each other, and shapes that cross with no corner in the other, have no deep corner that
+shows it: `overlaps` finds them by separating axes. The walls of the enclosure are half planes, in
+which any depth is meaningful.
 """
 
 from __future__ import annotations
@@ -69,12 +69,12 @@ def depths(
     model = LinkageModel(linkage, p, ca.SX.sym("q", rows.shape[1]), ca.SX(rows.shape[1], 1))
     gaps = ca.vertcat(*(gap(model, touch) for touch in touches(model, contacts, p)))
     values = [value for variable in variables for value in variable.starts]
-    at = ca.Function("gaps", [model.q, p.vector], [gaps])
-    found = np.array([np.array(at(row, values)).ravel() for row in rows])
+    gap_function = ca.Function("gaps", [model.q, p.vector], [gaps])
+    gap_rows = np.array([np.array(gap_function(row, values)).ravel() for row in rows])
     first = 0
     for pair in near(linkage, contacts):
         last = first + pair.places
-        yield pair, -found[:, first:last].min(axis=1)
+        yield pair, -gap_rows[:, first:last].min(axis=1)
         first = last
 
 
@@ -91,9 +91,11 @@ def overlaps(
 
     def placed(name: str) -> NDArray[np.float64]:
         """The corners of a body in the world, (k, corners, 2)."""
-        corners = [model.frames[name].point(ca.SX(ca.DM(at))) for at in bodies[name].shape]
-        at = ca.Function("corners", [model.q, p.vector], [ca.vertcat(*corners)])
-        return np.array(at(q.T, np.tile(values, (len(q), 1)).T)).T.reshape(len(q), -1, 2)
+        frame = model.frames[name]
+        corners = [frame.point(ca.SX(ca.DM(point))) for point in bodies[name].shape]
+        in_world = ca.Function("corners", [model.q, p.vector], [ca.vertcat(*corners)])
+        stacked = np.array(in_world(q.T, np.tile(values, (len(q), 1)).T))
+        return stacked.T.reshape(len(q), -1, 2)
 
     for pair in near(linkage, contacts):
         if pair.kind == "body":
@@ -115,5 +117,5 @@ def _apart(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.f
     outward = np.stack([span[..., 1], -span[..., 0]], axis=-1)
     outward /= np.linalg.norm(span, axis=-1, keepdims=True)
     heights = np.einsum("kei,kci->kec", outward, other) - np.sum(outward * one, -1)[..., None]
-    found: NDArray[np.float64] = heights.min(axis=2).max(axis=1)
-    return found
+    distance: NDArray[np.float64] = heights.min(axis=2).max(axis=1)
+    return distance

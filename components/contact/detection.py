@@ -77,17 +77,17 @@ def obstacle_parameters(contacts: Contacts) -> list[Variable]:
         text = f"corners of {name}, counterclockwise"
         return Variable(f"{name}.corners", (len(points), 2), "m", flat, text, "fixed")
 
-    found = []
+    rows = []
     if contacts.enclosure:
-        found.append(corners("enclosure", contacts.enclosure))
+        rows.append(corners("enclosure", contacts.enclosure))
     for i, disc in enumerate(contacts.disc):
         name = disc.name or f"disc{i + 1}"
         text = f"centre of {name}"
-        found.append(Variable(f"{name}.center", (2,), "m", disc.center, text, "fixed"))
-        found.append(Variable(f"{name}.radius", (), "m", disc.radius, f"radius of {name}", "fixed"))
+        rows.append(Variable(f"{name}.center", (2,), "m", disc.center, text, "fixed"))
+        rows.append(Variable(f"{name}.radius", (), "m", disc.radius, f"radius of {name}", "fixed"))
     for i, polygon in enumerate(contacts.polygon):
-        found.append(corners(polygon.name or f"polygon{i + 1}", polygon.corners))
-    return found
+        rows.append(corners(polygon.name or f"polygon{i + 1}", polygon.corners))
+    return rows
 
 
 def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) -> list[Variable]:
@@ -101,15 +101,15 @@ def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) ->
 
 def touches(model: LinkageModel, contacts: Contacts, p: Signals) -> list[Touch]:
     """Every place of every pair within reach, in the order of `broad_phase.near`."""
-    found: list[Touch] = []
+    touching: list[Touch] = []
     for pair in near(model.linkage, contacts):
         body = _body(model, pair.body)
         if pair.kind == "enclosure":
             at_end = _in_corner if contacts.friction is None else _at_walls
-            found += [t for end in _rows(body) for t in at_end(model, pair.body, end, p)]
+            touching += [t for end in _rows(body) for t in at_end(model, pair.body, end, p)]
         else:
-            found += _between(model, body, _obstacle(model, pair, p))
-    return found
+            touching += _between(model, body, _obstacle(model, pair, p))
+    return touching
 
 
 def _body(model: LinkageModel, name: str) -> Shape:
@@ -135,9 +135,10 @@ def _at_walls(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[To
 
 
 def _in_corner(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:
-    at = model.frames[body].point(end)
+    point = model.frames[body].point(end)
     walls = [
-        [ca.dot(at - a, -outward), a, -outward] for a, _, outward in edges(p["enclosure.corners"])
+        [ca.dot(point - a, -outward), a, -outward]
+        for a, _, outward in edges(p["enclosure.corners"])
     ]
     first, second = select(walls[0][0] < walls[1][0], walls[0] + walls[1], walls[1] + walls[0]), []
     first, second = first[:3], first[3:]
@@ -155,25 +156,25 @@ def _between(model: LinkageModel, a: Shape, b: Shape) -> Iterator[Touch]:
         for corner in _rows(a):
             plane, normal = _nearest(b, other.local(frame.point(corner)))
             outward = other.rotation @ normal
-            at = other.point(plane) + b.radius * outward
-            yield Touch(a.body, b.body, ca.SX(1), corner, at, outward)
+            position = other.point(plane) + b.radius * outward
+            yield Touch(a.body, b.body, ca.SX(1), corner, position, outward)
     if a.corners.shape[0] > 1 or b.corners.shape[0] == 1:
         world = [other.point(corner) for corner in _rows(b)]
-        seen = [frame.local(at) for at in world]
+        seen = [frame.local(position) for position in world]
         backs: list[ca.SX] = [ca.SX(0)] * len(seen)
         if a.corners.shape[0] == 2 and len(seen) > 2:
             backs = sunk_past(a.corners, ca.horzcat(*seen).T)
-        for at, local, back in zip(world, seen, backs, strict=True):
+        for position, local, back in zip(world, seen, backs, strict=True):
             point, normal = _nearest(a, local, back)
             inward = -(frame.rotation @ normal)
-            yield Touch(a.body, b.body, ca.SX(1), point, at + b.radius * inward, inward)
+            yield Touch(a.body, b.body, ca.SX(1), point, position + b.radius * inward, inward)
 
 
-def _nearest(shape: Shape, at: ca.SX, back: ca.SX | int = 0) -> list[ca.SX]:
+def _nearest(shape: Shape, position: ca.SX, back: ca.SX | int = 0) -> list[ca.SX]:
     """Point and outward normal of a core that is nearest to a point of its frame."""
     corners = shape.corners
     if corners.shape[0] == 1:
-        return nearest_on_point(corners.T, at)
+        return nearest_on_point(corners.T, position)
     if corners.shape[0] == 2:
-        return nearest_on_segment(corners, at, back)
-    return nearest_on_boundary(edges(corners), at)
+        return nearest_on_segment(corners, position, back)
+    return nearest_on_boundary(edges(corners), position)

@@ -44,7 +44,7 @@ def damping_ratio(restitution: float) -> float:
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
-    found = []
+    variables = []
     for joint in joints_with(linkage, "limits"):
         limits, effort = _limits(joint), joint.effort_unit
         stiffness, damping = f"{effort}/{joint.unit}", f"{effort}.s/{joint.unit}"
@@ -60,8 +60,8 @@ def parameters(linkage: Linkage) -> list[Variable]:
         for name, (unit, value, text) in given.items():
             if value is not None:
                 text = f"{text} of {joint.name}"
-                found.append(Variable(f"{joint.name}.{name}", (), unit, value, text))
-    return found
+                variables.append(Variable(f"{joint.name}.{name}", (), unit, value, text))
+    return variables
 
 
 class JointLimits(OneSidedForces):

@@ -64,12 +64,12 @@ class LocatedEvents(Integrator):
             apart = before.gap >= 0
             start, end = before.event(pushing, apart), after.event(pushing, apart)
             changes = after.pushing != pushing
-            found = ca.logic_and(changes, ca.logic_and(start.value >= 0, end.value < 0))
-            share = ca.if_else(found, _root(start, end, left), 1 - changes)
+            crossed = ca.logic_and(changes, ca.logic_and(start.value >= 0, end.value < 0))
+            share = ca.if_else(crossed, _root(start, end, left), 1 - changes)
             first = ca.mmin(share)
             x = stepped(x, pushing, t, first * left)
             rate, there = at(x, pushing, t + first * left)
-            now = ca.logic_and(found, share <= first + TOGETHER)
+            now = ca.logic_and(crossed, share <= first + TOGETHER)
             delay = _newton(there.event(pushing, apart), now, first, left)
             x += delay * rate
             t += first * left + delay

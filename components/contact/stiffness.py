@@ -59,11 +59,11 @@ def _mobilities(linkage: Linkage, along: bool) -> dict[str, float]:
         return ca.vertcat(*(ca.vertcat(f.point(ca.SX(ca.DM(at))), f.angle) for f, at in frames))
 
     closed, _ = start_mobility(linkage, places)
-    found = {"ground": 0.0}
+    mobilities = {"ground": 0.0}
     angles = np.arange(64) * math.pi / 32
     for i, (body, _) in enumerate(points):
         own = closed[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]
         u = np.stack([np.cos(angles), np.sin(angles), np.full(64, body.radius or 0.0)])
         most = np.max(np.sum(u * (own @ u), 0)) if along else np.linalg.eigvalsh(own[:2, :2])[-1]
-        found[body.name] = max(found.get(body.name, 0.0), float(most))
-    return found
+        mobilities[body.name] = max(mobilities.get(body.name, 0.0), float(most))
+    return mobilities

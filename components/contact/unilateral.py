@@ -88,8 +88,8 @@ class AllOneSidedForces(OneSidedForces):
         return sum((part.energy for part in self._parts), start=ca.SX(0))
 
     def efforts(self, laws: ca.SX | None = None) -> ca.SX:
-        found = [part.efforts(own) for part, own in self._shared(laws)]
-        return sum(found[1:], start=found[0])
+        efforts = [part.efforts(own) for part, own in self._shared(laws)]
+        return sum(efforts[1:], start=efforts[0])
 
     def state_rates(self, laws: ca.SX | None = None) -> ca.SX:
         return ca.vertcat(*(part.state_rates(own) for part, own in self._shared(laws)))

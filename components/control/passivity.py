@@ -32,28 +32,28 @@ PERIOD = Variable(STEP_SIZE, (), "s", 1e-3, "period T", "fixed")
 
 def parameters(spec: Passivity) -> list[Variable]:
     """The budget, the limit, the noise, and the time after which a free handle is a new start."""
-    found = [
+    variables = [
         Variable("passivity_energy", (), "J", spec.energy, "energy that the motors may give"),
         Variable("passivity_limit", (), "1", spec.limit, "largest beta, below 2"),
         Variable("passivity_noise", (), "J", spec.noise, "kinetic energy without a direction"),
     ]
     if spec.reset_after is not None:
         text = "time without a wrench after which what was absorbed is forgotten"
-        found.append(Variable("passivity_reset_after", (), "s", spec.reset_after, text))
-    return found
+        variables.append(Variable("passivity_reset_after", (), "s", spec.reset_after, text))
+    return variables
 
 
 def states(spec: Passivity, x: tuple[str, ...], F: tuple[str, ...]) -> list[Variable]:
     """The observer's memory; x and F: units of the entries of the pose and of the wrench."""
     shape = (len(x),)
-    found = [
+    variables = [
         Variable("E_before", (), "J", description="energy left at the last sample"),
         Variable("x_before", shape, x, description="pose at the last sample"),
         Variable("F_before", shape, F, description="wrench of the last sample"),
     ]
     if spec.reset_after is not None:
-        found.append(Variable("free_time", (), "s", description="time without a wrench"))
-    return found
+        variables.append(Variable("free_time", (), "s", description="time without a wrench"))
+    return variables
 
 
 OUTPUTS = (

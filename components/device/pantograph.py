@@ -115,21 +115,21 @@ def dynamics(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
 
     so that dM_d/dt - 2 C_d is skew.
     """
-    at = ca.SX.sym("pose", 3)
-    J, m = _all_jacobians(at, p)
-    J_dot = ca.reshape(ca.jtimes(ca.vec(ca.densify(J)), at, v), J.shape)
+    symbols = ca.SX.sym("pose", 3)
+    J, m = _all_jacobians(symbols, p)
+    J_dot = ca.reshape(ca.jtimes(ca.vec(ca.densify(J)), symbols, v), J.shape)
     weighted = J.T @ ca.diag(m)
-    M, C = ca.substitute([weighted @ J, weighted @ J_dot], [at], [pose])
+    M, C = ca.substitute([weighted @ J, weighted @ J_dot], [symbols], [pose])
     return M, C
 
 
 def motion(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
     """M_d and the vector C_d v = J' m (Jdot v) of `dynamics`, with fewer operations than the matrix
     C_d."""
-    at = ca.SX.sym("pose", 3)
-    J, m = _all_jacobians(at, p)
-    bias = ca.jtimes(J @ v, at, v)
-    M, c = ca.substitute([J.T @ ca.diag(m) @ J, J.T @ (m * bias)], [at], [pose])
+    symbols = ca.SX.sym("pose", 3)
+    J, m = _all_jacobians(symbols, p)
+    bias = ca.jtimes(J @ v, symbols, v)
+    M, c = ca.substitute([J.T @ ca.diag(m) @ J, J.T @ (m * bias)], [symbols], [pose])
     return M, c
 
 
@@ -150,9 +150,9 @@ def stop_wrench(pose: ca.SX, v: ca.SX, p: Parameters) -> ca.SX:
     """Wrench (N, N, N.m) of the stops: a unilateral spring and damper for each negative margin m,
     with the force max(0, -K m - B mdot) in the direction in which m grows.
     """
-    at = ca.SX.sym("pose", 3)
-    gap = margins(at, p)
-    gap, slope = ca.substitute([gap, ca.jacobian(gap, at)], [at], [pose])
+    symbols = ca.SX.sym("pose", 3)
+    gap = margins(symbols, p)
+    gap, slope = ca.substitute([gap, ca.jacobian(gap, symbols)], [symbols], [pose])
     push = -p["stop_stiffness"] * gap - p["stop_damping"] * (slope @ v)
     return slope.T @ ca.if_else(gap < 0, ca.fmax(0, push), 0)
 

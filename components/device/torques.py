@@ -30,5 +30,5 @@ def torque_function(device: Device) -> ca.Function:
 
 def motor_torques(device: Device, wrenches: Field, poses: Field) -> Field:
     """`torque_function` of wrenches and poses, both (k, 3): (k, 4)."""
-    found = torque_function(device).map(len(wrenches))
-    return np.asarray(found(wrenches.T, poses.T)).T
+    torques = torque_function(device).map(len(wrenches))
+    return np.asarray(torques(wrenches.T, poses.T)).T

@@ -25,23 +25,23 @@ def margin(device: Device, poses: Field) -> Field:
     shape (n, 3); negative outside the workspace."""
     pose = ca.SX.sym("pose", 3)
     least = ca.Function("margin", [pose], [ca.mmin(pantograph.margins(pose, numbers(device)))])
-    given, found = np.ascontiguousarray(poses, float), np.zeros(len(poses))
+    given, margins = np.ascontiguousarray(poses, float), np.zeros(len(poses))
     buffer: Any
     buffer, evaluate = least.map(len(poses)).buffer()  # a plain call takes ten times as long
     buffer.set_arg(0, given.data)
-    buffer.set_res(0, found.data)
+    buffer.set_res(0, margins.data)
     evaluate()
-    return found
+    return margins
 
 
 def link_function(device: Device) -> ca.Function:
     """The points of `links`, (2, 12), as a function of the pose, (3,)."""
-    p, at = numbers(device), ca.SX.sym("pose", 3)
+    p, pose = numbers(device), ca.SX.sym("pose", 3)
     rows = []
-    for arm in pantograph.arms(at, p):
+    for arm in pantograph.arms(pose, p):
         elbow = arm.base + p["proximal_length"] * arm.proximal_direction
-        rows += [arm.base, elbow, at[:2] + arm.offset]
-    return ca.Function("links", [at], [ca.horzcat(*rows)])
+        rows += [arm.base, elbow, pose[:2] + arm.offset]
+    return ca.Function("links", [pose], [ca.horzcat(*rows)])
 
 
 def links(device: Device, pose: Sequence[float]) -> Field:

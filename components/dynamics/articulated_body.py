@@ -58,28 +58,28 @@ def symmetric(A: ca.SX) -> ca.SX:
 def _coordinates(model: LinkageModel, extra: Mapping[str, tuple[ca.SX, ca.SX]]) -> list[Coordinate]:
     """The coordinates from the ground outward; a body's inertia belongs to the last coordinate of
     its joint."""
-    found: list[Coordinate] = []
+    coordinates: list[Coordinate] = []
     tip: dict[str, tuple[int | None, ca.SX]] = {"ground": (None, ca.SX(2, 1))}
     bodies = {b.name: b for b in model.linkage.body}
     for joint in model.outward:
         body = bodies[joint.child]
         m, inertia = model.p[f"{body.name}.mass"], model.p[f"{body.name}.inertia"]
-        at, twists = model.twists(joint)
+        pivot, twists = model.twists(joint)
         parent, before = tip[joint.parent]
-        X = ca.sparsify(to_point(model.centers[body.name] - at))
+        X = ca.sparsify(to_point(model.centers[body.name] - pivot))
         own = symmetric(X.T @ ca.diag(ca.vertcat(m, m, inertia)) @ X)
         if body.name in extra:
             point, K = extra[body.name]
-            X = ca.sparsify(to_point(point - at))
+            X = ca.sparsify(to_point(point - pivot))
             own = own + symmetric(X.T @ K @ X)
         for k, S in enumerate(twists):
             last = k == len(twists) - 1
-            shift = _shift(at - before) if k == 0 else ca.SX.eye(3)
+            shift = _shift(pivot - before) if k == 0 else ca.SX.eye(3)
             index = model.coordinate(joint.name) + k
-            found.append(Coordinate(index, parent, shift, S, own if last else ca.SX(3, 3)))
-            parent = len(found) - 1
-        tip[joint.child] = parent, at
-    return found
+            coordinates.append(Coordinate(index, parent, shift, S, own if last else ca.SX(3, 3)))
+            parent = len(coordinates) - 1
+        tip[joint.child] = parent, pivot
+    return coordinates
 
 
 class TreeInertia:

@@ -43,16 +43,16 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
         return q, qd
     n, count = q.numel(), rows(model.linkage)
     symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
-    at = LinkageModel(model.linkage, model.p, *symbols)
-    least = ClosedLoopSolver(UnitInertia(n), at.W, count, MU)
+    symbolic = LinkageModel(model.linkage, model.p, *symbols)
+    least = ClosedLoopSolver(UnitInertia(n), symbolic.W, count, MU)
     parameters = model.p.vector
     shared = {"cse": True}
     newton = ca.Function(
-        "newton", [symbols[0], parameters], [symbols[0] - least.constrain(at.h)], shared
+        "newton", [symbols[0], parameters], [symbols[0] - least.constrain(symbolic.h)], shared
     )
 
     def projected(solver: ClosedLoopSolver) -> ca.Function:
-        rates = symbols[1] - solver.constrain(at.W @ symbols[1])
+        rates = symbols[1] - solver.constrain(symbolic.W @ symbols[1])
         return ca.Function("project", [*symbols, parameters], [rates], shared)
 
     for _ in range(STEPS):
@@ -60,7 +60,7 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     solvers = [least]
     if model.linkage.start_velocity:
         Z = ca.diag(ca.SX(1.0 - _given(model.linkage)))
-        solvers = [ClosedLoopSolver(UnitInertia(n), ca.sparsify(at.W @ Z), count, MU), least]
+        solvers = [ClosedLoopSolver(UnitInertia(n), ca.sparsify(symbolic.W @ Z), count, MU), least]
     for project in map(projected, solvers):
         for _ in range(RATE_STEPS):
             qd = project(q, qd, parameters)
@@ -81,8 +81,8 @@ def require_assembled(component: Component, model: LinkageModel) -> None:
     start = component.initialize(component.start_inputs, component.start_parameters)
     q, qd = start[:n], np.array(start[n : 2 * n]).ravel()
     gaps = [ca.norm_2(closure.h) for closure in model.closures]
-    at = ca.Function("gaps", [model.q, model.p.vector], [ca.vertcat(ca.SX(0, 1), *gaps)])
-    left_open = np.array(at(q, component.start_parameters)).ravel().tolist()
+    gap_function = ca.Function("gaps", [model.q, model.p.vector], [ca.vertcat(ca.SX(0, 1), *gaps)])
+    left_open = np.array(gap_function(q, component.start_parameters)).ravel().tolist()
     for closure, left in zip(model.closures, left_open, strict=True):
         if not left < TOLERANCE:
             raise AssemblyError(
@@ -104,8 +104,8 @@ def _rates(linkage: Linkage, qd: NDArray[np.float64]) -> Iterator[str]:
     """`crank = 2` for each joint that `start_velocity` names."""
     place = 0
     for j in linkage.joint:
-        found = qd[place : place + COORDINATES[j.type]].tolist()
-        place += len(found)
+        rates = qd[place : place + COORDINATES[j.type]].tolist()
+        place += len(rates)
         if j.name in linkage.start_velocity:
-            value = f"{found[0]:.10g}" if len(found) == 1 else str(found)
+            value = f"{rates[0]:.10g}" if len(rates) == 1 else str(rates)
             yield f"{j.name} = {value}"

@@ -30,6 +30,6 @@ def equivalent_wrench(
     S = scaling(length_scale)
     values, vectors = eigen(S @ Lambda_inv @ S)
     least = locked(open_mobility, length_scale)
-    kept = values > ca.fmax(RANK * largest(values), least)
-    inverse = ca.if_else(kept, 1 / ca.if_else(kept, values, 1), 0)
+    mobile = values > ca.fmax(RANK * largest(values), least)
+    inverse = ca.if_else(mobile, 1 / ca.if_else(mobile, values, 1), 0)
     return S @ (vectors @ (inverse * (vectors.T @ (S @ acceleration))))

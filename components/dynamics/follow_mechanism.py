@@ -66,8 +66,8 @@ def step(block: Block, model: LinkageModel, copy: GraphicsCopy) -> tuple[ca.SX, 
 
 def _exact(block: Block, model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     n = model.q.numel()
-    at = LinkageModel(model.linkage, block.p, ca.SX.sym("q", n), ca.SX.sym("qd", n))
-    project = projection(at, TreeInertia(at))
+    reference = LinkageModel(model.linkage, block.p, ca.SX.sym("q", n), ca.SX.sym("qd", n))
+    project = projection(reference, TreeInertia(reference))
     closed, rate = project(block.u["q_ref"], block.u["qd_ref"], block.p.vector)
     return closed, rate
 

@@ -27,8 +27,8 @@ from hapticlink.components.forces.friction import rubbing
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate
 from hapticlink.components.specs.linkage import Linkage
 
-LEAST = 1e-9  # rad/s or m/s, of a default v_f
-OPENED = 0.25  # share of the mobility with open loops
+MIN_SPEED = 1e-9  # rad/s or m/s, of a default v_f
+OPEN_SHARE = 0.25  # share of the mobility with open loops
 STABLE = 2.0  # |pole| h up to which the explicit methods are stable
 
 
@@ -57,15 +57,15 @@ class Scale:
         """v_f and d that are not given, by their names as parameters; if f is 0, which may be
         tuned, those for f = 1."""
         d, v_f = self.joint.friction_deflection, self.joint.friction_speed
-        pull, found = (self.joint.friction or 1.0) * self.A, {}
+        pull, values = (self.joint.friction or 1.0) * self.A, {}
         if v_f is None:
-            v_f = ca.fmax(4 * self.N * pull * h, LEAST)
+            v_f = ca.fmax(4 * self.N * pull * h, MIN_SPEED)
             v_f = v_f if d is None else ca.fmax(ca.fmin(v_f, d / h), (pull * d) ** 0.5)
-            found[f"{self.name}.friction_speed"] = v_f
+            values[f"{self.name}.friction_speed"] = v_f
         if d is None:
             d = ca.fmax(LAG * h * v_f, v_f**2 / pull if pull else 0.0)
-            found[f"{self.name}.friction_deflection"] = d
-        return found
+            values[f"{self.name}.friction_deflection"] = d
+        return values
 
 
 def scales(linkage: Linkage) -> list[Scale]:
@@ -73,19 +73,19 @@ def scales(linkage: Linkage) -> list[Scale]:
     if not (rubs := rubbing(linkage)):
         return []
     return [
-        Scale(j.name, j.joint, closed, max(closed, OPENED * opened), len(rubs))
+        Scale(j.name, j.joint, closed, max(closed, OPEN_SHARE * opened), len(rubs))
         for j, (closed, opened) in zip(rubs, _mobilities(linkage, rubs), strict=True)
     ]
 
 
 def speeds(linkage: Linkage, h: float) -> dict[str, float]:
     """v_f (rad/s or m/s) by joint, for steps of h (s)."""
-    found = {}
+    speeds = {}
     for scale in scales(linkage):
         defaults = scale.defaults(ca.SX(h))
         given = scale.joint.friction_speed
-        found[scale.name] = float(defaults.get(f"{scale.name}.friction_speed", given))
-    return found
+        speeds[scale.name] = float(defaults.get(f"{scale.name}.friction_speed", given))
+    return speeds
 
 
 def longest_step(scales: Iterable[Scale]) -> float:
@@ -97,7 +97,7 @@ def longest_step(scales: Iterable[Scale]) -> float:
 def require_slow(scales: Iterable[Scale], h: float) -> None:
     """Raises ValueError for given values that are too stiff for steps of h (s) of explicit
     methods."""
-    for what, pole in (found for scale in scales for found in scale.poles):
+    for what, pole in (named_pole for scale in scales for named_pole in scale.poles):
         if pole * h > STABLE:
             raise ValueError(f"{what} makes a pole at {pole:.3g} 1/s, {TOO_FAST.format(h)}")
 

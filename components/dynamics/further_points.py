@@ -46,12 +46,12 @@ Users = tuple[str, ...]
 
 def inputs(linkage: Linkage, users: Users) -> Iterator[Variable]:
     for name in (point.name for point in linkage.point):
-        at = f"{name}.x"
+        pose = f"{name}.x"
         text = f"wrench at {name}"
-        yield Variable(f"{name}.F_hand", (3,), WRENCH, description=text, power=Power(at))
+        yield Variable(f"{name}.F_hand", (3,), WRENCH, description=text, power=Power(pose))
         if name in users:
             text = f"virtual coupling at {name}, acts with - on the mechanism"
-            drift = Power(at, sign=-1.0)
+            drift = Power(pose, sign=-1.0)
             yield Variable(f"{name}.F_drift", (3,), WRENCH, description=text, power=drift)
 
 
@@ -99,13 +99,13 @@ class Pushed:
 
 def pushed(model: LinkageModel, u: Signals) -> list[Pushed]:
     """The further points, with the wrenches of hands and of virtual couplings."""
-    found = []
+    points = []
     for point in model.linkage.point:
         wrench = u[f"{point.name}.F_hand"]
         if (drift := f"{point.name}.F_drift") in u:
             wrench = wrench - u[drift]
-        found.append(Pushed(point.name, model.pose(point.body, f"{point.name}.at"), wrench))
-    return found
+        points.append(Pushed(point.name, model.pose(point.body, f"{point.name}.at"), wrench))
+    return points
 
 
 def efforts(model: LinkageModel, u: Signals) -> ca.SX:
@@ -123,34 +123,34 @@ def _jacobians(model: LinkageModel, names: Users) -> dict[str, ca.SX]:
 
 def mobilities(space: OperationalSpace, names: Users) -> dict[str, ca.SX]:
     """Lambda_k^-1 of the points, by output."""
-    found = _jacobians(space.model, names)
-    return {f"{name}.Lambda_inv": space.mobility(J) for name, J in found.items()}
+    jacobians = _jacobians(space.model, names)
+    return {f"{name}.Lambda_inv": space.mobility(J) for name, J in jacobians.items()}
 
 
 def values(
     space: OperationalSpace, block: Block, users: Users, applied: ca.SX, *, mobility: bool
 ) -> dict[str, ca.SX]:
     """The outputs; `applied` are the generalised forces (n x 1) of all wrenches and contacts."""
-    model, found = space.model, dict[str, ca.SX]()
+    model, outputs = space.model, dict[str, ca.SX]()
     for point in pushed(model, block.u):
-        found[f"{point.name}.x"], found[f"{point.name}.v"] = point.x, model.rate(point.x)
+        outputs[f"{point.name}.x"], outputs[f"{point.name}.v"] = point.x, model.rate(point.x)
         if mobility:
-            found |= mobilities(space, (point.name,))
+            outputs |= mobilities(space, (point.name,))
         if point.name in users:
             J = ca.jacobian(point.x, model.q)
             acceleration = J @ space.response(applied - J.T @ point.wrench)[0]
-            found[f"{point.name}.a_bias"] = space.bias(point.x)
-            found[f"{point.name}.F_env"] = equivalent_wrench(
+            outputs[f"{point.name}.a_bias"] = space.bias(point.x)
+            outputs[f"{point.name}.F_env"] = equivalent_wrench(
                 space.mobility(J), space.open_mobility(J), acceleration, block.p["length_scale"]
             )
-    return found
+    return outputs
 
 
 def directions(
     block: Block, space: OperationalSpace, users: Users, q0: ca.SX, q1: ca.SX
 ) -> dict[str, ConstrainedDirections]:
     """The constrained directions at the operational point and at those of users, by state."""
-    found = [constrained_directions(block, space, q0, q1)]
+    constrained = [constrained_directions(block, space, q0, q1)]
     for name, J in _jacobians(space.model, users).items():
-        found.append(constrained_directions(block, space, q0, q1, J, f"{name}."))
-    return dict(zip(counts(users), found, strict=True))
+        constrained.append(constrained_directions(block, space, q0, q1, J, f"{name}."))
+    return dict(zip(counts(users), constrained, strict=True))

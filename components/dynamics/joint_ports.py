@@ -49,15 +49,15 @@ def inputs(linkage: Linkage) -> list[Variable]:
 
 def outputs(linkage: Linkage) -> list[Variable]:
     """Position (rad or m) and velocity (rad/s or m/s) of the joints with these ports."""
-    found = [
+    rows = [
         Variable(name, (), _UNITS[j.type][1], description=f"coordinate of {j.name}")
         for j, name in _of(linkage, "position")
     ]
     for joint, name in _of(linkage, "velocity"):
         of = f"{joint.name}.position" if "position" in joint.ports else None
         text = f"rate of {joint.name}"
-        found.append(Variable(name, (), _UNITS[joint.type][2], description=text, derivative_of=of))
-    return found
+        rows.append(Variable(name, (), _UNITS[joint.type][2], description=text, derivative_of=of))
+    return rows
 
 
 def efforts(model: LinkageModel, u: Signals) -> ca.SX:
@@ -70,6 +70,6 @@ def efforts(model: LinkageModel, u: Signals) -> ca.SX:
 
 def values(model: LinkageModel) -> dict[str, ca.SX]:
     """The values of the outputs."""
-    found = {n: model.q[model.coordinate(j.name)] for j, n in _of(model.linkage, "position")}
+    positions = {n: model.q[model.coordinate(j.name)] for j, n in _of(model.linkage, "position")}
     rates = {n: model.qd[model.coordinate(j.name)] for j, n in _of(model.linkage, "velocity")}
-    return found | rates
+    return positions | rates

@@ -28,12 +28,12 @@ LIGHT = 1e-2  # relative to the mean
 def groups(linkage: Linkage) -> list[list[Joint]]:
     """Groups of joints whose loops are connected by shared joints; each joint of a loop is in one
     group."""
-    found: list[set[str]] = []
+    chains: list[set[str]] = []
     cycles = [_way(linkage, a) ^ _way(linkage, b) for a, b in (o.bodies for o in linkage.loop)]
     for cycle in (*cycles, *(set(gear.joints) for gear in linkage.gear)):
-        shared = [group for group in found if group & cycle]
-        found = [group for group in found if not group & cycle] + [cycle.union(*shared)]
-    return [[j for j in linkage.joint if j.name in group] for group in found]
+        shared = [group for group in chains if group & cycle]
+        chains = [group for group in chains if not group & cycle] + [cycle.union(*shared)]
+    return [[j for j in linkage.joint if j.name in group] for group in chains]
 
 
 def _way(linkage: Linkage, body: str) -> set[str]:

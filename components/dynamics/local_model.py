@@ -37,21 +37,25 @@ def ports(linkage: Linkage) -> list[Variable]:
     turns = tuple("1" if unit == "rad" else "1/m" for unit in units)
     inertias = {("m", "m"): "kg.m2", ("m", "1"): "kg.m", ("1", "m"): "kg.m", ("1", "1"): "kg"}
     D_units = tuple(inertias[a, b] for a in lengths for b in lengths)
-    at = _at_start(linkage)
+    starts = _at_start(linkage)
     text = "joint-space inertia"
-    found = [Variable("D", (n, n), D_units, at["D"], text, kind="semidefinite")]
+    variables = [Variable("D", (n, n), D_units, starts["D"], text, kind="semidefinite")]
     if m:
-        found.append(Variable("W", (m, n), lengths, at["W"], "Jacobian of the loop closures"))
-        found.append(Variable("w", (m,), "m/s2", at["w"], "Wdot qd"))
+        variables.append(
+            Variable("W", (m, n), lengths, starts["W"], "Jacobian of the loop closures")
+        )
+        variables.append(Variable("w", (m,), "m/s2", starts["w"], "Wdot qd"))
     J_units = (*lengths, *lengths, *turns)
-    found.append(Variable("J_h", (3, n), J_units, at["J_h"], "Jacobian of the operational point"))
-    return found
+    variables.append(
+        Variable("J_h", (3, n), J_units, starts["J_h"], "Jacobian of the operational point")
+    )
+    return variables
 
 
 def values(model: LinkageModel) -> dict[str, ca.SX]:
     """The values of these ports at the model's pose, for the virtual environment."""
-    found = {"D": model.D, "J_h": model.J_h}
-    return found | {"W": model.W, "w": model.w} if model.linkage.closed else found
+    matrices = {"D": model.D, "J_h": model.J_h}
+    return matrices | {"W": model.W, "w": model.w} if model.linkage.closed else matrices
 
 
 def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
@@ -60,14 +64,14 @@ def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
     start = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
     assembled = ca.Function("assembled", [p.vector], list(start))
     q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
-    at = values(LinkageModel(linkage, p, q, qd))
-    rows = [ca.vec(ca.densify(value).T) for value in at.values()]
+    matrices = values(LinkageModel(linkage, p, q, qd))
+    rows = [ca.vec(ca.densify(value).T) for value in matrices.values()]
     evaluated = ca.Function("evaluated", [q, qd, p.vector], rows)
     defaults = [s for v in p.variables for s in v.starts]
     numbers = evaluated.call([*assembled.call([ca.DM(defaults)]), ca.DM(defaults)])
     return {
         name: tuple(float(x) for x in column.elements())
-        for name, column in zip(at, numbers, strict=True)
+        for name, column in zip(matrices, numbers, strict=True)
     }
 
 

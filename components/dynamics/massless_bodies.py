@@ -37,8 +37,8 @@ def require_inertia(component: Component, model: LinkageModel) -> None:
     poses = ca.vertcat(
         *(ca.vertcat(model.centers[b.name], model.frames[b.name].angle) for b in bodies)
     )
-    at = ca.Function("J", [model.q, model.p.vector], [ca.jacobian(poses, model.q), model.W])
-    J, W = (np.array(v) for v in at(start, component.start_parameters))
+    jacobians = ca.Function("J", [model.q, model.p.vector], [ca.jacobian(poses, model.q), model.W])
+    J, W = (np.array(v) for v in jacobians(start, component.start_parameters))
     moves = J @ (null_space(W, 1e-9) if len(W) else np.eye(n))
     size = np.tile([1.0, 1.0, mean_link_length(model.linkage) ** 2], len(bodies))
     has = np.ravel([(b.mass > 0, b.mass > 0, b.inertia > 0) for b in bodies])

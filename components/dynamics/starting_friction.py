@@ -1,6 +1,6 @@
 """Start of the deflections z of joints with friction (friction.py): nothing jerks at t = 0.
 
-A joint that moves starts to slide as it has long done so, z = d sign(qd). Joints at rest start with
+A joint that moves starts fully deflected, z = d sign(qd). Joints at rest start with
 the deflections that keep them at rest, as far as friction can:
 
     0 = a + A F,   a: their accelerations without friction of their own,   A: their mobility
@@ -26,18 +26,18 @@ def start(space: OperationalSpace, Q: ca.SX, q: ca.SX, qd: ca.SX, t: ca.SX) -> c
     """z at (q, qd) and t = 0, k x 1. Q: generalised forces in addition to the linkage's own, in the
     symbols of the model."""
     model = space.model
-    at, k = Joints(model), model.deflection.numel()
-    J = at.jacobian
-    resting = ca.fabs(at.v) < MOVING * at.v_f
-    sliding = ca.if_else(resting, 0, at.d * ca.sign(at.v))
-    motion = J @ space.motion(Q)[0] + ca.jtimes(at.v, model.q, model.qd)
+    joints, k = Joints(model), model.deflection.numel()
+    J = joints.jacobian
+    resting = ca.fabs(joints.v) < MOVING * joints.v_f
+    sliding = ca.if_else(resting, 0, joints.d * ca.sign(joints.v))
+    motion = J @ space.motion(Q)[0] + ca.jtimes(joints.v, model.q, model.qd)
     a = ca.substitute(motion, model.deflection, sliding)
     a = ca.if_else(resting, a, 0)
     rest = ca.diag(resting)
     A = rest @ space.mobility(J) @ rest
     shift = ca.if_else(resting, MU * ca.trace(A) / k + TINY, 1)
     F = -Regularised(A, shift).proximal(a)
-    held = ca.if_else(resting, -F * at.d / ca.fmax(at.f, TINY), sliding)
-    z = ca.fmin(ca.fmax(held, -at.d), at.d)
+    held = ca.if_else(resting, -F * joints.d / ca.fmax(joints.f, TINY), sliding)
+    z = ca.fmin(ca.fmax(held, -joints.d), joints.d)
     symbols, values = ca.vertcat(model.q, model.qd, t), ca.densify(ca.vertcat(q, qd, 0))
     return ca.substitute(z, symbols, values)

@@ -24,14 +24,14 @@ def mechanism_parameters(
 ) -> list[Variable]:
     """Parameters of the virtual mechanism; Baumgarte's alpha only where the scene gives it, since
     its default depends on the step size."""
-    found = [*parameters(linkage), *start_parameters(linkage)]
+    variables = [*parameters(linkage), *start_parameters(linkage)]
     if linkage.closed and mechanism.stabilization == "baumgarte":
         text = "Baumgarte frequency of (3.3)"
         if mechanism.alpha is not None:
-            found.append(Variable("alpha", (), "1/s", mechanism.alpha, text))
+            variables.append(Variable("alpha", (), "1/s", mechanism.alpha, text))
         beta = default_beta if mechanism.beta is None else mechanism.beta
-        found.append(Variable("beta", (), "1", beta, "Baumgarte damping ratio of (3.3)"))
-    return found
+        variables.append(Variable("beta", (), "1", beta, "Baumgarte damping ratio of (3.3)"))
+    return variables
 
 
 def start_parameters(linkage: Linkage) -> list[Variable]:
@@ -88,7 +88,7 @@ def states(linkage: Linkage) -> list[Variable]:
 def motion_outputs(linkage: Linkage) -> list[Variable]:
     units, m = coordinate_units(linkage), sum(rows(linkage))
     n = (len(units),)
-    found = [
+    variables = [
         Variable("x", (3,), POSE, description="pose of the operational point"),
         Variable(
             "v", (3,), TWIST, description="velocity of the operational point", derivative_of="x"
@@ -114,11 +114,13 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
         Variable("energy", (), "J", description="kinetic and potential energy"),
     ]
     if m:
-        found.append(Variable("lambda", (m,), "N", description="Lagrange multipliers of the loops"))
+        variables.append(
+            Variable("lambda", (m,), "N", description="Lagrange multipliers of the loops")
+        )
         gap = "largest gap over the loops"
         apart = mean_link_length(linkage)  # a loop that is open by a link's length has diverged
-        found.append(Variable("closure_error", (), "m", description=gap, max=apart))
-    return found
+        variables.append(Variable("closure_error", (), "m", description=gap, max=apart))
+    return variables
 
 
 def mobility_output() -> Variable:

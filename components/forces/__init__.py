@@ -47,7 +47,7 @@ def efforts(model: LinkageModel, *, weight: bool = True) -> ca.SX:
     another size, or one that refers to a frame, joint or parameter that the linkage does not
     have."""
     kinds = [kind for kind in KINDS if weight or kind is not gravity]
-    found = [Q for kind in kinds if (Q := kind.efforts(model)) is not None]
+    parts = [Q for kind in kinds if (Q := kind.efforts(model)) is not None]
     n = model.q.numel()
     for force in named(model.linkage):
         try:
@@ -58,21 +58,21 @@ def efforts(model: LinkageModel, *, weight: bool = True) -> ca.SX:
             raise ValueError(f"force `{force.name}`: efforts are no expression") from error
         if Q.shape != (n, 1):
             raise ValueError(f"force `{force.name}`: efforts of {Q.shape}, not {(n, 1)}")
-        found.append(Q)
-    return sum(found, start=ca.SX(n, 1))
+        parts.append(Q)
+    return sum(parts, start=ca.SX(n, 1))
 
 
 def sources(model: LinkageModel) -> ca.SX:
     """The generalised forces (n x 1) that may put energy in: those of drives, and those of
     [[linkage.force]] apart from their potentials."""
     driven = drives.efforts(model)
-    found = [] if driven is None else [driven]
+    parts = [] if driven is None else [driven]
     for force in named(model.linkage):
-        found.append(ca.SX(force.efforts(model)) + ca.gradient(force.energy(model), model.q))
-    return sum(found, start=ca.SX(model.q.numel(), 1))
+        parts.append(ca.SX(force.efforts(model)) + ca.gradient(force.energy(model), model.q))
+    return sum(parts, start=ca.SX(model.q.numel(), 1))
 
 
 def energy(model: LinkageModel) -> ca.SX:
     """Sum of all potential energies (J)."""
-    found = [V for kind in KINDS if (V := kind.energy(model)) is not None]
-    return sum([*found, *(f.energy(model) for f in named(model.linkage))], start=ca.SX(0))
+    parts = [V for kind in KINDS if (V := kind.energy(model)) is not None]
+    return sum([*parts, *(f.energy(model) for f in named(model.linkage))], start=ca.SX(0))

@@ -26,17 +26,17 @@ from hapticlink.components.time_signals import TimeSignal
 def parameters(linkage: Linkage) -> list[Variable]:
     """The parameters of the drives. Raises ValueError for a drive on a free joint, which has three
     coordinates."""
-    found = []
+    variables = []
     for j in joints_with(linkage, "drive"):
         drive, text = j.joint.drive, f"drive of {j.name}"
         if isinstance(drive, ConstantDrive):
-            found.append(Variable(f"{j.name}.effort", (), j.effort_unit, drive.effort, text))
+            variables.append(Variable(f"{j.name}.effort", (), j.effort_unit, drive.effort, text))
         elif isinstance(drive, PDDrive):
             units = (f"{j.effort_unit}/{j.unit}", f"{j.effort_unit}.s/{j.unit}")
             gains = (drive.stiffness, drive.damping)
             for name, unit, gain in zip(("K", "B"), units, gains, strict=True):
-                found.append(Variable(f"{j.name}.drive_{name}", (), unit, gain, text))
-    return found
+                variables.append(Variable(f"{j.name}.drive_{name}", (), unit, gain, text))
+    return variables
 
 
 def energy(model: LinkageModel) -> None:

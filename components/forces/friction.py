@@ -27,14 +27,14 @@ def rubbing(linkage: Linkage) -> list[JointCoordinate]:
 
 def parameters(linkage: Linkage) -> list[Variable]:
     """The parameters of joints with friction that are given; friction_scale.py defines others."""
-    found = []
+    rows = []
     texts = ("friction", "deflection at which it slides", "speed at which it slides")
     for j in rubbing(linkage):
         units = (j.effort_unit, j.unit, f"{j.unit}/s")
         for key, unit, text in zip(KEYS, units, texts, strict=True):
             if (value := getattr(j.joint, key)) is not None:
-                found.append(Variable(f"{j.name}.{key}", (), unit, value, f"{text} of {j.name}"))
-    return found
+                rows.append(Variable(f"{j.name}.{key}", (), unit, value, f"{text} of {j.name}"))
+    return rows
 
 
 def states(linkage: Linkage) -> list[Variable]:
@@ -62,15 +62,15 @@ class Joints:
 def energy(model: LinkageModel) -> ca.SX | None:
     if not rubbing(model.linkage):
         return None
-    at = Joints(model)
-    return 0.5 * ca.dot(at.f / at.d, at.z**2)
+    j = Joints(model)
+    return 0.5 * ca.dot(j.f / j.d, j.z**2)
 
 
 def efforts(model: LinkageModel) -> ca.SX | None:
     if not rubbing(model.linkage):
         return None
-    at = Joints(model)
-    return -at.jacobian.T @ (at.f * dry_friction.held(at.z, at.v, at.d, at.tau) / at.d)
+    j = Joints(model)
+    return -j.jacobian.T @ (j.f * dry_friction.held(j.z, j.v, j.d, j.tau) / j.d)
 
 
 def bounded(model: LinkageModel, z: ca.SX) -> ca.SX:
@@ -83,5 +83,5 @@ def deflection_rates(model: LinkageModel) -> ca.SX:
     """z' of the joints with friction, k x 1; none without."""
     if not rubbing(model.linkage):
         return ca.SX(0, 1)
-    at = Joints(model)
-    return dry_friction.deflection_rate(at.z, at.v, at.d, at.tau)
+    j = Joints(model)
+    return dry_friction.deflection_rate(j.z, j.v, j.d, j.tau)

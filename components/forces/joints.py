@@ -18,13 +18,13 @@ KEYS = ("stiffness", "rest", "damping")
 def parameters(linkage: Linkage) -> list[Variable]:
     """The parameters of these terms. Raises ValueError for a term on a free joint, which has three
     coordinates."""
-    found = []
+    variables = []
     for j in joints_with(linkage, *KEYS):
         units = (f"{j.effort_unit}/{j.unit}", j.unit, f"{j.effort_unit}.s/{j.unit}")
         for unit, key in zip(units, KEYS, strict=True):
             if (value := getattr(j.joint, key)) is not None:
-                found.append(Variable(f"{j.name}.{key}", (), unit, value, f"{key} of {j.name}"))
-    return found
+                variables.append(Variable(f"{j.name}.{key}", (), unit, value, f"{key} of {j.name}"))
+    return variables
 
 
 def energy(model: LinkageModel) -> ca.SX | None:

@@ -25,20 +25,20 @@ def _name(linkage: Linkage, index: int) -> str:
 
 
 def parameters(linkage: Linkage) -> list[Variable]:
-    found = []
+    variables = []
     for i, s in enumerate(linkage.spring):
         name = _name(linkage, i)
-        for k, (body, at) in enumerate(zip(s.bodies, s.at, strict=True)):
+        for k, (body, point) in enumerate(zip(s.bodies, s.at, strict=True)):
             text = f"{name} on {body}"
-            found.append(Variable(f"{name}.at{k + 1}", (2,), "m", at, text, "fixed"))
+            variables.append(Variable(f"{name}.at{k + 1}", (2,), "m", point, text, "fixed"))
         for field, unit, value in (
             ("stiffness", "N/m", s.stiffness),
             ("damping", "N.s/m", s.damping),
             ("length", "m", s.length),
         ):
             if value is not None:
-                found.append(Variable(f"{name}.{field}", (), unit, value, f"{field} of {name}"))
-    return found
+                variables.append(Variable(f"{name}.{field}", (), unit, value, f"{field} of {name}"))
+    return variables
 
 
 def _span(model: LinkageModel, index: int) -> ca.SX:
@@ -65,7 +65,7 @@ def energy(model: LinkageModel) -> ca.SX | None:
 
 def efforts(model: LinkageModel) -> ca.SX | None:
     V = energy(model)
-    found = [] if V is None else [-ca.gradient(V, model.q)]
+    parts = [] if V is None else [-ca.gradient(V, model.q)]
     for i, s in enumerate(model.linkage.spring):
         if s.damping is None:
             continue
@@ -74,5 +74,5 @@ def efforts(model: LinkageModel) -> ca.SX | None:
         if s.length is not None:  # damps along the distance only
             rate = span * ca.dot(span, rate) / ca.fmax(ca.dot(span, span), MET)
         b = model.p[f"{_name(model.linkage, i)}.damping"]
-        found.append(-ca.jacobian(span, model.q).T @ (b * rate))
-    return sum(found[1:], start=found[0]) if found else None
+        parts.append(-ca.jacobian(span, model.q).T @ (b * rate))
+    return sum(parts[1:], start=parts[0]) if parts else None

@@ -58,16 +58,16 @@ def gear_name(linkage: Linkage, index: int) -> str:
 
 def gear_parameters(linkage: Linkage) -> list[Variable]:
     """Ratio and offset of each gear; by default the offset is that of the start coordinates."""
-    found = []
+    rows = []
     for i, gear in enumerate(linkage.gear):
         name = gear_name(linkage, i)
         unit, per = (COORDINATE_UNITS[_type(linkage, joint)][0] for joint in gear.joints)
         text = f"{gear.joints[0]} over {gear.joints[1]}"
         ratio_unit = "1" if unit == per else f"{unit}/{per}"
-        found.append(Variable(f"{name}.ratio", (), ratio_unit, gear.ratio, text, "fixed"))
+        rows.append(Variable(f"{name}.ratio", (), ratio_unit, gear.ratio, text, "fixed"))
         text = f"{gear.joints[0]} where {gear.joints[1]} is 0"
-        found.append(Variable(f"{name}.offset", (), unit, _offset(linkage, gear), text, "fixed"))
-    return found
+        rows.append(Variable(f"{name}.offset", (), unit, _offset(linkage, gear), text, "fixed"))
+    return rows
 
 
 def _type(linkage: Linkage, joint: str) -> str:
@@ -85,15 +85,15 @@ def closures(model: Placed) -> list[Closure]:
     """The closures at the model's pose."""
     linkage = model.linkage
     length = mean_link_length(linkage)
-    found = [_loop(model, i, length) for i in range(len(linkage.loop))]
+    rows_of_loops = [_loop(model, i, length) for i in range(len(linkage.loop))]
     for i, gear in enumerate(linkage.gear):
         name = gear_name(linkage, i)
         first, second = (model.q[model.coordinate(joint)] for joint in gear.joints)
         turns = _type(linkage, gear.joints[0]) == "revolute"
         h = first - model.p[f"{name}.ratio"] * second - model.p[f"{name}.offset"]
         joins = f"{gear.joints[0]} to {gear.joints[1]}"
-        found.append(Closure(name, joins, length * h if turns else h))
-    return found
+        rows_of_loops.append(Closure(name, joins, length * h if turns else h))
+    return rows_of_loops
 
 
 def _loop(model: Placed, index: int, length: float) -> Closure:

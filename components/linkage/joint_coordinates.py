@@ -45,7 +45,7 @@ class JointCoordinate:
 def joints_with(linkage: Linkage, *keys: str) -> list[JointCoordinate]:
     """The joints, then the cut joints, that have one of the keys. Raises ValueError for a free
     joint that has, whose coordinates are three."""
-    found = []
+    coordinates = []
     for j in linkage.joint:
         given = [key for key in keys if getattr(j, key) is not None]
         units = COORDINATE_UNITS[j.type]
@@ -55,9 +55,9 @@ def joints_with(linkage: Linkage, *keys: str) -> list[JointCoordinate]:
                 "has three; use a spring between points"
             )
         if given:
-            found.append(JointCoordinate(j.name, j, units[0]))
+            coordinates.append(JointCoordinate(j.name, j, units[0]))
     for i, loop in enumerate(linkage.loop):
         if any(getattr(loop, key) is not None for key in keys):
             unit = "rad" if loop.type == "revolute" else "m"
-            found.append(JointCoordinate(loop_name(linkage, i), loop, unit, i))
-    return found
+            coordinates.append(JointCoordinate(loop_name(linkage, i), loop, unit, i))
+    return coordinates

@@ -125,19 +125,19 @@ class LinkageModel:
     def twists(self, joint: Joint) -> tuple[ca.SX, list[ca.SX]]:
         """The joint's point in the world (m), and the twist (omega, v_x, v_y) there for a unit rate
         of each of its coordinates."""
-        R, at = self.frames[joint.parent].rotation, self._pivot(joint)
+        R, pivot = self.frames[joint.parent].rotation, self._pivot(joint)
         turn = ca.sparsify(ca.SX([1, 0, 0]))
 
         def slide(direction: ca.SX) -> ca.SX:
             return ca.vertcat(ca.SX(1, 1), direction)
 
         if joint.type == "revolute":
-            return at, [turn]
+            return pivot, [turn]
         if joint.type == "prismatic":
             axis = self.p[f"{joint.name}.axis"]
             along = R @ ca.vertcat(ca.cos(axis), ca.sin(axis))
-            return at + along * self._of(joint), [slide(along)]
-        moved = at + R @ self._of(joint)[:2]
+            return pivot + along * self._of(joint), [slide(along)]
+        moved = pivot + R @ self._of(joint)[:2]
         return moved, [slide(R[:, 0]), slide(R[:, 1]), turn]
 
     def _child(self, joint: Joint, parent: Frame, q: ca.SX) -> Frame:

@@ -20,38 +20,38 @@ def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
         shape = () if isinstance(value, int | float) else (2,)
         return Variable(name, shape, unit, value, text, variability="fixed")
 
-    found = []
+    rows = []
     for b in linkage.body:
-        found.append(fixed(f"{b.name}.mass", "kg", b.mass, f"mass of {b.name}"))
-        found.append(
+        rows.append(fixed(f"{b.name}.mass", "kg", b.mass, f"mass of {b.name}"))
+        rows.append(
             fixed(f"{b.name}.inertia", "kg.m2", b.inertia, f"inertia of {b.name} about its centre")
         )
         if b.center is not None:
-            found.append(fixed(f"{b.name}.center", "m", b.center, f"centre of mass of {b.name}"))
+            rows.append(fixed(f"{b.name}.center", "m", b.center, f"centre of mass of {b.name}"))
     for j in linkage.joint:
         if j.at_parent is not None:
-            found.append(fixed(f"{j.name}.at_parent", "m", j.at_parent, f"{j.name} on {j.parent}"))
+            rows.append(fixed(f"{j.name}.at_parent", "m", j.at_parent, f"{j.name} on {j.parent}"))
         if j.at_child is not None:
-            found.append(fixed(f"{j.name}.at_child", "m", j.at_child, f"{j.name} on {j.child}"))
+            rows.append(fixed(f"{j.name}.at_child", "m", j.at_child, f"{j.name} on {j.child}"))
         if j.type == "prismatic":
-            found.append(fixed(f"{j.name}.axis", "rad", j.axis or 0.0, f"direction of {j.name}"))
+            rows.append(fixed(f"{j.name}.axis", "rad", j.axis or 0.0, f"direction of {j.name}"))
     for i, loop in enumerate(linkage.loop):
         name = loop_name(linkage, i)
         for k, (body, at) in enumerate(zip(loop.bodies, loop.at, strict=True)):
-            found.append(fixed(f"{name}.at{k + 1}", "m", at, f"{name} on {body}"))
+            rows.append(fixed(f"{name}.at{k + 1}", "m", at, f"{name} on {body}"))
         if loop.type != "revolute":
-            found.append(fixed(f"{name}.axis", "rad", loop.axis or 0.0, f"direction of {name}"))
+            rows.append(fixed(f"{name}.axis", "rad", loop.axis or 0.0, f"direction of {name}"))
         if loop.type == "prismatic":
             text = f"angle of {loop.bodies[0]} from {loop.bodies[1]}"
-            found.append(fixed(f"{name}.angle", "rad", loop.angle or 0.0, text))
+            rows.append(fixed(f"{name}.angle", "rad", loop.angle or 0.0, text))
     if linkage.operational_point.at is not None:
         at, body = linkage.operational_point.at, linkage.operational_point.body
-        found.append(fixed("operational_point.at", "m", at, f"operational point on {body}"))
+        rows.append(fixed("operational_point.at", "m", at, f"operational point on {body}"))
     for point in linkage.point:
         if point.at is not None:
             text = f"{point.name} on {point.body}"
-            found.append(fixed(f"{point.name}.at", "m", point.at, text))
-    return tuple(found)
+            rows.append(fixed(f"{point.name}.at", "m", point.at, text))
+    return tuple(rows)
 
 
 def loop_name(linkage: Linkage, index: int) -> str:
@@ -84,9 +84,9 @@ def mean_link_length(linkage: Linkage) -> float:
         if j.parent in points:
             points[j.parent].append(j.at_parent or (0.0, 0.0))
     for loop in linkage.loop:
-        for body, at in zip(loop.bodies, loop.at, strict=True):
+        for body, point in zip(loop.bodies, loop.at, strict=True):
             if body in points:
-                points[body].append(at)
+                points[body].append(point)
     spans = [max(math.dist(a, b) for a in p for b in p) for p in points.values() if p]
     lengths = [s for s in spans if s > 0] or [
         math.sqrt(b.inertia / b.mass) for b in bodies if b.mass > 0 and b.inertia > 0

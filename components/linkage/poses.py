@@ -21,15 +21,15 @@ def pose_function(linkage: Linkage) -> tuple[list[str], ca.Function]:
     p = Signals("p", parameters)
     n = len(coordinates(linkage, {}))
     model = LinkageModel(linkage, p, ca.SX.sym("q", n), ca.SX(n, 1))
-    found = ca.horzcat(*(ca.vertcat(f.origin, f.angle) for f in model.frames.values()))
+    stacked = ca.horzcat(*(ca.vertcat(f.origin, f.angle) for f in model.frames.values()))
     values = [value for variable in parameters for value in variable.starts]
-    at = ca.Function("poses", [model.q, p.vector], [found])
-    return [*model.frames], ca.Function("poses", [model.q], [at(model.q, values)])
+    function = ca.Function("poses", [model.q, p.vector], [stacked])
+    return [*model.frames], ca.Function("poses", [model.q], [function(model.q, values)])
 
 
 def poses(linkage: Linkage, q: Sequence[Sequence[float]]) -> dict[str, NDArray[np.float64]]:
     """(x m, y m, theta rad) of each body's frame in the world, (k, 3), at joint coordinates q
     (k, n); "ground" is among the bodies. Raises ValueError as `LinkageModel` does."""
-    names, at = pose_function(linkage)
-    results = [np.array(at(row)) for row in np.atleast_2d(np.asarray(q, float))]
+    names, function = pose_function(linkage)
+    results = [np.array(function(row)) for row in np.atleast_2d(np.asarray(q, float))]
     return {name: np.array([r[:, i] for r in results]) for i, name in enumerate(names)}

@@ -88,22 +88,22 @@ def pairs(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
     """
     walls = 2 if contacts.friction is None else len(contacts.enclosure or ())
     shaped = [(i, body) for i, body in enumerate(linkage.body) if body.shape]
-    found = []
+    pairs = []
     for _, body in shaped:
         corners = len(body.shape)
         if contacts.enclosure:
-            found.append(Pair(body.name, "enclosure", 0, "enclosure", walls * corners))
+            pairs.append(Pair(body.name, "enclosure", 0, "enclosure", walls * corners))
         for i, disc in enumerate(contacts.disc):
-            found.append(Pair(body.name, "disc", i, disc.name or f"disc{i + 1}", 1))
+            pairs.append(Pair(body.name, "disc", i, disc.name or f"disc{i + 1}", 1))
         for i, polygon in enumerate(contacts.polygon):
             name = polygon.name or f"polygon{i + 1}"
             places = _places(corners, len(polygon.corners))
-            found.append(Pair(body.name, "polygon", i, name, places))
+            pairs.append(Pair(body.name, "polygon", i, name, places))
     for (_, first), (i, second) in combinations(shaped, 2):
         if _touch(linkage, contacts, {first.name, second.name}):
             places = _places(len(first.shape), len(second.shape))
-            found.append(Pair(first.name, "body", i, second.name, places))
-    return tuple(found)
+            pairs.append(Pair(first.name, "body", i, second.name, places))
+    return tuple(pairs)
 
 
 def _places(corners: int, others: int) -> int:

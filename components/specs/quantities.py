@@ -43,8 +43,8 @@ class Quantity(GroupedMetadata):
     @property
     def range(self) -> str:
         """The bounds as text, `> 0 and <= 1000`; `finite` without bounds."""
-        said = [f"{_BOUNDS[name][0]} {bound}" for name, bound in self.bounds.items()]
-        return " and ".join(said) or "finite"
+        bounds = [f"{_BOUNDS[name][0]} {bound}" for name, bound in self.bounds.items()]
+        return " and ".join(bounds) or "finite"
 
     def __contains__(self, number: float | Fraction) -> bool:
         return all(_BOUNDS[name][1](number, bound) for name, bound in self.bounds.items())

@@ -20,7 +20,7 @@ import fmpy
 
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.fmus.native.compiler_cache import compiler_cache
-from hapticlink.fmus.versions import version
+from hapticlink.fmus.versions import install_command, version
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
 TARGETS = {
@@ -57,7 +57,7 @@ def compiler_version() -> str:
     except PackageNotFoundError:
         raise FmuError(
             "native FMUs are compiled with ziglang, which is not installed: "
-            "pip install '.[native]' in the checkout, or take packaging = \"python\""
+            f'{install_command("native")}, or set packaging = "python"'
         ) from None
 
 
@@ -82,17 +82,17 @@ def compile_library(
         raise FmuError(f"no platform {platform!r}; there are {', '.join(PLATFORMS)}")
     if len(targets) > 1 and not isinstance(source, (Path, str)):
         source = [*source]
-    with tempfile.TemporaryDirectory(dir=library.parent) as room:
-        slices = [_compiled(source, Path(room), target, options) for target in targets]
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        slices = [_compiled(source, Path(folder), target, options) for target in targets]
         library.write_bytes(slices[0] if len(slices) == 1 else universal(slices))
     return library
 
 
 def _compiled(
-    source: Path | str | Iterable[Path], room: Path, target: str, options: Sequence[str]
+    source: Path | str | Iterable[Path], folder: Path, target: str, options: Sequence[str]
 ) -> bytes:
-    made = room / target
-    made.mkdir()
+    own_folder = folder / target
+    own_folder.mkdir()
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     # A Mach-O file contains the path that it was written to, so this is the same everywhere.
     if isinstance(source, (Path, str)):
@@ -102,12 +102,12 @@ def _compiled(
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             for each in source:
                 command = [*options, "-c", "-o", f"{each.stem}.o", str(each.resolve())]
-                jobs[f"{each.stem}.o"] = pool.submit(_zig, command, made, target)
+                jobs[f"{each.stem}.o"] = pool.submit(_zig, command, own_folder, target)
         for job in jobs.values():
             job.result()
         inputs = [*jobs]
-    _zig([*link, *options, "-o", "library", *inputs], made, target)
-    return (made / "library").read_bytes()
+    _zig([*link, *options, "-o", "library", *inputs], own_folder, target)
+    return (own_folder / "library").read_bytes()
 
 
 def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
@@ -133,9 +133,9 @@ def universal(slices: Iterable[bytes]) -> bytes:
     0xCAFEBABE, the count, and (cputype, subtype, offset, size, alignment) of each slice."""
     slices = list(slices)
     head = struct.pack(">II", 0xCAFEBABE, len(slices))
-    body, at = b"", 1 << _PAGE
+    body, offset = b"", 1 << _PAGE
     for part in slices:
         cpu = struct.unpack_from("<I", part, 4)[0]
-        head += struct.pack(">IIIII", cpu, _CPU[cpu], at + len(body), len(part), _PAGE)
+        head += struct.pack(">IIIII", cpu, _CPU[cpu], offset + len(body), len(part), _PAGE)
         body += part + bytes(-len(part) % (1 << _PAGE))
-    return head.ljust(at, b"\0") + body
+    return head.ljust(offset, b"\0") + body

@@ -16,10 +16,10 @@ import re
 from collections.abc import Iterable, Iterator
 from itertools import islice
 
-LONGEST = 30_000
+MAX_STATEMENTS = 30_000
 """Statements that stay one function, which compiles in 3 s."""
-PIECE = 500
-FILE = 40
+PIECE_STATEMENTS = 500
+FILE_PIECES = 40
 """Pieces in a file."""
 
 _FUNCTION = re.compile(
@@ -36,14 +36,14 @@ def split(text: str) -> tuple[str, Iterable[str]]:
     function is long. `text` is CasADi's, with static functions."""
     long: list[tuple[list[str], list[str]]] = []  # heads of the pieces, and statements
 
-    def shortened(found: re.Match[str]) -> str:
-        name, parameters, declared, body = found.groups()
+    def shortened(match: re.Match[str]) -> str:
+        name, parameters, declared, body = match.groups()
         statements = body.splitlines(keepends=True)
-        if len(statements) <= LONGEST:
-            return found[0]
+        if len(statements) <= MAX_STATEMENTS:
+            return match[0]
         heads = [
             f"__attribute__((noinline)) int part{k}_{name}({parameters}, casadi_real* a)"
-            for k in range(-(-len(statements) // PIECE))
+            for k in range(-(-len(statements) // PIECE_STATEMENTS))
         ]
         long.append((heads, statements))
         size = 1 + max(int(slot[1:]) for slot in _SLOT.findall(declared))
@@ -63,14 +63,14 @@ def split(text: str) -> tuple[str, Iterable[str]]:
 
 
 def _files(main: str, pieces: Iterator[str]) -> Iterator[str]:
-    while several := [*islice(pieces, FILE)]:
+    while several := [*islice(pieces, FILE_PIECES)]:
         yield main + "".join(several)
 
 
 def _pieces(heads: list[str], statements: list[str]) -> Iterator[str]:
     """The pieces of a function, with their heads."""
     slots = [_slots(statement) for statement in statements]
-    bounds = [slice(k, k + PIECE) for k in range(0, len(statements), PIECE)]
+    bounds = [slice(k, k + PIECE_STATEMENTS) for k in range(0, len(statements), PIECE_STATEMENTS)]
     after: list[set[str]] = []  # by piece: slots whose values later pieces read
     live: set[str] = set()
     for piece in reversed(bounds):

@@ -41,11 +41,8 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
     header = "\n".join(
         [
             *(f"#define {name} {value}" for name, value in sizes.items()),
-            _table(
-                "char *const names",
-                _texts(names),
-            ),
-            _table("char *const state_names", _texts(component.state_texts)),
+            _table("char *const names", map(json.dumps, names)),
+            _table("char *const state_names", map(json.dumps, component.state_texts)),
             _table("double starts", map(number, starts)),
             _table("char is_fixed", (str(int(flag)) for flag in fixed)),
             text,
@@ -59,10 +56,6 @@ def _table(declared: str, entries: Iterable[str]) -> str:
     return f"static const {declared}[] = {{{', '.join([*entries, '0'])}}};"
 
 
-def _texts(names: Iterable[str]) -> Iterable[str]:
-    return map(json.dumps, names)
-
-
 def number(value: float) -> str:
     if math.isfinite(value):
         return repr(float(value))
@@ -74,7 +67,7 @@ def _room(text: str, of: str) -> int:
     return max(int(n) for n in re.findall(rf"\*sz_{of} = (\d+);", text))
 
 
-def functions(made: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
+def functions(given: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
     """Static C functions in which each instruction of CasADi's virtual machine is a statement on
     local variables, and the C files with the pieces of those that are long.
 
@@ -82,7 +75,7 @@ def functions(made: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
     them: with these branches the time to compile grows with the square of the length.
     """
     generator = ca.CodeGenerator("component")
-    for function in made:
+    for function in given:
         generator.add(function if function.is_a("SXFunction") else function.expand())
     text = "#define CASADI_SYMBOL_EXPORT static\n" + generator.dump()
     text = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", text)

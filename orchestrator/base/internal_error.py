@@ -1,5 +1,5 @@
-"""An exception that nobody has foreseen: a mistake in hapticlink, told in a line; the traceback
-goes to a file for whoever mends it. Those of a plugin are told by `plugins.blamed`."""
+"""An exception that nobody has foreseen: a mistake in hapticlink, reported in a line; the traceback
+goes to a file for whoever mends it. Those of a plugin are reported by `plugins.blamed`."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import tempfile
 import traceback
 from importlib.metadata import PackageNotFoundError, version
 
-TOLD = "an error of hapticlink itself"
-"""By which it is told from a fault of what it was given."""
+PREFIX = "an error of hapticlink itself"
+"""By which it differs from a fault of what it was given."""
 
 
 def reported(error: Exception) -> str:
     """What to tell the user; the report lies in the temporary folder."""
     what = "".join(traceback.format_exception_only(error)).strip()
-    told = f"{TOLD}, not of what it was given: {what[:300]}"
+    message = f"{PREFIX}, not of what it was given: {what[:300]}"
     try:
-        return f"{told}\n  please report it, with {_written(error)}"
+        return f"{message}\n  please report it, with {_written(error)}"
     except OSError as full:
-        return f"{told}\n  a report cannot be written: {full}"
+        return f"{message}\n  a report cannot be written: {full}"
 
 
 def _written(error: Exception) -> str:

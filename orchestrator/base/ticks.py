@@ -135,7 +135,7 @@ def aligned(period: Fraction, base: Fraction, end: int, first: Fraction | None =
     )
 
 
-MOST_DRAWN = 1_000_000
+MAX_DRAWN = 1_000_000
 """Largest number of drawn periods: about 100 MB and some seconds; 4.6 h at 60 Hz."""
 
 
@@ -146,14 +146,14 @@ def variable(
     (rates, Hz), in whole ticks, by numpy's PCG64 with `seed`.
 
     Raises ValueError where no whole number of ticks lies between the bounds, and where more than
-    MOST_DRAWN periods may be needed.
+    MAX_DRAWN periods may be needed.
     """
     import numpy as np
 
     low, high = bounds(slowest, fastest, base)
-    if end // low > MOST_DRAWN:
+    if end // low > MAX_DRAWN:
         raise ValueError(
-            f"up to {end // low} periods would be drawn before the run, at most {MOST_DRAWN} are: "
+            f"up to {end // low} periods would be drawn before the run, at most {MAX_DRAWN} are: "
             "take a shorter duration or a fixed rate"
         )
     generator = np.random.Generator(np.random.PCG64(seed))

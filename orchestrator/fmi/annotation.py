@@ -47,13 +47,17 @@ class Annotation:
     states: tuple[str, ...] | None = None
 
 
+def block(tree: Element) -> Element | None:
+    """The annotation's Block in a modelDescription.xml, None where there is none."""
+    return tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
+
+
 def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> Annotation:
     """The annotation of an FMU, empty if it has none. Raises ValueError if it is malformed, or does
     not fit the variables and their units."""
-    block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
-    if block is None:
+    if (declared := block(tree)) is None:
         return Annotation()
-    timing: Any = block.get("timing")
+    timing: Any = declared.get("timing")
     if timing is not None:
         _one_of(timing, "timing", TIMINGS)
     ports = _Ports(scalars, units)
@@ -61,7 +65,7 @@ def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) ->
     power: dict[str, Power] = {}
     springs: list[Spring] = []
     states: tuple[str, ...] | None = None
-    for element in block:
+    for element in declared:
         _one_of(element.tag, "element", ("Port", "Spring", "States"))
         name = element.get("name", "")
         if element.tag == "States":
@@ -101,26 +105,26 @@ class _Ports:
 
     def spring(self, element: Element) -> Spring:
         needed = "set_position position stiffness"
-        found = Spring(**_attributes(element, needed, "damping set_velocity velocity force"))
-        size = len(self._entries(found.set_position, "input"))
-        self._entries(found.position, "input", "output", size=size)
-        for parameter in filter(None, (found.stiffness, found.damping)):
+        spring = Spring(**_attributes(element, needed, "damping set_velocity velocity force"))
+        size = len(self._entries(spring.set_position, "input"))
+        self._entries(spring.position, "input", "output", size=size)
+        for parameter in filter(None, (spring.stiffness, spring.damping)):
             self._entries(parameter, "parameter", size=size)
-        if found.set_velocity:
-            self._entries(found.set_velocity, "input", size=size)
-        if found.velocity:
-            self._entries(found.velocity, "input", "output", size=size)
-        if found.force:
-            self._entries(found.force, "output", size=size)
-        return found
+        if spring.set_velocity:
+            self._entries(spring.set_velocity, "input", size=size)
+        if spring.velocity:
+            self._entries(spring.velocity, "input", "output", size=size)
+        if spring.force:
+            self._entries(spring.force, "output", size=size)
+        return spring
 
     def _entries(self, name: str, *causalities: str, size: int = 0) -> list[Scalar]:
-        found = [s for s in self._scalars if s.port == name and s.causality in causalities]
-        if not found:
+        entries = [s for s in self._scalars if s.port == name and s.causality in causalities]
+        if not entries:
             raise ValueError(f"there is no {' or '.join(causalities)} {name!r}")
-        if size and len(found) != size:
-            raise ValueError(f"{name} has {len(found)} entries, and {size} are needed")
-        return found
+        if size and len(entries) != size:
+            raise ValueError(f"{name} has {len(entries)} entries, and {size} are needed")
+        return entries
 
 
 def _attributes(element: Element, needed: str, further: str = "") -> dict[str, str]:

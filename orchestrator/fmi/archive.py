@@ -14,18 +14,18 @@ from xml.parsers import expat
 from hapticlink.fmus.cache import is_whole
 from hapticlink.orchestrator.base.faults import InputFault
 
-MOST_XML = 256 * 2**20
+MAX_XML_BYTES = 256 * 2**20
 """Bytes of one XML entry; the largest FMUs (10^5 variables) have some 50 MB."""
-MOST = 2**30
+MAX_BYTES = 2**30
 """Bytes of an archive once it is unpacked."""
-MOST_ENTRIES = 10_000
+MAX_ENTRIES = 10_000
 
 
 @contextmanager
 def opened(path: Path, kind: str) -> Iterator[zipfile.ZipFile]:
     """The archive at `path`, a `kind` ("FMU"). Raises InputFault where it is missing, damaged,
-    larger than MOST or MOST_ENTRIES, or holds an entry that would land outside the folder that it
-    is unpacked to."""
+    larger than MAX_BYTES or MAX_ENTRIES, or holds an entry that would land outside the folder that
+    it is unpacked to."""
     try:
         if path.exists() and not path.is_file():  # a pipe, which may never be written to
             raise InputFault(f"{path}: it is no file; give the path of an {kind}")
@@ -65,10 +65,10 @@ def _outside(entry: zipfile.ZipInfo) -> str:
 def _too_large(entries: list[zipfile.ZipInfo]) -> str:
     """The reason to refuse an archive for its size, "" if there is none. The sizes that it declares
     for its entries are reliable: never more is read of an entry."""
-    if (size := sum(entry.file_size for entry in entries)) > MOST:
-        return f"it has {size} bytes unpacked; at most {MOST}"
-    if len(entries) > MOST_ENTRIES:
-        return f"it has {len(entries)} entries; at most {MOST_ENTRIES}"
+    if (size := sum(entry.file_size for entry in entries)) > MAX_BYTES:
+        return f"it has {size} bytes unpacked; at most {MAX_BYTES}"
+    if len(entries) > MAX_ENTRIES:
+        return f"it has {len(entries)} entries; at most {MAX_ENTRIES}"
     return ""
 
 
@@ -90,8 +90,10 @@ def read_xml(archive: zipfile.ZipFile, entry: str) -> bytes:
         info = archive.getinfo(entry)
     except KeyError:
         raise InputFault(f"{path}: holds no {entry}") from None
-    if info.file_size > MOST_XML:
-        raise InputFault(f"{path}: {entry} has {info.file_size} bytes; at most {MOST_XML} are read")
+    if info.file_size > MAX_XML_BYTES:
+        raise InputFault(
+            f"{path}: {entry} has {info.file_size} bytes; at most {MAX_XML_BYTES} are read"
+        )
     text = archive.read(info)
     parser = expat.ParserCreate()
 

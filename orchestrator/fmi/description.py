@@ -38,10 +38,7 @@ if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
 
 @dataclass(frozen=True)
 class Description:
-    """A co-simulation FMU, as its modelDescription.xml says.
-
-    fmi is "2" or "3"; flags are the capabilities of its CoSimulation element that are true.
-    """
+    """A co-simulation FMU, as its modelDescription.xml describes it."""
 
     path: Path
     guid: str
@@ -49,9 +46,12 @@ class Description:
     timing: Timing
     scalars: tuple[Scalar, ...]
     fmi: str = "2"
+    """The major version: "2" or "3"."""
     units: dict[str, Unit] = field(default_factory=dict)
     flags: frozenset[str] = frozenset()
+    """The capabilities of its CoSimulation element that are true."""
     step_size: str | None = None
+    """Of its default experiment (s), as it is written."""
     dependencies: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """By output: the variables that it depends on directly. An output that is not here may depend
     on every input."""
@@ -66,15 +66,17 @@ class Description:
     states: tuple[str, ...] | None = None
     """The states that its serialised FMU state ends with; None where that is not declared."""
     declares_timing: bool = False
-    """Whether the FMU itself says its timing."""
+    """Whether the FMU itself declares its timing."""
     block: str | None = None
     """The block of this project that it was built from; None for FMUs of others."""
 
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
         """The entries of the vector `name` (or the scalar of exactly that name), sorted by index:
         some tools write x[10] before x[2]."""
-        found = (s for s in self.scalars if name in (s.port, s.name) and s.causality in causalities)
-        return tuple(sorted(found, key=lambda s: s.indices))
+        scalars = (
+            s for s in self.scalars if name in (s.port, s.name) and s.causality in causalities
+        )
+        return tuple(sorted(scalars, key=lambda s: s.indices))
 
     def follows(self, output: Scalar, inputs: Iterable[Scalar] | None = None) -> bool:
         """Whether an output depends directly on one of `inputs`, by default on any input."""
@@ -85,16 +87,18 @@ class Description:
 
     def derivative(self, outputs: Iterable[Scalar]) -> tuple[Scalar, ...] | None:
         """The outputs that are the derivatives of `outputs`, all or none."""
-        by_name = {s.name: s for s in self.outputs}
-        found = [by_name.get(self.derivatives.get(s.name, "")) for s in outputs]
-        return None if None in found else tuple(s for s in found if s)
+        return self._related(outputs, self.derivatives)
 
     def integral(self, outputs: Iterable[Scalar]) -> tuple[Scalar, ...] | None:
         """The outputs of which `outputs` are the derivatives, all or none."""
+        return self._related(outputs, {rate: name for name, rate in self.derivatives.items()})
+
+    def _related(
+        self, outputs: Iterable[Scalar], names: Mapping[str, str]
+    ) -> tuple[Scalar, ...] | None:
         by_name = {s.name: s for s in self.outputs}
-        of = {derivative: name for name, derivative in self.derivatives.items()}
-        found = [by_name.get(of.get(s.name, "")) for s in outputs]
-        return None if None in found else tuple(s for s in found if s)
+        related = [by_name.get(names.get(s.name, "")) for s in outputs]
+        return None if None in related else tuple(s for s in related if s)
 
     def unit(self, scalar: Scalar) -> Unit | None:
         return None if scalar.unit is None else self.units.get(scalar.unit, Unit(scalar.unit))
@@ -102,8 +106,8 @@ class Description:
     @cached_property
     def outputs(self) -> tuple[Scalar, ...]:
         """All outputs, type by type in the order of TYPES."""
-        found = [s for s in self.scalars if s.causality == "output"]
-        return tuple(sorted(found, key=lambda s: TYPES.index(s.type)))
+        outputs = [s for s in self.scalars if s.causality == "output"]
+        return tuple(sorted(outputs, key=lambda s: TYPES.index(s.type)))
 
 
 def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Description:
@@ -113,49 +117,18 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
     with opened(path, "FMU") as archive:
         content = read_xml(archive, "modelDescription.xml")
         tree = ElementTree.fromstring(content)
-        version = tree.get("fmiVersion") or "none"
-        if version.partition(".")[0] not in ("2", "3") or tree.find("CoSimulation") is None:
-            raise InputFault(
-                f"{path}: FMI version {version}, co-simulation: "
-                f"{tree.find('CoSimulation') is not None}; "
-                "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
-            )
-        for variable in tree.iterfind("./ModelVariables/*") if sizes else ():
-            if variable.get("name") in sizes:
-                variable.set("start", str(sizes[variable.get("name", "")]))
+        version = _version(path, tree)
         if sizes:
-            content = ElementTree.tostring(tree)
-        block = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
+            content = _resized(tree, sizes)
         try:
             model = read_model_description(_only_xml(content), validate=False)
-            require_countable(model)
-            relative, units = differences(tree), {u.name: _unit(u) for u in model.unitDefinitions}
-            scalars = tuple(
-                s
-                for v in model.modelVariables
-                for s in numbers(
-                    v,
-                    version[0],
-                    v.name in relative,
-                    bounded=block is not None,
-                    resized=bool(sizes),
-                )
-            )
-            written = ("String", "Binary")
-            strings = (v for v in model.modelVariables if v.type in written and not v.shape)
-            texts, of = tuple(text(v) for v in strings), derivatives(model)
-            require_unique(s.name for s in (*scalars, *texts))
-            dependencies = {
-                output.variable.name: frozenset(v.name for v in output.dependencies)
-                for output in model.outputs
-                if output.dependencies is not None
-            }
+            variables = _variables(tree, model, version, resized=bool(sizes))
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
-        _require_binary(archive, model.coSimulation.modelIdentifier, version[0])
+        _require_binary(archive, model.coSimulation.modelIdentifier, version)
         require_whole(archive)
     try:
-        declared = annotation.read(tree, scalars, units)
+        declared = annotation.read(tree, variables.scalars, variables.units)
     except ValueError as error:
         raise InputFault(f"{path}: its hapticlink annotation cannot be used: {error}") from error
     capable = {k for k, value in tree.find("CoSimulation").items() if value == "true"}  # type: ignore[union-attr]
@@ -164,21 +137,72 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         model.guid,
         model.coSimulation.modelIdentifier,
         declared.timing or "continuous",
-        scalars,
-        version[0],
-        units,
+        variables.scalars,
+        version,
+        variables.units,
         frozenset(capable),
         model.defaultExperiment and model.defaultExperiment.stepSize,
-        dependencies=dependencies,
-        strings=texts,
-        derivatives=of,
+        dependencies=variables.dependencies,
+        strings=variables.texts,
+        derivatives=variables.derivatives,
         kinds=declared.kinds,
         power=declared.power,
         springs=declared.springs,
         states=declared.states,
         declares_timing=declared.timing is not None,
-        block=None if block is None else model.modelName,
+        block=None if annotation.block(tree) is None else model.modelName,
     )
+
+
+def _version(path: Path, tree: ElementTree.Element) -> str:
+    """ "2" or "3". Raises InputFault for other versions, and for an FMU without co-simulation."""
+    version = tree.get("fmiVersion") or "none"
+    cosimulates = tree.find("CoSimulation") is not None
+    if version.partition(".")[0] not in ("2", "3") or not cosimulates:
+        raise InputFault(
+            f"{path}: FMI version {version}, co-simulation: {cosimulates}; "
+            "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
+        )
+    return version[0]
+
+
+def _resized(tree: ElementTree.Element, sizes: Mapping[str, int]) -> bytes:
+    """The XML text with the start values `sizes` of structural parameters."""
+    for variable in tree.iterfind("./ModelVariables/*"):
+        if (name := variable.get("name", "")) in sizes:
+            variable.set("start", str(sizes[name]))
+    return ElementTree.tostring(tree)
+
+
+@dataclass(frozen=True)
+class _Variables:
+    """What ModelVariables, UnitDefinitions and ModelStructure say, as in `Description`."""
+
+    scalars: tuple[Scalar, ...]
+    texts: tuple[Scalar, ...]
+    units: dict[str, Unit]
+    derivatives: dict[str, str]
+    dependencies: dict[str, frozenset[str]]
+
+
+def _variables(tree: ElementTree.Element, model: Any, version: str, *, resized: bool) -> _Variables:
+    require_countable(model)
+    relative, bounded = differences(tree), annotation.block(tree) is not None
+    scalars = tuple(
+        s
+        for v in model.modelVariables
+        for s in numbers(v, version, v.name in relative, bounded=bounded, resized=resized)
+    )
+    written = ("String", "Binary")
+    texts = tuple(text(v) for v in model.modelVariables if v.type in written and not v.shape)
+    require_unique(s.name for s in (*scalars, *texts))
+    dependencies = {
+        output.variable.name: frozenset(v.name for v in output.dependencies)
+        for output in model.outputs
+        if output.dependencies is not None
+    }
+    units = {u.name: _unit(u) for u in model.unitDefinitions}
+    return _Variables(scalars, texts, units, derivatives(model), dependencies)
 
 
 def _only_xml(text: bytes) -> BytesIO:

@@ -26,7 +26,7 @@ def derivatives(
     """
     call = slave.dll[f"fmi{description.fmi}GetDirectionalDerivative"]
     unknowns = _whole(description, outputs)
-    found, rows = np.zeros(len(unknowns)), [unknowns.index(_key(s)) for s in outputs]
+    column, rows = np.zeros(len(unknowns)), [unknowns.index(_key(s)) for s in outputs]
     columns = []
     for scalar in inputs:
         knowns = _whole(description, [scalar])
@@ -36,13 +36,13 @@ def derivatives(
             references = [reference for reference, entry in keys if entry == 0]
             arguments.append((ctypes.c_uint * len(references))(*references))
             arguments.append(ctypes.c_size_t(len(references)))
-        for values in (seed, found):
+        for values in (seed, column):
             arguments.append(ctypes.c_void_p(values.ctypes.data))
             if description.fmi == "3":
                 arguments.append(ctypes.c_size_t(len(values)))
         if not succeeded(call(*arguments)):
             return None
-        columns.append(found[rows])
+        columns.append(column[rows])
     return np.stack(columns, axis=1)
 
 

@@ -9,7 +9,7 @@ messages that the FMU logged are part of the error.
 from __future__ import annotations
 
 import ctypes
-import os
+import logging
 import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
@@ -20,12 +20,14 @@ from typing import Any
 import numpy as np
 from fmpy import fmi2
 
+from hapticlink.orchestrator.base import current_directory
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries
+from hapticlink.orchestrator.fmi import arithmetic, messages, process_cache, python_libraries
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
 from hapticlink.orchestrator.fmi.instance import Vector
+from hapticlink.orchestrator.fmi.load_library import loaded
 from hapticlink.orchestrator.fmi.retry import Retry
 from hapticlink.orchestrator.fmi.setter import Places, Setter
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
@@ -35,7 +37,6 @@ from hapticlink.orchestrator.fmi.status import (
     ERROR,
     FATAL,
     STATUS,
-    require_success,
     succeeded,
     worse,
 )
@@ -60,17 +61,16 @@ class InProcess(WithStates):
         self._key = messages.opened()
 
     def _load(self) -> None:
-        before = os.getcwd()
         try:
             self._folder = process_cache.unpack(self.description, self._folder)
-            self.slave = self._instantiate()
+            with current_directory.restored(self.name):
+                self.slave = self._instantiate()
+            self._keep_arithmetic()
         except Exception as error:  # FMPy raises bare Exception
-            said = str(error)
-            if said.startswith("Failed to instantiate"):
-                said = "its instantiation failed; its guid may not be that of its binary"
-            raise self._fault(f"could not be loaded: {said}", 0.0) from error
-        finally:
-            os.chdir(before)  # FMPy leaves it changed where a library cannot be loaded
+            reason = str(error)
+            if reason.startswith("Failed to instantiate"):
+                reason = "its instantiation failed; its guid may not be that of its binary"
+            raise self._fault(f"could not be loaded: {reason}", 0.0) from error
         outputs = self.description.outputs
         self.gets = self.fewer = self._transfers("Get", outputs, self.outputs)
         if self.seldom:
@@ -85,6 +85,8 @@ class InProcess(WithStates):
                 status = do_step(time, size)
             except SystemError as error:
                 raise self.raised(self.do_step, error) from error
+            finally:
+                self._keep_arithmetic()
             return self._settled(status, time)
 
         self._advance: Callable[[float, float], int] = advance
@@ -93,14 +95,10 @@ class InProcess(WithStates):
             self._advance = self.retry.step
 
     def _instantiate(self) -> Any:
-        slave = self._library(
-            guid=self.description.guid,
-            modelIdentifier=self.description.identifier,
-            unzipDirectory=self._folder,
-            instanceName=self.name,
-            libraryPath=python_libraries.shared(self._folder, self.description.identifier),
+        about = self.description
+        slave = loaded(
+            self._library, about.fmi, about.guid, about.identifier, self._folder, self.name
         )
-        require_success(slave)
         self.holds_python = python_libraries.prepare(slave.dll, self._folder)
         slave.instantiate(loggingOn=True, **self._logging())
         return slave
@@ -169,7 +167,9 @@ class InProcess(WithStates):
         try:
             for transfer in transfers:
                 setattr(self.place, counted, getattr(self.place, counted) + 1)
-                if not succeeded(status := transfer.call()):
+                status = transfer.call()
+                self._keep_arithmetic()
+                if not succeeded(status):
                     raise self.failed(transfer.name, status)
         except SystemError as error:
             raise self.raised(transfer.name, error) from error
@@ -229,6 +229,13 @@ class InProcess(WithStates):
             getattr(self.slave, name)(self.slave.component, *arguments)
         except Exception as error:
             raise self.failed(name, getattr(error, "status", ERROR)) from error
+        finally:
+            self._keep_arithmetic()
+
+    def _keep_arithmetic(self) -> None:
+        """Restores how this process rounds numbers where an FMU of others has changed it."""
+        if self.description.block is None and arithmetic.restored():
+            self.place.altered += 1
 
     # --- the loop -------------------------------------------------------------------------
 
@@ -301,7 +308,7 @@ class InProcess(WithStates):
     def abandon(self) -> None:
         self._status = FATAL
 
-    def _said(self) -> list[str]:
+    def _logged(self) -> list[str]:
         return messages.newest(self._key)
 
     def close(self) -> FmuFault | None:
@@ -322,6 +329,10 @@ class InProcess(WithStates):
             return fault
         finally:
             messages.closed(self._key)
+            self._keep_arithmetic()
+            if self.place.altered:
+                said = "%s changed how this process rounds numbers, in %d calls; it is restored"
+                logging.getLogger(__name__).warning(said, self.name, self.place.altered)
             # pythonfmu puts resources/ on sys.path for good.
             sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]
             process_cache.leave(self._folder)

@@ -35,20 +35,20 @@ class InProcess3(InProcess):
 
     def _stepper(self) -> Callable[[float, float], int]:
         do_step, component = self.slave.dll["fmi3DoStep"], self.slave.component
-        self.told = [ctypes.c_bool() for _ in range(3)]  # event, terminate, early return
+        self.step_flags = [ctypes.c_bool() for _ in range(3)]  # event, terminate, early return
         self.reached = ctypes.c_double()
-        told, last = [ctypes.byref(flag) for flag in self.told], ctypes.byref(self.reached)
+        flags, last = [ctypes.byref(flag) for flag in self.step_flags], ctypes.byref(self.reached)
         forward, instance = ctypes.c_bool(self.forward), ctypes.c_void_p(component)
 
         def advance(time: float, size: float) -> int:
-            at, over = ctypes.c_double(time), ctypes.c_double(size)
-            status: int = do_step(instance, at, over, forward, *told, last)
+            begin, over = ctypes.c_double(time), ctypes.c_double(size)
+            status: int = do_step(instance, begin, over, forward, *flags, last)
             return status
 
         return advance
 
     def _settled(self, status: int, time: float) -> int:
-        if self.told[1] and succeeded(status):
+        if self.step_flags[1] and succeeded(status):
             self._end(self.reached.value)
         return status
 
@@ -64,12 +64,12 @@ class InProcess3(InProcess):
         into = np.array([place[s.name] for s in scalars], dtype=np.intp)
         known = {s.name: float(v) for s, v in self.starts if not isinstance(v, str)}
         everything = np.array([known.get(s.name, s.start) for s in whole])
-        kept = set(place) - {s.name for s in scalars}
-        for name in kept:
+        unconnected = set(place) - {s.name for s in scalars}
+        for name in unconnected:
             if np.isnan(everything[place[name]]):
                 what = f"{name} has no start value in an array of this size; give start.{name}"
                 raise self._fault(what, 0.0)
-        exact = {n: v for n, v in wide(self.starts).items() if n in kept} | dict(exact)
+        exact = {n: v for n, v in wide(self.starts).items() if n in unconnected} | dict(exact)
         return everything, into, self._transfers("Set", whole, everything, exact)
 
     def _set_text(self, scalar: Scalar, text: str) -> None:

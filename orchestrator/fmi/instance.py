@@ -183,7 +183,7 @@ class Instance(ABC):
         """Terminate if FMI allows it in the current state, free, unload, and remove the folder.
         Returns the fault of an FMU that fails in this."""
 
-    def _said(self) -> Sequence[str]:
+    def _logged(self) -> Sequence[str]:
         """The last messages that the FMU logged."""
         return ()
 
@@ -210,8 +210,8 @@ class Instance(ABC):
             scalar, value, bound = beyond
             what = f"output {scalar.name} is {value:.3g}, beyond {bound:.3g}: the run has diverged"
             remedy = "take a higher rate, a finer integrator, or weaker gains"
-            said = f"{what} ({remedy})"
-            raise Diverged(self.name, said, self.time, passing=True, repeatable=True)
+            message = f"{what} ({remedy})"
+            raise Diverged(self.name, message, self.time, passing=True, repeatable=True)
         if self.good is not None:
             self.good[:] = self.outputs
 
@@ -234,4 +234,4 @@ class Instance(ABC):
     def _fault(
         self, what: str, time: float, passing: bool = False, repeatable: bool = False
     ) -> FmuFault:
-        return FmuFault(self.name, what, time, self._said(), passing, repeatable)
+        return FmuFault(self.name, what, time, self._logged(), passing, repeatable)

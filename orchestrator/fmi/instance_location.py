@@ -9,19 +9,20 @@ class Place(ctypes.Structure):
     """time: where the instance stands. begin, size, end: of its newest step. step_time: spent in
     doStep. All in s. ended: whether it has requested the end of the simulation. waiting: whether
     there are settings that it is to take before its next step. setter: the key of the Setter whose
-    values its inputs have, 0 where that is not known. The others count the calls of its functions
+    values its inputs have, 0 where that is not known. altered: the number of its calls that changed
+    how this process rounds numbers. The others count the calls of its functions
     in the loop."""
 
     _fields_ = (
         *((name, ctypes.c_double) for name in ("time", "begin", "size", "end", "step_time")),
-        *((name, ctypes.c_int64) for name in ("ended", "waiting", "setter")),
+        *((name, ctypes.c_int64) for name in ("ended", "waiting", "setter", "altered")),
         *((name, ctypes.c_int64) for name in ("gets", "sets", "steps", "saves", "rollbacks")),
     )
 
     def calls(self) -> dict[str, int]:
         """The number of calls of the loop by kind, without those that were not made."""
-        found = {name: getattr(self, name + "s") for name in _CALLS}
-        return {name: count for name, count in found.items() if count}
+        counts = {name: getattr(self, name + "s") for name in _CALLS}
+        return {name: count for name, count in counts.items() if count}
 
     def start(self) -> None:
         """Count from here."""

@@ -22,7 +22,7 @@ def turn(unit: Unit | None) -> float | None:
 
 
 def misfit(kind: str, units: Sequence[Unit | None]) -> str | None:
-    """The reason why entries with these units cannot be of a kind, "" if they can."""
+    """The reason why entries with these units cannot be of a kind, None if they can."""
     n = len(units)
     if kind in MATRICES and math.isqrt(n) ** 2 != n:
         return f"has {n} entries, and a {kind} matrix is square"

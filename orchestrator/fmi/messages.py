@@ -7,7 +7,7 @@ from itertools import count
 
 from fmpy import fmi2
 
-KEPT, LONGEST = 5, 2000
+MAX_MESSAGES, MAX_LENGTH = 5, 2000
 """Messages of an instance, and characters of one."""
 
 _messages: dict[int, deque[str]] = {}
@@ -17,15 +17,16 @@ _keys = count(1)
 def opened() -> int:
     """A key for a new instance; its messages are kept from now on."""
     key = next(_keys)
-    _messages[key] = deque(maxlen=KEPT)
+    _messages[key] = deque(maxlen=MAX_MESSAGES)
     return key
 
 
 def keep(key: int, status: int, message: bytes) -> None:
     """Keep a message of instance `key`, to be shown if a call fails."""
-    said = _messages.get(key)
-    if said is not None and status > 0:
-        said.append((message or b"")[: 4 * LONGEST].decode("utf-8", "replace").strip()[:LONGEST])
+    own = _messages.get(key)
+    if own is not None and status > 0:
+        text = (message or b"")[: 4 * MAX_LENGTH].decode("utf-8", "replace")
+        own.append(text.strip()[:MAX_LENGTH])
 
 
 def newest(key: int) -> list[str]:
@@ -38,9 +39,9 @@ def closed(key: int) -> None:
 
 def callbacks(key: int) -> fmi2.fmi2CallbackFunctions:
     """The callback functions of an FMI 2.0 FMU."""
-    made = fmi2.fmi2CallbackFunctions.from_buffer_copy(_CALLBACKS)
-    made.componentEnvironment = key
-    return made
+    functions = fmi2.fmi2CallbackFunctions.from_buffer_copy(_CALLBACKS)
+    functions.componentEnvironment = key
+    return functions
 
 
 def _log(key: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:

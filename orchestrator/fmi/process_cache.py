@@ -14,7 +14,7 @@ from fmpy import extract, platform
 
 from hapticlink.orchestrator.fmi.description import Description, describe
 
-MOST = 32
+MAX_UNPACKED = 32
 """Number of FMUs that are kept from one run to the next."""
 File = tuple[Path, int, int]
 """A path with time of change (ns) and size of what is there."""
@@ -28,11 +28,11 @@ def described(path: Path) -> Description:
     try:
         file = _file(path)
     except OSError:
-        return describe(path)  # which says what is wrong
+        return describe(path)  # which raises an InputFault with the reason
     return _described(file)
 
 
-@lru_cache(MOST)
+@lru_cache(MAX_UNPACKED)
 def _described(file: File) -> Description:
     return describe(file[0])
 
@@ -54,24 +54,24 @@ def unpacked_once() -> Iterator[None]:
         _folders = None
 
 
-def unpack(found: Description, folder: str) -> str:
+def unpack(description: Description, folder: str) -> str:
     """Unpacks an FMU into `folder`, which is empty; or removes that, and returns the folder in
     which it is unpacked already."""
-    if found.block is None:
-        extract(found.path, folder)
+    if description.block is None:
+        extract(description.path, folder)
         return folder
     if _folders is None:
-        extract(found.path, folder, _is_needed)
+        extract(description.path, folder, _is_needed)
         return folder
-    file = _file(found.path)
-    kept = _folders.pop(file, None)
-    if kept is None:
-        extract(found.path, folder, _is_needed)
-        kept = folder
+    file = _file(description.path)
+    unpacked = _folders.pop(file, None)
+    if unpacked is None:
+        extract(description.path, folder, _is_needed)
+        unpacked = folder
     else:
         os.rmdir(folder)
-    _folders[file] = kept  # the newest
-    return kept
+    _folders[file] = unpacked  # the newest
+    return unpacked
 
 
 def _is_needed(entry: str) -> bool:
@@ -86,7 +86,7 @@ def leave(folder: str) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def trim(most: int = MOST) -> None:
+def trim(most: int = MAX_UNPACKED) -> None:
     """Removes the folders that were used longest ago, so that `most` are left. No FMU may be open
     in them."""
     for file in list(_folders or ())[: max(len(_folders or ()) - most, 0)]:

@@ -20,7 +20,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from fmpy import platform, platform_tuple, sharedLibraryExtension
+from fmpy import sharedLibraryExtension
 
 from hapticlink.fmus import cache as fmu_cache
 from hapticlink.fmus.atomic_file import atomic_file
@@ -49,23 +49,20 @@ def prepare(loaded: ctypes.CDLL, folder: str) -> bool:
     raise ValueError("resources/slavemodule.txt names no module beside it; build the FMU again")
 
 
-def shared(folder: str, identifier: str) -> str | None:
-    """The path from which to load the library of the Python FMU that is unpacked in `folder`: the
-    same one for all libraries of the same bytes. None for other FMUs, and for a library that others
-    lie beside, which it may need."""
-    if not Path(folder, "resources", "slavemodule.txt").exists():
+def shared(folder: Path, library: Path) -> Path | None:
+    """The path from which to load the `library` of a Python FMU that is unpacked in `folder`: the
+    same one for all libraries of the same bytes. None for other FMUs, and for a library that other
+    files lie beside, which it may need."""
+    if not (folder / "resources" / "slavemodule.txt").exists():
         return None
-    for name in (platform, platform_tuple):
-        library = Path(folder, "binaries", name, f"{identifier}{sharedLibraryExtension}")
-        if library.is_file() and [*library.parent.iterdir()] == [library]:
-            content = library.read_bytes()
-            digest = hashlib.sha256(content).hexdigest()
-            return str(_stored(content, digest))
-    return None
+    if [*library.parent.iterdir()] != [library]:
+        return None
+    content = library.read_bytes()
+    return _stored(content, hashlib.sha256(content).hexdigest())
 
 
 def _stored(content: bytes, digest: str) -> Path:
-    path = _libraries() / f"{digest}{sharedLibraryExtension}"
+    path = _libraries(fmu_cache.folder()) / f"{digest}{sharedLibraryExtension}"
     with suppress(OSError):
         if hashlib.sha256(path.read_bytes()).hexdigest() == digest:
             return path
@@ -76,13 +73,13 @@ def _stored(content: bytes, digest: str) -> Path:
 
 
 @cache
-def _libraries() -> Path:
-    """In the cache of built FMUs; a folder of this process where there is none."""
-    root = fmu_cache.folder()
+def _libraries(root: Path | None) -> Path:
+    """In the cache of built FMUs, `root`; a folder of this process where there is none."""
     if root is not None:
         with suppress(OSError):
             folder = root / "libraries"
-            folder.mkdir(parents=True, exist_ok=True)
+            fmu_cache.private(root)
+            fmu_cache.private(folder)
             if os.access(folder, os.W_OK | os.X_OK):
                 return folder
     folder = Path(temporary_folders.new())

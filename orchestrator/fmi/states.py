@@ -45,8 +45,8 @@ class WithStates(Instance):
     def serialized(self) -> bytes:
         state = self._state("Get", "getFMUState")
         try:
-            found: bytes = self._state("Serialize", "serializeFMUState", state)
-            return found
+            content: bytes = self._state("Serialize", "serializeFMUState", state)
+            return content
         finally:
             self.slave.freeFMUState(state)
 

@@ -28,12 +28,7 @@ _ENTRY = re.compile(r"\[[\d, ]+\]$")
 
 @dataclass(frozen=True)
 class Scalar:
-    """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array.
-
-    conversion: applied to values of a connection to it. nominal: nominal value (FMI 2.0.5 section
-    2.2.7), 1 by default. bound: magnitude beyond which a block of this project is outside of its
-    model.
-    """
+    """One number of an FMU: a variable of FMI 2.0, an entry of an FMI 3.0 array."""
 
     name: str
     reference: int
@@ -43,10 +38,15 @@ class Scalar:
     variability: str = "continuous"
     start: float = 0.0
     relative: bool = False
+    """Whether it is a difference, to which the offset of a unit does not apply."""
     entry: int = 0
+    """Its index among the entries of its array, row by row."""
     conversion: Linear = SAME
+    """Applied to values of a connection to it."""
     nominal: float = 1.0
+    """Nominal value (FMI 2.0.5 section 2.2.7)."""
     bound: float | None = None
+    """The magnitude beyond which a block of this project is outside of its model."""
     initial: str | None = None
     items: tuple[tuple[str, int], ...] = ()
     """Of an enumeration: name and value of each."""
@@ -83,8 +83,8 @@ class Scalar:
 def entry_of(name: str) -> tuple[str, tuple[int, ...]]:
     """`x` and (2, 3) of `x[2,3]`: the vector or matrix that a scalar is an entry of, and its
     indices; () for a scalar by itself."""
-    found = _ENTRY.search(name)
-    return _ENTRY.sub("", name), tuple(map(int, re.findall(r"\d+", found[0]))) if found else ()
+    match = _ENTRY.search(name)
+    return _ENTRY.sub("", name), tuple(map(int, re.findall(r"\d+", match[0]))) if match else ()
 
 
 def differences(tree: ElementTree.Element) -> set[str | None]:
@@ -131,29 +131,29 @@ def numbers(
         )
 
 
-MOST = 10**6
+MAX_NUMBERS = 10**6
 """Numbers of an FMU; the largest have some 10^5."""
 
 
 def require_countable(model: Any) -> None:
     """Raises ValueError for arrays with more entries than memory could hold."""
     count = sum(math.prod(variable.shape or ()) for variable in model.modelVariables)
-    if count > MOST:
-        raise ValueError(f"{count} numbers with all entries of its arrays; at most {MOST}")
+    if count > MAX_NUMBERS:
+        raise ValueError(f"{count} numbers with all entries of its arrays; at most {MAX_NUMBERS}")
 
 
 def derivatives(model: Any) -> dict[str, str]:
     """By name of an output, the name of its time derivative: by the attribute `derivative`, or
     der(y) if variable names are structured (FMI 2.0.5 sections 2.2.7 and 2.2.9)."""
     structured = model.variableNamingConvention == "structured"
-    found: dict[str, str] = {}
+    by_output: dict[str, str] = {}
     for variable in model.modelVariables:
         names = _names(variable)
         if variable.derivative is not None:
-            found |= dict(zip(_names(variable.derivative), names, strict=False))
+            by_output |= dict(zip(_names(variable.derivative), names, strict=False))
         elif structured and (y := _DERIVATIVE.fullmatch(variable.name)):
-            found |= {y[1] + name.removeprefix(variable.name): name for name in names}
-    return found
+            by_output |= {y[1] + name.removeprefix(variable.name): name for name in names}
+    return by_output
 
 
 def _names(variable: Any) -> list[str]:

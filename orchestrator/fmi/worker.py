@@ -1,4 +1,4 @@
-"""The process of an isolated FMU: answers the messages of `isolated.Isolated` until it is told to
+"""The process of an isolated FMU: answers the messages of `isolated.Isolated` until it is asked to
 close or the calling process has ended."""
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Worker:
         return len(self._setters) - 1
 
     def connect_derivatives(self, scalars: Any, orders: Any) -> int:
-        made = self.instance.connect_derivatives(scalars, orders, range(len(scalars)))
-        self._setters.append(made)
+        setter = self.instance.connect_derivatives(scalars, orders, range(len(scalars)))
+        self._setters.append(setter)
         return len(self._setters) - 1
 
     def set_all(self, pending: Any) -> None:
@@ -73,8 +73,8 @@ class Worker:
         instance.step(time, end, size)
         try:
             outputs = self.read()
-        except FmuFault as failed:  # told when somebody reads
-            fault = _told(failed)
+        except FmuFault as failed:  # raised when somebody reads
+            fault = _fault_fields(failed)
         return outputs, fault, instance.ended, instance.step_time, instance.smaller_steps
 
     def close(self) -> dict[str, int]:
@@ -87,7 +87,7 @@ class Worker:
         return instance.calls
 
 
-def _told(fault: FmuFault) -> tuple[Any, ...]:
+def _fault_fields(fault: FmuFault) -> tuple[Any, ...]:
     return fault.what, fault.time, fault.messages, fault.passing, fault.repeatable
 
 
@@ -105,10 +105,10 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             called = worker.instance if call in worker.DIRECT else worker
             answer = ("answer", getattr(called, call)(*arguments))
         except FmuFault as fault:
-            answer = ("end" if isinstance(fault, AsksToEnd) else "fault", _told(fault))
+            answer = ("end" if isinstance(fault, AsksToEnd) else "fault", _fault_fields(fault))
         pickle.dump(answer, answers)
         answers.flush()
-    with suppress(FmuFault):  # there is nobody left to be told
+    with suppress(FmuFault):  # nobody is left to receive it
         worker.close()
 
 

@@ -25,7 +25,7 @@ WATCH = 0.05
 
 
 # Ctrl-C in the terminal goes to the caller alone, which ends the run and then this process.
-APART: Any = (
+OWN_GROUP: Any = (
     {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
     if sys.platform == "win32"
     else {"start_new_session": True}
@@ -43,7 +43,7 @@ class Process:
         # -P: the worker's imports do not depend on the folder that the user stands in.
         command = [sys.executable, "-P", "-m", module]
         self._popen = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **APART
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **OWN_GROUP
         )
         assert self._popen.stdin is not None
         assert self._popen.stdout is not None
@@ -51,11 +51,16 @@ class Process:
         self._ended = threading.Event()
         self._deadline: float | None = None
         self._late = self.busy = False
+        self.interruptible = False
+        """Whether the first signal already ends the process: it has nothing to lose yet."""
         interrupt.add(self.kill)
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
         while not self._ended.wait(WATCH):
+            if self.interruptible and interrupt.came():
+                self.kill()
+                return
             if self._deadline is not None and monotonic() > self._deadline:
                 self._late = True
                 self.kill()
@@ -86,13 +91,13 @@ class Process:
         # An answer that is there already is taken, however late it is asked for.
         self._deadline = max(self._sent + self._allowed, now + 2 * WATCH)
         try:
-            found = pickle.load(self._answers)
+            answer = pickle.load(self._answers)
         except Exception:  # the end of the stream, or what is left of an answer cut in two
             raise self._died() from None
         finally:
             self._deadline = None
         self.busy = False
-        return found
+        return answer
 
     def _died(self) -> Died:
         self.busy = False

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.holds.restorable import Restorable
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class NearEnd:
     sampled: bool = False
 
 
-class EnergyTank(Restorable):
+class EnergyTank:
     """Available energy of one spring-damper, shared by the holds of its set position (row 0) and
     set velocity (row 1), and by the hold of the force on its far side.
 
@@ -48,8 +47,8 @@ class EnergyTank(Restorable):
         self._tick, self.available, self.needed, self._credited = -1, 0.0, 0.0, 0.0
 
     def __deepcopy__(self, memo: dict[int, Any]) -> EnergyTank:
-        """Returns the tank itself, as copied holds have to share it; a rollback therefore saves
-        and restores the tank's attributes beside those of the holds."""
+        """Returns the tank itself, as copied holds have to share it; whoever restores a state
+        therefore restores the tank's attributes beside those of the holds."""
         return self
 
     def credit(self, total: float) -> None:

@@ -13,5 +13,4 @@ from hapticlink.orchestrator.holds.laws import LAWS
 class FirstOrder(OfSamples):
     laws = LAWS["FIRST_ORDER"]
     degree = 1
-    order = 2
     interpolates = True

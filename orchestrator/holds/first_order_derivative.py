@@ -16,4 +16,3 @@ class FirstOrderDerivative(OfSamples):
     depth = 1
     needs = "derivative"
     degree = 1
-    order = 2

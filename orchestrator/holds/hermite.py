@@ -16,5 +16,4 @@ class Hermite(OfSamples):
     laws = LAWS["HERMITE"]
     needs = "derivative"
     degree = 3
-    order = 4
     interpolates = True

@@ -7,18 +7,23 @@ from typing import ClassVar, Literal
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.restorable import Restorable
 
 Needs = Literal["derivative", "integral", "power", "spring"]
 
 
-class Hold(Restorable, ABC):
-    """Gives the value of an input between two samples of its source. Times are in ticks.
+class Hold(ABC):
+    """A hold reconstructs the value of an input between two samples of its source.
 
-    At t = 0 a hold receives the source's initial output, stamped 0, before its value is read, also
-    where samples are delayed. There is no sample of the time before: until the second one arrives,
-    the hold has only that. A rollback restores a hold from a deep copy of its attributes, so they
-    must contain its whole state.
+    1. Times are whole ticks; `HoldContext.seconds` converts them.
+    2. At t = 0 the hold receives the source's initial output, stamped 0, before its value is read,
+       also where samples are delayed. There is no sample of the time before: until the second one
+       arrives, the hold has only that.
+    3. `push` takes a sample with the instant at which the source had it (its stamp) and the instant
+       at which the target gets it (its arrival). Stamps never decrease.
+    4. `value` may be called several times at a tick, for different instants, and returns a vector
+       of `HoldContext.size` finite numbers, which the caller does not change.
+    5. The whole state of a hold is in its attributes: the lifted map of a scene reads and writes it
+       there.
     """
 
     needs: ClassVar[Needs | None] = None
@@ -30,8 +35,6 @@ class Hold(Restorable, ABC):
     """Whether every value is one of the samples, unchanged, so that a matrix keeps its kind."""
     degree: ClassVar[int] = 0
     """Degree of the value as a polynomial in time within a step of the target; 0 if constant."""
-    order: ClassVar[int] = 1
-    """Order of the global error between plants of one rate, which step control uses."""
     interpolates: ClassVar[bool] = False
     """Whether it interpolates once the sample of the step's end is known (coupling "iterated")."""
     downsamples: ClassVar[bool] = False

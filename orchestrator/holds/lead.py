@@ -12,4 +12,3 @@ from hapticlink.orchestrator.holds.laws import LAWS
 
 class Lead(OfSamples):
     laws = LAWS["LEAD"]
-    order = 2

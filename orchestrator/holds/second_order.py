@@ -16,5 +16,4 @@ class SecondOrder(OfSamples):
     laws = LAWS["SECOND_ORDER"]
     depth = 3
     degree = 2
-    order = 3
     interpolates = True

@@ -18,17 +18,17 @@ class AlgebraicLoop:
     ring: str
 
 
-def groups(system: System, units: Iterable[Fmu]) -> list[list[Fmu]]:
+def groups(system: System, fmus: Iterable[Fmu]) -> list[list[Fmu]]:
     """`units` in groups, each after those that feed it; a group of several FMUs is a loop."""
-    names = {u.name for u in units}
-    feeds = {u.name: [c.source for c in system.into(u.name) if c.source in names] for u in units}
+    names = {u.name for u in fmus}
+    feeds = {u.name: [c.source for c in system.into(u.name) if c.source in names] for u in fmus}
     return [[system.fmu[n] for n in group] for group in components(feeds)]
 
 
-def direct(system: System, units: Iterable[Fmu]) -> dict[str, set[str]]:
+def direct(system: System, fmus: Iterable[Fmu]) -> dict[str, set[str]]:
     """For each unit, those of `units` on which its used outputs depend by direct feed-through
     (ModelStructure, FMI 2.0.5 section 2.2.8)."""
-    names = {u.name for u in units}
+    names = {u.name for u in fmus}
     return {
         u.name: {
             c.source
@@ -36,29 +36,29 @@ def direct(system: System, units: Iterable[Fmu]) -> dict[str, set[str]]:
             if c.source in names
             and any(u.description.follows(y, c.inputs) for y in _read(system, u))
         }
-        for u in units
+        for u in fmus
     }
 
 
-def _read(system: System, unit: Fmu) -> Iterator[Scalar]:
+def _read(system: System, fmu: Fmu) -> Iterator[Scalar]:
     """The used outputs: those of connections, and those that holds read beside them."""
-    for c in system.out_of(unit.name):
+    for c in system.out_of(fmu.name):
         yield from c.outputs
         yield from beside(c, system.fmu)
 
 
-def plants(system: System, units: Iterable[Fmu]) -> Iterator[list[Fmu]]:
+def plants(system: System, fmus: Iterable[Fmu]) -> Iterator[list[Fmu]]:
     """Plants in the order in which they step. Within an algebraic loop, topologically by direct
     feed-through; ties keep the declaration order."""
-    for group in groups(system, units):
+    for group in groups(system, fmus):
         parts = components(direct(system, group))
         yield [system.fmu[name] for part in parts for name in part]
 
 
 def loops(system: System, ordered: Iterable[Iterable[Fmu]]) -> Iterator[AlgebraicLoop]:
     """The loops within each group of FMUs that a scheme puts in an order."""
-    for units in ordered:
-        for group in plants(system, units):
+    for fmus in ordered:
+        for group in plants(system, fmus):
             names = tuple(u.name for u in group)
             feeds = {n: [c.source for c in system.into(n) if c.source in names] for n in names}
             if len(names) > 1:
@@ -70,7 +70,7 @@ def components(feeds: Mapping[str, Collection[str]]) -> list[list[str]]:
 
     A group of more than one node is a loop (a strongly connected component; Tarjan 1972).
     """
-    found: list[list[str]] = []
+    groups: list[list[str]] = []
     number: dict[str, int] = {}
     lowest: dict[str, int] = {}
     path: list[str] = []
@@ -85,14 +85,14 @@ def components(feeds: Mapping[str, Collection[str]]) -> list[list[str]]:
             elif before in path:
                 lowest[node] = min(lowest[node], number[before])
         if lowest[node] == number[node]:
-            at = path.index(node)
-            found.append(sorted(path[at:], key=list(feeds).index))
-            del path[at:]
+            begin = path.index(node)
+            groups.append(sorted(path[begin:], key=list(feeds).index))
+            del path[begin:]
 
     for node in feeds:
         if node not in number:
             visit(node)
-    return found
+    return groups
 
 
 def ring(feeds: Mapping[str, Collection[str]], group: Collection[str]) -> str:

@@ -33,12 +33,12 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
     yield LEGEND
     yield f"ticks of {base.numerator}/{base.denominator} s, {system.coupling.scheme}"
     for clock in timeline.clocks:
-        units = ", ".join(
+        fmus = ", ".join(
             u.name + (" (sampled)" if u.sampled else "")
             for u in system.fmus
             if u.clock == clock.name
         )
-        yield f"  {clock.name}: {_steps(clock)}: {units}"
+        yield f"  {clock.name}: {_steps(clock)}: {fmus}"
     yield from _fetched(system)
     yield from _holds(system)
     for loop in plan.loops():

@@ -23,14 +23,6 @@ class Event(NamedTuple):
     firings: tuple[Firing, ...]
 
 
-class Part(NamedTuple):
-    """A step of the plants of one clock alone, for step control, or reading at its end."""
-
-    clock: str
-    dticks: int
-    ended: bool = False
-
-
 @dataclass(frozen=True)
 class Get:
     """Read all outputs of an FMU; their stamp is `ahead` of the event's tick."""
@@ -131,27 +123,8 @@ class Repeat:
     again: tuple[Operation, ...]
 
 
-@dataclass(frozen=True)
-class Advance:
-    """Advance the plants of a clock over `dticks` in steps of controlled size."""
-
-    clock: str
-    dticks: int
-
-
 Operation = (
-    Get
-    | Push
-    | Evaluate
-    | Blend
-    | Set
-    | Step
-    | Save
-    | Rollback
-    | Repeat
-    | Advance
-    | Record
-    | StopWhen
+    Get | Push | Evaluate | Blend | Set | Step | Save | Rollback | Repeat | Record | StopWhen
 )
 
 

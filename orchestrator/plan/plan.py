@@ -18,16 +18,14 @@ from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.plan import dependency_order
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
 from hapticlink.orchestrator.plan.operations import (
-    Advance,
     Event,
     Firing,
     Operation,
-    Part,
     Record,
     Step,
     flat,
 )
-from hapticlink.orchestrator.plan.schemes import SCHEMES, step_control
+from hapticlink.orchestrator.plan.schemes import SCHEMES
 from hapticlink.orchestrator.system.system import System
 
 Block = tuple[Operation, ...]
@@ -44,30 +42,19 @@ class Plan:
     the events with their ticks."""
 
     system: System
-    _blocks: dict[Event | Part, Block] = field(default_factory=dict)
+    _blocks: dict[Event, Block] = field(default_factory=dict)
 
-    def block(self, kind: Event | Part) -> Block:
+    def block(self, kind: Event) -> Block:
+        """The operations of a kind of event in the order of the coupling scheme. Raises InputFault
+        for a scheme of a plugin that gives anything else."""
         if kind not in self._blocks:
-            self._blocks[kind] = self._made(kind)
+            coupling = self.system.coupling.scheme
+            block = SCHEMES[coupling].block(self.system, kind)
+            if not isinstance(block, tuple) or not all(isinstance(op, Operation) for op in block):
+                what = shortened(repr(block))
+                raise InputFault(f"coupling = {coupling!r}: {what} is no tuple of operations")
+            self._blocks[kind] = block
         return self._blocks[kind]
-
-    def _made(self, kind: Event | Part) -> Block:
-        if isinstance(kind, Part):
-            return step_control.part(self.system, kind, self._ordered)
-        if self.system.coupling.step_control:
-            return step_control.block(self.system, kind, self._ordered)
-        return self._ordered(self.system, kind)
-
-    def _ordered(self, system: System, event: Event) -> Block:
-        """The operations of `event` in the order of the coupling scheme. Raises InputFault for a
-        scheme of a plugin that gives anything else."""
-        block = SCHEMES[system.coupling.scheme].block(system, event)
-        if not isinstance(block, tuple) or not all(isinstance(op, Operation) for op in block):
-            what = shortened(repr(block))
-            raise InputFault(
-                f"coupling = {system.coupling.scheme!r}: {what} is no tuple of operations"
-            )
-        return block
 
     def check(self) -> None:
         """Raises InputFault if the scheme cannot order the FMUs, or leaves out the step of one or
@@ -90,13 +77,8 @@ class Plan:
         return tuple(dependency_order.loops(self.system, ordered))
 
     def unrolled(self, event: Event) -> Iterator[Operation]:
-        """The operations of `event`, with one iteration of each Repeat and one step of each
-        Advance."""
-        for operation in flat(self.block(event)):
-            if isinstance(operation, Advance):
-                yield from flat(self.block(Part(operation.clock, operation.dticks)))
-            else:
-                yield operation
+        """The operations of `event`, with one iteration of each Repeat."""
+        return flat(self.block(event))
 
     def __iter__(self) -> Iterator[Moment]:
         return moments(self.system.timeline)

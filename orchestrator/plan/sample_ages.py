@@ -51,15 +51,15 @@ class Ages:
         if not tick:
             return
         age = tick - stamp
-        if (found := self._found.get(connection)) is None:
+        if (counted := self._found.get(connection)) is None:
             self._found[connection] = [age, age, age, 1]
             return
-        if age < found[0]:
-            found[0] = age
-        elif age > found[1]:
-            found[1] = age
-        found[2] += age
-        found[3] += 1
+        if age < counted[0]:
+            counted[0] = age
+        elif age > counted[1]:
+            counted[1] = age
+        counted[2] += age
+        counted[3] += 1
 
     def delays(self) -> dict[str, Delay]:
         seconds = self._seconds
@@ -69,11 +69,11 @@ class Ages:
         }
 
 
-MOST = 100_000
+MAX_EVENTS = 100_000
 """Number of events that are processed without a run if their pattern does not repeat."""
 
 
-def delays(plan: Plan, events: int = MOST) -> dict[str, Delay]:
+def delays(plan: Plan, events: int = MAX_EVENTS) -> dict[str, Delay]:
     ages = Ages(plan)
     for tick, event in islice(plan, events):
         if not ages.event(tick, event):

@@ -105,11 +105,11 @@ class Stamps:
 
 def uses(plan: Plan, until: int | None = None) -> Iterator[Use]:
     """Every value given to every input over the whole run, or up to a tick, in order."""
-    found: list[Use] = []
-    stamps = Stamps(plan, lambda *use: found.append(Use(*use)))
+    pending: list[Use] = []
+    stamps = Stamps(plan, lambda *use: pending.append(Use(*use)))
     for tick, event in plan:
         if until is not None and tick > until:
             return
         stamps.event(tick, event)
-        yield from found
-        found.clear()
+        yield from pending
+        pending.clear()

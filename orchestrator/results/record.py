@@ -152,26 +152,6 @@ class StepErrors:
     size: float
 
 
-@dataclass
-class Steps:
-    """Statistics of step control on a clock: steps taken, rejected for their error, failed in an
-    FMU, and forced (accepted at `min` although the error was too large); the shortest and longest
-    step (s). A step of doubling consists of its two halves."""
-
-    taken: int = 0
-    rejected: int = 0
-    failed: int = 0
-    forced: int = 0
-    shortest: float = 0.0
-    longest: float = 0.0
-
-    def count(self, size: float, forced: bool) -> None:
-        self.shortest = min(self.shortest, size) if self.taken else size
-        self.longest = max(self.longest, size)
-        self.taken += 1
-        self.forced += forced
-
-
 @dataclass(frozen=True)
 class Energy:
     """Energies (J) of a connection from 0 to `until` (s), the newest sample of the source that the
@@ -188,7 +168,7 @@ class Energy:
 class RunEnding:
     """What is known when a run has ended. The defaults hold for a run that goes on or was killed.
 
-    Keys of the mappings are names of FMUs, clocks (`controlled_steps`) or connections.
+    Keys of the mappings are names of FMUs or connections.
     """
 
     end: End = End()
@@ -215,7 +195,6 @@ class RunEnding:
     unstable: str = ""
     """A message if sampling and holding generated more energy than was put in."""
     step_errors: dict[str, StepErrors] = field(default_factory=dict)
-    controlled_steps: dict[str, Steps] = field(default_factory=dict)
     energies: dict[str, Energy] | Literal["none"] = "none"
     """Of connections across rates, "none" where none carries power."""
     energies_within_a_rate: dict[str, Energy] = field(default_factory=dict)

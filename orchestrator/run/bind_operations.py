@@ -6,18 +6,16 @@ resolved once, when an operation is bound, so that the event loop calls no more 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 
 import numpy as np
 
 from hapticlink.orchestrator.plan.operations import (
-    Advance,
     Blend,
     Evaluate,
     Get,
     Operation,
-    Part,
     Push,
     Record,
     Repeat,
@@ -39,7 +37,6 @@ from hapticlink.orchestrator.run.metered_operations import (
 )
 from hapticlink.orchestrator.run.parallel_steps import Finish, with_barriers
 from hapticlink.orchestrator.run.simulation import Call, Simulation
-from hapticlink.orchestrator.run.step_control import Advancer
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system import held_polynomials
 
@@ -55,21 +52,17 @@ class Stop(Exception):
 class Binder:
     """Binds operations to the FMUs, holds and signals of a simulation.
 
-    calls: returns the bound operations of a part of the plan, for step control. `loops` and
-    `advancers` are the fixed-point iterations and the step controls that were bound, whose counts
-    the run reports. joined: makes one call of a sequence of instructions and their calls; without
-    it each is a call.
+    loops: the fixed-point iterations that were bound, whose counts the run reports. joined: makes
+    one call of a sequence of instructions and their calls; without it each is a call.
     """
 
     def __init__(
         self,
         simulation: Simulation,
-        calls: Callable[[Part], Sequence[Call]],
         joined: Callable[[Bound], Call] | None = None,
     ) -> None:
-        self._simulation, self._calls, self._joined = simulation, calls, joined
+        self._simulation, self._joined = simulation, joined
         self.loops: dict[Repeat, FixedPoint] = {}
-        self.advancers: dict[str, Advancer] = {}
 
     def instructions(self, operations: Iterable[Operation], judged: bool = True) -> Bound:
         """The instructions of a block with their calls. Not `judged`, outputs need not be
@@ -125,9 +118,6 @@ class Binder:
             case Rollback(fmu):
                 rollback = simulation.instances[fmu].rollback
                 return lambda tick: rollback()
-            case Advance(clock, dticks):
-                advance = self._advancer(clock).advance
-                return lambda tick: advance(tick, dticks)
             case Repeat():
                 return self._repeat(operation)
             case Record(clock):
@@ -250,11 +240,6 @@ class Binder:
             derived[:] = derivatives.ravel()
 
         return derive
-
-    def _advancer(self, clock: str) -> Advancer:
-        if clock not in self.advancers:
-            self.advancers[clock] = Advancer(clock, self._simulation, self._calls)
-        return self.advancers[clock]
 
     def _blend(self, connection: str, points: tuple[tuple[float, Fraction], ...]) -> Call:
         """Writes a weighted sum of the hold's values at several instants."""

@@ -150,7 +150,7 @@ def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
         for fmu in (u for u in system.fmus if u.clock == clock.name):
             own = [op for op in block if getattr(op, "fmu", None) == fmu.name]
             steps = [op for op in own if isinstance(op, Step)]
-            if system.coupling.scheme == "iterated" or system.coupling.step_control:
+            if system.coupling.scheme == "iterated":
                 unable[fmu.name] = "its steps may be repeated"
             elif fmu.sampled or own[-1:] != steps:
                 unable[fmu.name] = "its outputs are due within the instant"

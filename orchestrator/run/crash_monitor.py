@@ -6,17 +6,18 @@ run.json and removes the temporary folders.
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import json_file
+from hapticlink.orchestrator.run.compiled import library
 
 
 @contextmanager
@@ -24,21 +25,33 @@ def watched(folder: Path) -> Iterator[None]:
     """Context in which a crash of this process is recorded in `folder`/run.json.
 
     Within it os._exit, with which Python code of an FMU can end the process, changes exit status 0
-    to 1, since 0 would mean a regular end of the run.
+    to 1, since 0 would mean a regular end of the run; and so does exit() of C, where there is a
+    compiled loop.
     """
     command = [sys.executable, "-P", "-m", __name__, str(folder.resolve()), str(os.getpid())]
     # A session of its own keeps the terminal's Ctrl-C from it. Its standard input is closed by the
     # operating system when this process ends.
     with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
         interrupt.add(process.kill)
+        guard = _guard()
         exit_at_once = os._exit
         os._exit = lambda status: exit_at_once(status or 1)
+        guard(1)
         try:
             yield
         finally:
+            guard(0)
             os._exit = exit_at_once
             interrupt.remove(process.kill)
             process.kill()
+
+
+def _guard() -> Callable[[int], object]:
+    """Switches the guard against exit() of C on and off (process_state.c)."""
+    with suppress(library.Unavailable):
+        guard: Callable[[int], object] = library.loaded().guard
+        return guard
+    return lambda on: None
 
 
 def record_crash(folder: Path, process: int) -> None:
@@ -69,9 +82,9 @@ def record_crash(folder: Path, process: int) -> None:
 def _process(folder: Path) -> int | None:
     """The process ID of the run in progress in `folder`, from its run.json; None without one."""
     try:
-        end = json.loads((folder / "run.json").read_text(encoding="utf-8"))["end"]
+        end = json_file.read(folder / "run.json")["end"]
         process: int | None = end.get("process")
-    except (OSError, ValueError, KeyError):
+    except (InputFault, LookupError, TypeError, AttributeError):
         return None
     return process
 

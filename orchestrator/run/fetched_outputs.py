@@ -61,15 +61,14 @@ def _read(system: System) -> Iterator[str]:
         signals.scalar(system.ends_when.fmu, system.ends_when.variable)
     yield from (f"{fmu}.{variable}" for fmu, variable in signals.asked)
     for fmu in system.fmus:
-        yield from (f"{fmu.name}.{name}" for name in _of_itself(fmu, system))
+        yield from (f"{fmu.name}.{name}" for name in _of_itself(fmu))
 
 
-def _of_itself(fmu: Fmu, system: System) -> Iterator[str]:
+def _of_itself(fmu: Fmu) -> Iterator[str]:
     """The outputs of an FMU by which its steps and its faults are judged."""
     description = fmu.description
-    controlled = system.coupling.step_control is not None and not fmu.sampled
     for scalar in description.outputs:
-        if controlled or scalar.bound or scalar.port in TOLD.get(description.block or "", ()):
+        if scalar.bound or scalar.port in TOLD.get(description.block or "", ()):
             yield scalar.name
     if StepCheck.possible(description):
         for pair in description.derivatives.items():

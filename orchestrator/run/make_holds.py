@@ -11,7 +11,6 @@ from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
-from hapticlink.orchestrator.holds.restorable import Restorable
 from hapticlink.orchestrator.run import spring_holds
 from hapticlink.orchestrator.run.checked_hold import CheckedHold
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
@@ -23,7 +22,7 @@ from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
 
-def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], list[Restorable]]:
+def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], list[EnergyTank]]:
     """The hold of each connection by name, and the energy tanks, each shared by the holds of one
     spring-damper."""
     shared: dict[SetSpring, EnergyTank] = {}

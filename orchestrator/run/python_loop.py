@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hapticlink.orchestrator.plan.operations import Event, Part
+from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results.record import Iterations, Steps
+from hapticlink.orchestrator.results.record import Iterations
 from hapticlink.orchestrator.run.bind_operations import Binder, Bound
 from hapticlink.orchestrator.run.fixed_point import total
 from hapticlink.orchestrator.run.simulation import Call, Simulation
@@ -25,8 +25,8 @@ class PythonLoop:
         joined: Callable[[Bound], Call] | None = None,
     ) -> None:
         self._plan, self._simulation, self.in_python = plan, simulation, in_python
-        self._binder = Binder(simulation, self._calls, joined)
-        self._bound: dict[Event | Part, list[Call]] = {}
+        self._binder = Binder(simulation, joined)
+        self._bound: dict[Event, list[Call]] = {}
         self.complete = 0
 
     def run(self, turn: Callable[[int], object]) -> None:
@@ -37,14 +37,11 @@ class PythonLoop:
             self.complete += 1
             turn(tick)
 
-    def _calls(self, kind: Event | Part) -> list[Call]:
+    def _calls(self, kind: Event) -> list[Call]:
         """The calls of a kind of event, bound at its first occurrence."""
         if (found := self._bound.get(kind)) is None:
             found = self._bound[kind] = self._binder.bind_all(self._plan.block(kind))
         return found
-
-    def steps(self) -> dict[str, Steps]:
-        return {clock: a.steps for clock, a in self._binder.advancers.items()}
 
     def iterations(self) -> Iterations | None:
         return total(loop.counts for loop in self._binder.loops.values())

@@ -9,7 +9,7 @@ import numpy as np
 
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
-from hapticlink.orchestrator.holds.restorable import Restorable
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.record import LinkCounts
 from hapticlink.orchestrator.results.run_folder import RunFolder
@@ -53,14 +53,14 @@ class Simulation:
         self.isolated = isolated(system.fmus)
         self.instances = opened(system, self.signals, self.isolated, stack)
         stack.callback(self._dismiss)
-        repeated = system.coupling.step_control is not None or system.coupling.scheme == "iterated"
+        repeated = system.coupling.scheme == "iterated"
         self.step_checks = {
             fmu.name: StepCheck(self.instances[fmu.name])
             for fmu in (() if repeated else system.fmus)
             if fmu.name not in self.isolated and StepCheck.possible(fmu.description)
         }
         self.holds: dict[str, Hold]
-        self.springs: list[Restorable]
+        self.springs: list[EnergyTank]
         self.holds, self.springs = make_holds(system, self.signals)
         self.meters = Meters(system, self.signals)
         self.balance = Balance(system, self.signals)

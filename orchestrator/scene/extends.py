@@ -11,12 +11,12 @@ from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.scene import dropped_keys as dropping
 from hapticlink.orchestrator.scene import families, toml_keys
 from hapticlink.orchestrator.scene.find_scene import find, folder_of
-from hapticlink.orchestrator.scene.overrides import told
+from hapticlink.orchestrator.scene.overrides import as_typed
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import Path, Place, flatten, key_lines, place_of, whole
 
-LONGEST = 20
+MAX_EXTENDED = 20
 """Scenes that extend one another."""
 
 
@@ -71,8 +71,8 @@ def document(
         _, found = find(base, folder)
     except InputFault as fault:
         raise refuse(f"{fault}; a path is relative to this file") from None
-    if len(above) >= LONGEST:
-        raise refuse(f"the last of {LONGEST} scenes, each over the next: put some into one")
+    if len(above) >= MAX_EXTENDED:
+        raise refuse(f"the last of {MAX_EXTENDED} scenes, each over the next: put some into one")
     where = folder_of(base, folder)
     base = str(where / FilePath(base).name) if where else base
     so_far = (*(above or (name,)), str(FilePath(base).resolve()) if where else base)
@@ -80,26 +80,14 @@ def document(
         raise refuse(f"runs in a circle: {' -> '.join(so_far)}")
     below, below_places = document(found, base, where, so_far, base)
     below = dropping.taken(below, dropped, lambda message: refuse(message, "drop"))
-    below_places = {
-        p: at for p, at in below_places.items() if toml_keys.value(below, p) is not None
-    }
-    return _merged(below, data), _merged_places(below_places, below, places, data)
-
-
-def _merged_places(
-    base_places: Mapping[Path, Place],
-    base: Mapping[str, Any],
-    top_places: Mapping[Path, Place],
-    top: Mapping[str, Any],
-) -> dict[Path, Place]:
-    """File and line of each key of `_merged(base, top)`: none in `base` of what `top` replaces."""
-    replaced = set(_replaced(base, top))
-    kept = {
+    replaced = set(_replaced(below, data))
+    inherited = {
         path: place
-        for path, place in base_places.items()
-        if not any(path[:i] in replaced for i in range(1, len(path) + 1))
+        for path, place in below_places.items()
+        if toml_keys.value(below, path) is not None
+        and not any(path[:i] in replaced for i in range(1, len(path) + 1))
     }
-    return kept | dict(top_places)
+    return _merged(below, data), inherited | places
 
 
 def _replaced(base: Mapping[str, Any], top: Mapping[str, Any], at: Path = ()) -> Iterator[Path]:
@@ -123,7 +111,7 @@ def with_family(
     try:
         expanded = families.members(linkage)
     except families.FamilyError as error:
-        option = told(set_by[error.path]) if error.path in set_by else None
+        option = as_typed(set_by[error.path]) if error.path in set_by else None
         file, line = place_of(error.path, places)
         finding = Finding(".".join(map(str, error.path)), error.message, line, option, file)
         raise SceneFault(name, [finding]) from None

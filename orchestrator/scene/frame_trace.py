@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base.faults import InputFault
 
 LARGEST = 2**24
 """Bytes: some 10^6 frames, 4 h of them at 60 Hz."""
-LONGEST = Decimal("1e12")
+MAX_STAMP = Decimal("1e12")
 """Largest time stamp (s); seconds since 1970 are about 2e9."""
 
 
@@ -40,7 +40,7 @@ def frame_times(path: Path) -> list[float]:
             continue
         try:
             stamp = Decimal(field)
-            if not -LONGEST < stamp < LONGEST:
+            if not -MAX_STAMP < stamp < MAX_STAMP:
                 raise InvalidOperation
         except InvalidOperation:  # not a number, or a comparison with "nan"
             if number == 1:

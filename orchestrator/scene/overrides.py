@@ -67,19 +67,18 @@ def parse(option: str) -> tuple[tuple[str, ...], Any]:
     as `holds.virtual_environment.P_c=lead`. Raises InputFault where there is no `=` or no key.
     """
     names, equals, text = _key(option)
+    shown = f"--set {shortened(option)}"
     if not equals or not all(names):
-        said = f"--set {shortened(option)}"
-        raise InputFault(f"{said}: write key=value, e.g. --set graphics.rate=10")
+        raise InputFault(f"{shown}: write key=value, e.g. --set graphics.rate=10")
     if len(names) > DEEPEST:
-        said = f"--set {shortened(option)}"
-        raise InputFault(f"{said}: a key of {len(names)} names; none has more than {DEEPEST}")
+        raise InputFault(f"{shown}: a key of {len(names)} names; none has more than {DEEPEST}")
     try:
         return names, loads(f"value = {text}")["value"]
     except ValueError:
         return names, text.strip()
 
 
-def told(option: str) -> str:
+def as_typed(option: str) -> str:
     """The option as it stands on a command line; `--swap` for an FMU that replaces a block."""
     try:
         names, value = parse(option)

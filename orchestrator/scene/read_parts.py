@@ -69,8 +69,8 @@ def _reader(record: Any) -> pydantic.TypeAdapter[Any]:
         return reader
     except (pydantic.errors.PydanticUserError, NameError) as error:
         why = shortened(str(error).partition("\n")[0])
-        said = f"{record.__module__}: the annotations of {record.__name__} cannot be read: {why}"
-        raise InputFault(said) from error
+        message = f"{record.__module__}: the annotations of {record.__name__} cannot be read: {why}"
+        raise InputFault(message) from error
 
 
 def put(scene: Scene, found: Mapping[Path, Any]) -> Scene:

@@ -12,7 +12,7 @@ from hapticlink.components.blocks import BLOCKS
 from hapticlink.components.registry import Registry
 from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.rates import AnyRate, Seconds
+from hapticlink.orchestrator.scene.rates import AnyRate
 
 SCHEMES: Registry[Any] = Registry("scheme", {})
 """Coupling schemes, registered by `plan.schemes`, which this package may not import."""
@@ -132,24 +132,6 @@ class Latency:
     """Probability that a sample is lost."""
     seed: Seed = 0
     """Seed of the generator."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class StepControl:
-    """Adaptive communication step sizes."""
-
-    method: Literal["doubling", "ecco"]
-    """Error estimate. doubling: a step compared with two of half its size; ecco: the residual
-    energy of a step."""
-    tolerance: Annotated[float, Quantity("1", gt=0)]
-    """doubling: error per second of an output y, relative to its nominal (by default 1) + |y|;
-    ecco: residual energy relative to `energy`."""
-    min: Seconds
-    """Shortest step, accepted whatever its error."""
-    max: Seconds | None = None
-    """Longest step; by default a period of the rate."""
-    energy: Annotated[float, Quantity("J", gt=0)] | None = None
-    """Typical energy in the scene, which ecco needs."""
 
 
 @dataclass(frozen=True, kw_only=True)

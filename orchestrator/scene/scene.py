@@ -39,7 +39,6 @@ from hapticlink.orchestrator.scene.records import (
     PowerPort,
     Record,
     SetSpring,
-    StepControl,
     Wire,
 )
 from hapticlink.orchestrator.scene.scene_source import Origin, Source
@@ -127,8 +126,6 @@ class Scene:
     [coupling](coupling.md)."""
     iteration: Iteration = field(default_factory=Iteration)
     """Settings of coupling = "iterated"."""
-    step_control: StepControl | None = None
-    """Adaptive communication step sizes."""
     sensing: Literal["ideal", "encoders"] = "ideal"
     """ideal: controller and mechanism get the hand's wrench and the true pose; encoders: those that
     the observer estimates."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hapticlink.orchestrator.base.faults import Finding
-from hapticlink.orchestrator.scene.overrides import told
+from hapticlink.orchestrator.scene.overrides import as_typed
 from hapticlink.orchestrator.scene.toml_keys import Path, Place, place_of
 
 
@@ -37,7 +37,7 @@ class Origin:
         key = self._dotted(path)
         for length in range(len(path), 0, -1):
             if path[:length] in self.set_by:
-                return Finding(key, message, option=told(self.set_by[path[:length]]))
+                return Finding(key, message, option=as_typed(self.set_by[path[:length]]))
         file, line = place_of(path, self.source.places)
         return Finding(key, message, line or None, file=file)
 

@@ -1,4 +1,4 @@
-"""What the values of a scene may be at all, whoever wrote them: a file, an option, an SSP."""
+"""Ranges that no value of a scene may leave, in a file, an option or an SSP."""
 
 from __future__ import annotations
 

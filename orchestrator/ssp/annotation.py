@@ -32,15 +32,15 @@ def read(path: FilePath, root: Element) -> dict[str, Any]:
             except (ValueError, RecursionError) as error:
                 raise InputFault(f"{path}: annotation {ANNOTATION}: {error}") from error
             for where, message in _problems(found):
-                said = ": ".join((".".join(map(str, where)), message))
-                raise InputFault(f"{path}: annotation {ANNOTATION}: {said}")
+                problem = ": ".join((".".join(map(str, where)), message))
+                raise InputFault(f"{path}: annotation {ANNOTATION}: {problem}")
             assert isinstance(found, dict)
             return found
     return {}
 
 
 def _problems(found: Any) -> Iterator[Problem]:
-    """What is wrong, the first of which is told: later ones may presume it."""
+    """What is wrong, the first of which is reported: later ones may presume it."""
     yield from unsound(found)
     own = {f.name for f in fields(Scene)} - NOT_IN_ANNOTATION
     yield from _table(found, (), own | {"graphics", "fmu", "connection"})

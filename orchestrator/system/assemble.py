@@ -73,7 +73,6 @@ def from_scene(
         Coupling(
             scene.coupling,
             scene.iteration,
-            scene.step_control,
             scene.substeps,
             (*scene.get_after_set, *_read_again(scene, ours)),
         ),
@@ -122,6 +121,6 @@ def _path(wire: Wire, paths: Mapping[str, Keys]) -> Keys:
     return next(((*paths[end], "replaces") for end in ends if end in paths), ())
 
 
-def _has_output(units: Iterable[Fmu], condition: Condition) -> bool:
-    named = (u for u in units if u.name == condition.fmu)
+def _has_output(fmus: Iterable[Fmu], condition: Condition) -> bool:
+    named = (u for u in fmus if u.name == condition.fmu)
     return any(s.name == condition.variable for u in named for s in u.description.outputs)

@@ -141,7 +141,7 @@ def misfit(
         )
     if needs == "power" and not carries_power(c, power):
         return (
-            f"it carries no power that is known: write a [[power]] that pairs the effort "
+            f"it is not a declared power connection: write a [[power]] that pairs the effort "
             f"{c.target}.{c.target_port} with a displacement (docs/passivity.md, Energy), or take "
             "another hold"
         )

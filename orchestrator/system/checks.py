@@ -20,25 +20,25 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 def unfit(
     scene: Scene,
-    units: Iterable[Fmu],
+    fmus: Iterable[Fmu],
     connections: Iterable[Connection],
     refused: Iterable[Refused],
     sets: Iterable[SetSpring],
 ) -> Iterator[Problem]:
     """A finding for each name in these tables that the system does not have, and for each entry
     that does not fit it; `sets` are the springs of the scene and of its FMUs."""
-    by_name = {u.name: u for u in units}
-    found = [c for c in connections if not c.initial]
+    by_name = {u.name: u for u in fmus}
+    held = [c for c in connections if not c.initial]
     for table in ("holds", "delays", "kinds"):
         for key in getattr(scene, table):
-            known = list(dict.fromkeys(name for c in found for name in names(c)))
+            known = list(dict.fromkeys(name for c in held for name in names(c)))
             if key not in known:
                 hint = near(key, known)
                 if hint.startswith("there are"):
-                    hint = f"there are {', '.join(c.name for c in found) or 'none'}"
+                    hint = f"there are {', '.join(c.name for c in held) or 'none'}"
                 yield (table, key), f"is no connection of this scene; {hint}"
     for key, kind in scene.kinds.items():
-        for c in (c for c in found if key in names(c)):
+        for c in (c for c in held if key in names(c)):
             source = by_name[c.source].description
             if why := misfit(kind, [source.unit(s) for s in c.outputs]):
                 message = f"{c.source}.{c.source_port} {why}; take another kind, or leave it out"
@@ -90,11 +90,11 @@ def _refused(
             yield path, f"{r.hold!r} does not fit {r.connection.name}: {r.reason}"
 
 
-def _power(scene: Scene, i: int, p: PowerPort, units: Mapping[str, Fmu]) -> Iterator[Problem]:
+def _power(scene: Scene, i: int, p: PowerPort, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     sizes = {}
     for end, causality in (("effort", "input"), ("displacement", "output")):
         fmu, _, name = getattr(p, end).partition(".")
-        entries = units[fmu].description.port(name, causality) if fmu in units else ()
+        entries = fmus[fmu].description.port(name, causality) if fmu in fmus else ()
         sizes[end] = len(entries)
         if not entries:
             yield ("power", i, end), f"there is no {causality} {getattr(p, end)}"
@@ -106,27 +106,27 @@ def _power(scene: Scene, i: int, p: PowerPort, units: Mapping[str, Fmu]) -> Iter
         yield ("power", i), message
 
 
-def step_sizes(units: Iterable[Fmu], timeline: Timeline) -> Iterator[Problem]:
+def step_sizes(fmus: Iterable[Fmu], timeline: Timeline) -> Iterator[Problem]:
     """A finding for each FMU with a fixed communication step size on a clock whose steps vary."""
     seconds = timeline.seconds
-    for unit in units:
-        clock = timeline.clock(unit.clock)
-        if clock.first == clock.period or varies_step(unit.description):
+    for fmu in fmus:
+        clock = timeline.clock(fmu.clock)
+        if clock.first == clock.period or varies_step(fmu.description):
             continue
         least = seconds(min(clock.first, clock.shortest))
         yield (
             clock.key,
-            f"{unit.name} takes steps of one size only ({VARIABLE_STEP} is not true), but its "
+            f"{fmu.name} takes steps of one size only ({VARIABLE_STEP} is not true), but its "
             f"steps here are {least:.6g} to {seconds(clock.longest):.6g} s: take a fixed rate, "
             "with neither a phase nor align = 'tick'",
         )
 
 
 def iterated(
-    scene: Scene, units: Iterable[Fmu], connections: Iterable[Connection]
+    scene: Scene, fmus: Iterable[Fmu], connections: Iterable[Connection]
 ) -> Iterator[Problem]:
     """A finding where coupling "iterated" has no connected plants of one rate to iterate."""
-    plants = {u.name: u.clock for u in units if not u.sampled}
+    plants = {u.name: u.clock for u in fmus if not u.sampled}
     between = any(
         c.source in plants and plants[c.source] == plants.get(c.target) and not c.initial
         for c in connections

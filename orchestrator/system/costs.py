@@ -39,7 +39,7 @@ def costs(scene: Scene, timeline: Timeline, *, skip: bool = True) -> tuple[Block
     """
     tick = timeline.clock("haptics").longest
     clocks = {clock.name for clock in timeline.clocks}
-    found = []
+    rows = []
     for block in blocks(scene, skip=skip).built:
         # A block that the scene skips may have a rate that no clock runs at.
         clock = timeline.of.get(block.name, str(block.rate))
@@ -48,5 +48,5 @@ def costs(scene: Scene, timeline: Timeline, *, skip: bool = True) -> tuple[Block
             counted = cost(block.block, block.settings)
         except FmuError as error:
             raise InputFault(str(error)) from error
-        found.append(BlockCost(block.name, counted, tick / period))
-    return tuple(found)
+        rows.append(BlockCost(block.name, counted, tick / period))
+    return tuple(rows)

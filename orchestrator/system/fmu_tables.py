@@ -33,51 +33,51 @@ def fmus(
     for blocks. Findings are appended to `problems`."""
     for i, fmu in enumerate(scene.fmu):
         try:
-            found = _described(files.get(fmu.name) or FilePath(fmu.path or ""), fmu)
+            description = _described(files.get(fmu.name) or FilePath(fmu.path or ""), fmu)
         except InputFault as fault:
             problems.append((("fmu", i, "path"), str(fault)))
             continue
         block = replaced.get(fmu.name)
         if fmu.timing:
-            found = replace(found, timing=fmu.timing)
-        elif block and not found.declares_timing:
-            found = replace(found, timing=block.timing)
+            description = replace(description, timing=fmu.timing)
+        elif block and not description.declares_timing:
+            description = replace(description, timing=block.timing)
         for name, derivative in fmu.derivatives.items():
             try:
-                found = _with_derivative(found, name, derivative)
+                description = _with_derivative(description, name, derivative)
             except ValueError as error:
                 problems.append((("fmu", i, "derivatives", name), str(error)))
         starts: list[Starts] = []
         for name, value in fmu.start.items():
             try:
-                starts.append(_start(found, name, value))
+                starts.append(_start(description, name, value))
             except ValueError as error:
                 problems.append((("fmu", i, "start", name), str(error)))
-        yield fmu, found, sum(starts, ())
+        yield fmu, description, sum(starts, ())
 
 
 def _described(path: FilePath, fmu: ForeignFmu) -> Description:
     """The FMU with the sizes that `start` gives it by structural parameters. Raises InputFault."""
-    found = described(path)
-    structural = {s.name for s in found.scalars if s.structural}
+    description = described(path)
+    structural = {s.name for s in description.scalars if s.structural}
     sizes = {n: v for n, v in fmu.start.items() if n in structural and type(v) is int}
-    return describe(path, sizes) if sizes else found
+    return describe(path, sizes) if sizes else description
 
 
-def _with_derivative(found: Description, name: str, derivative: str) -> Description:
+def _with_derivative(description: Description, name: str, derivative: str) -> Description:
     """The description with `derivative` declared as the derivative of `name`. Raises ValueError
     unless both are outputs of one size."""
-    entries, slopes = outputs(found, name), outputs(found, derivative)
+    entries, slopes = outputs(description, name), outputs(description, derivative)
     if len(entries) != len(slopes):
         raise ValueError(f"{derivative} has {len(slopes)} entries for the {len(entries)} of {name}")
     declared = {a.name: b.name for a, b in zip(entries, slopes, strict=True)}
-    return replace(found, derivatives={**found.derivatives, **declared})
+    return replace(description, derivatives={**description.derivatives, **declared})
 
 
-def _start(found: Description, name: str, value: Value) -> Starts:
+def _start(description: Description, name: str, value: Value) -> Starts:
     """The start value of each scalar of `name`. Raises ValueError for a name that takes no start
     value, and for a value of a different size, type or range."""
-    scalars = settable(found, name, start=True)
+    scalars = settable(description, name, start=True)
     values = tuple(_entries(value, scalars[-1].indices, name))
     if len(values) != len(scalars):
         raise ValueError(f"{len(values)} values for the {len(scalars)} of {name}")
@@ -92,29 +92,31 @@ def _entries(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
         yield from value
     else:
         rows, size = (shape[0], math.prod(shape[1:])) if shape else (1, 1)
-        found = [tuple(_entries(row, shape[1:], name)) for row in value]
-        sizes = [len(row) for row in found]
+        entries = [tuple(_entries(row, shape[1:], name)) for row in value]
+        sizes = [len(row) for row in entries]
         if sizes != [size] * rows:
             raise ValueError(f"rows of {sizes} values for the {rows} rows of {size} of {name}")
-        yield from chain.from_iterable(found)
+        yield from chain.from_iterable(entries)
 
 
-def outputs(found: Description, name: str) -> tuple[Scalar, ...]:
+def outputs(description: Description, name: str) -> tuple[Scalar, ...]:
     """The scalars of the output `name`. Raises ValueError where there is no such output."""
-    entries = found.port(name, "output")
+    entries = description.port(name, "output")
     if not entries:
-        others = [s for s in found.scalars if name in (s.name, s.port)]
+        others = [s for s in description.scalars if name in (s.name, s.port)]
         if others:
             raise ValueError(f"{name} is no output, its causality is {others[0].causality}")
-        raise ValueError(unknown("output", name, dict.fromkeys(s.port for s in found.outputs)))
+        raise ValueError(
+            unknown("output", name, dict.fromkeys(s.port for s in description.outputs))
+        )
     return entries
 
 
-def settable(found: Description, name: str, start: bool = False) -> tuple[Scalar, ...]:
+def settable(description: Description, name: str, start: bool = False) -> tuple[Scalar, ...]:
     """The scalars of the input or parameter `name`: those that can be connected, or with `start`,
     those that take a start value. Raises ValueError where there are none."""
     able = attrgetter("startable" if start else "settable")
-    every = (*found.scalars, *found.strings)
+    every = (*description.scalars, *description.strings)
     named = [s for s in every if name in (s.name, s.port)]
     if not named:
         known = dict.fromkeys(s.port for s in filter(able, every))
@@ -125,7 +127,7 @@ def settable(found: Description, name: str, start: bool = False) -> tuple[Scalar
     what = what if named[0].variability != "constant" else f"constant {what}"
     hint = ""
     if start:
-        others = ", ".join(dict.fromkeys(s.port for s in found.scalars if able(s))) or "none"
+        others = ", ".join(dict.fromkeys(s.port for s in description.scalars if able(s))) or "none"
         hint = (
             ", and the FMU gives it no start value (initial exact or approx); variables that take "
             f"one: {others}"

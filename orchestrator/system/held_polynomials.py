@@ -50,8 +50,8 @@ def split(values: Vector, width: float) -> tuple[Vector, Vector]:
     """Derivatives (order, n), j! c_j / H^j with H = `width` (s), and mean (n,) of a polynomial,
     from its values (order + 1, n) at equidistant instants from the beginning to the end of a
     step."""
-    found = coefficients(len(values) - 1) @ values
+    scaled = coefficients(len(values) - 1) @ values
     orders = range(1, len(values))
     scales = [factorial(j) / width**j for j in orders]
     shares = [1 / (1 + j) for j in (0, *orders)]
-    return found[1:] * np.array(scales)[:, None], np.array(shares) @ found
+    return scaled[1:] * np.array(scales)[:, None], np.array(shares) @ scaled

@@ -39,7 +39,7 @@ def replacements(
     """By replaced block. `rows` are all connections that the haptic loop may have."""
     rows, connections = tuple(rows), tuple(connections)
     described = {u.name: u.description for u in fmus}
-    ports = {name: {s.port for s in found.scalars} for name, found in described.items()}
+    ports = {name: {s.port for s in description.scalars} for name, description in described.items()}
 
     def lost(name: str, block: Component) -> Iterator[str]:
         variables = (*block.inputs, *block.parameters, *block.outputs)

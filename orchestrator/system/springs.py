@@ -50,42 +50,42 @@ def misfit(
     c: Connection,
     springs: Iterable[SetSpring],
     connections: Collection[Connection],
-    units: Mapping[str, Fmu],
+    fmus: Mapping[str, Fmu],
 ) -> str | None:
     """Why a hold cannot limit the energy of the spring that a connection sets; None if it can."""
-    found = spring(c, springs)
-    if found is None:
+    own = spring(c, springs)
+    if own is None:
         return (
             f"it sets no spring whose energy is known: write a [[spring]] with {_end(c)} as its "
             "set_position or set_velocity (docs/passivity.md, pspm), or take another hold"
         )
-    fmu, _, name = found.position.partition(".")
-    near = next((k for k in connections if _end(k) == found.position and not k.initial), None)
-    if near is None and not units[fmu].description.port(name, "output"):
-        return f"the near end of its spring, {found.position}, is connected to nothing"
-    if near and (near.hold or units[near.source].clock != units[near.target].clock):
-        return f"{found.position} is held too: the near end of its spring must be read unheld"
-    if any(gain < 0 for gain in (*found.stiffness, *found.damping)):
-        return f"a gain of its spring is below 0: {[*found.stiffness]}, {[*found.damping]}"
+    fmu, _, name = own.position.partition(".")
+    near = next((k for k in connections if _end(k) == own.position and not k.initial), None)
+    if near is None and not fmus[fmu].description.port(name, "output"):
+        return f"the near end of its spring, {own.position}, is connected to nothing"
+    if near and (near.hold or fmus[near.source].clock != fmus[near.target].clock):
+        return f"{own.position} is held too: the near end of its spring must be read unheld"
+    if any(gain < 0 for gain in (*own.stiffness, *own.damping)):
+        return f"a gain of its spring is below 0: {[*own.stiffness]}, {[*own.damping]}"
     if any(s.conversion != SAME for k in (c, near) if k for s in k.inputs):
         return f"a connection to its spring converts units: connect signals in the units of {fmu}"
     for other in connections:
-        if _end(other) in found.ports and not other.initial and other.hold != c.hold:
+        if _end(other) in own.ports and not other.initial and other.hold != c.hold:
             held = f"held by {other.hold!r}" if other.hold else "not held"
             return f"{_end(other)} sets the same spring and is {held}: give both {c.hold!r}"
     return None
 
 
-def unfit(scene: Scene, units: Mapping[str, Fmu]) -> Iterator[Problem]:
+def unfit(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     """A finding for each [[spring]] with ports that do not exist or that do not fit together."""
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]
-        size = _size(s.set_position, units, "input")
+        size = _size(s.set_position, fmus, "input")
         for end, kinds in _KINDS.items():
             port = getattr(s, end)
             if not port:
                 continue
-            if not (entries := _size(port, units, *kinds)):
+            if not (entries := _size(port, fmus, *kinds)):
                 yield ("spring", i, end), f"there is no {' or '.join(kinds)} {port}"
             elif port.partition(".")[0] != fmu:
                 message = f"{port} is not of {fmu}: the ends of a spring are ports of one FMU"
@@ -104,6 +104,6 @@ def _end(c: Connection) -> str:
     return f"{c.target}.{c.target_port}"
 
 
-def _size(end: str, units: Mapping[str, Fmu], *causalities: str) -> int:
+def _size(end: str, fmus: Mapping[str, Fmu], *causalities: str) -> int:
     fmu, _, name = end.partition(".")
-    return len(units[fmu].description.port(name, *causalities)) if fmu in units else 0
+    return len(fmus[fmu].description.port(name, *causalities)) if fmu in fmus else 0

@@ -17,7 +17,6 @@ from hapticlink.orchestrator.scene.records import (
     Latency,
     PowerPort,
     SetSpring,
-    StepControl,
 )
 
 
@@ -85,7 +84,6 @@ class Coupling:
 
     scheme: str
     iteration: Iteration = field(default_factory=Iteration)
-    step_control: StepControl | None = None
     substeps: Mapping[str, int] = field(default_factory=dict)
     """By plant, the doSteps per communication step, held inputs updated before each."""
     get_after_set: tuple[str, ...] = ()

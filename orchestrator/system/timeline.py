@@ -34,9 +34,9 @@ def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
     given = clocks(scene, planned)
     exactly = [p for p in given.paces.values() if not p.on_ticks]
     spans = [span for p in exactly for span in (_period(p), p.first or _period(p))]
-    base = common_base([*spans, *([exact(scene.step_control.min)] if scene.step_control else [])])
+    base = common_base(spans)
     a_tick = int(haptic / base)
-    found = []
+    stepped = []
     for name, pace in given.paces.items():
         if not pace.on_ticks:
             starts: Sequence[int] = periodic(_period(pace), base, steps * a_tick, pace.first)
@@ -49,8 +49,8 @@ def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
                     starts = tuple(frame * a_tick for frame in frames)
             except ValueError as error:
                 raise SceneFault(scene.title, [scene.place(pace.path, str(error))]) from error
-        found.append(Clock(name, starts, pace.path))
-    return Timeline(base, steps * a_tick, tuple(found), given.of)
+        stepped.append(Clock(name, starts, pace.path))
+    return Timeline(base, steps * a_tick, tuple(stepped), given.of)
 
 
 def _period(pace: Pace) -> Fraction:
@@ -94,11 +94,11 @@ def clocks(scene: Scene, planned: Blocks | None = None) -> Clocks:
     """The clocks of `scene`: `haptics` always, others only where an FMU runs at them."""
     paths: dict[str, Path] = {fmu.name: ("fmu", i, "rate") for i, fmu in enumerate(scene.fmu)}
     rates = (planned or blocks(scene)).rates
-    found = {fmu: _of(fmu, rate, paths.get(fmu, ()), scene) for fmu, rate in rates.items()}
+    named = {fmu: _of(fmu, rate, paths.get(fmu, ()), scene) for fmu, rate in rates.items()}
     paces = {"haptics": _pace("haptics", (), scene)}
-    for name, pace in sorted(found.values(), key=lambda clock: clock[0] != "graphics"):
+    for name, pace in sorted(named.values(), key=lambda clock: clock[0] != "graphics"):
         paces.setdefault(name, pace)
-    return Clocks({fmu: name for fmu, (name, _) in found.items()}, paces)
+    return Clocks({fmu: name for fmu, (name, _) in named.items()}, paces)
 
 
 def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> tuple[str, Pace]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
-from hapticlink.orchestrator.scene.overrides import told
+from hapticlink.orchestrator.scene.overrides import as_typed
 
 
 @dataclass(frozen=True)
@@ -44,4 +44,4 @@ class Runs:
 
 def command(scene: str, *options: str) -> str:
     """The command line of a run."""
-    return " ".join(["hapticlink run", scene, *map(told, options)])
+    return " ".join(["hapticlink run", scene, *map(as_typed, options)])

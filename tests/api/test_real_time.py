@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from tests.orchestrator.foreign_fmus import python_fmu, scene
 from tests.orchestrator.wall_clock import MS, WallClock
@@ -42,6 +44,64 @@ def once(at: float, change: Turn) -> Turn:
             change(live)
 
     return turn
+
+
+NUMBERS = (-1.0, -1, float("nan"), float("inf"), -float("inf"), 1e30, "x", None, True, [1], 2**70)
+
+
+@pytest.mark.parametrize("value", NUMBERS, ids=repr)
+def test_what_no_scene_may_have_is_refused_while_it_runs(value: Any) -> None:
+    """And the run goes on as if it had not been asked for."""
+    refused: list[str] = []
+
+    def turn(live: hl.RealTime) -> None:
+        connection = "virtual_environment.Lambda_inv"
+        asked: dict[str, Callable[[], object]] = {
+            "delay": lambda: live.hold(connection, None, value),
+            "rate": lambda: live.rate("graphics", value),
+            "jitter": lambda: live.rate("graphics", 20, value),
+            "seed": lambda: live.rate("graphics", 20, 0.1, value),
+            "ticks": lambda: live.step(value),
+            "hand.wrench": lambda: live.set("hand.wrench", value),
+        }
+        for name, ask in asked.items():
+            if value is None and name == "delay":
+                continue  # which leaves it
+            with pytest.raises(InputFault, match=name):
+                ask()
+            refused.append(name)
+        live.stop()
+
+    made = ran("closed-loop", turn, "duration=0.1")
+    assert len(refused) >= 5
+    assert made.run["real_time"]["changes"] == []
+
+
+@pytest.mark.parametrize("every", [float("nan"), -1.0, "x"])
+def test_turns_come_after_a_time(every: Any) -> None:
+    with pytest.raises(InputFault, match="every"):
+        hl.RealTime("pendulum").run(lambda live: None, every=every)
+
+
+def test_before_a_run_there_is_nothing_to_read_or_change() -> None:
+    live = hl.RealTime("closed-loop")
+    asked: tuple[Callable[[], object], ...] = (
+        lambda: live.time,
+        lambda: live["hand.F"],
+        live.energies,
+        live.report,
+        live.holds,
+        live.reset,
+        live.stop,
+        live.step,
+        lambda: live.system,
+        lambda: live.rate("graphics", 10),
+        lambda: live.hold("hand.F", "zoh"),
+        lambda: live.set("hand.wrench", 0),
+    )
+    for ask in asked:
+        with pytest.raises(InputFault, match="the scene does not run yet"):
+            ask()
 
 
 def test_outputs_are_read_and_a_parameter_is_set_from_the_next_step_on() -> None:

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.fmus.versions import install_command
 from hapticlink.visualization.figures import run_figures
 from tests.shared_fixtures import sets, status
 
 SHORT = {"duration": 0.1, "graphics.rate": 40}
 FAR = {"linkage.start_velocity.slide": 1e308, "linkage.start.slide": 1.7e308}
 """A pose that is finite, and overflows after some steps."""
+
+
+@pytest.fixture(scope="module")
+def short() -> hl.Run:
+    return hl.run("closed-loop", SHORT)
 
 
 def same(one: hl.Run, two: hl.Run) -> bool:
@@ -51,7 +59,7 @@ def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
 def test_tables_too_large_are_not_read_back_and_that_is_told(
     bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("hapticlink.api.runs.MOST", 1000)
+    monkeypatch.setattr("hapticlink.api.runs.MAX_TABLE_BYTES", 1000)
     assert status("run", bar, "--out", tmp_path / "out") == 0
     assert "tables of more than 1000 bytes are not read back and drawn" in caplog.text
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"haptics.csv", "run.json"}
@@ -66,8 +74,8 @@ def test_options_of_a_scene_object_act(bar: Path) -> None:
     assert ended.run["scene"]["duration"] == 0.125
 
 
-def test_signals_go_by_name_each_with_its_times() -> None:
-    found = hl.run("closed-loop", SHORT)
+def test_signals_go_by_name_each_with_its_times(short: hl.Run) -> None:
+    found = short
     assert list(found) == ["haptics", "graphics"]
     for name, rate, shape in (
         ("haptic_device.M", "haptics", (3, 3)),
@@ -90,20 +98,39 @@ def test_signals_go_by_name_each_with_its_times() -> None:
     assert "4 rows of time, virtual_environment.x" in repr(found)
 
 
-def test_tracking_is_what_lies_between_the_two_poses() -> None:
-    found = hl.run("closed-loop", SHORT)
-    apart = found["virtual_mechanism.x"] - found["haptic_device.x_true"]
-    time, distance, angle = found.tracking()
-    assert np.array_equal(time, found.time("haptics"))
-    np.testing.assert_allclose(distance, 1e3 * np.linalg.norm(apart[:, :2], axis=1), rtol=1e-12)
-    np.testing.assert_allclose(angle, np.abs(apart[:, 2]), rtol=0, atol=1e-15)
-    line = found.figures()["distance"].axes[0].lines[0]
+def test_tracking_is_what_lies_between_the_two_poses(short: hl.Run) -> None:
+    error = short["virtual_mechanism.x"] - short["haptic_device.x_true"]
+    time, distance, angle = short.tracking()
+    assert np.array_equal(time, short.time("haptics"))
+    np.testing.assert_allclose(distance, 1e3 * np.linalg.norm(error[:, :2], axis=1), rtol=1e-12)
+    np.testing.assert_allclose(angle, np.abs(error[:, 2]), rtol=0, atol=1e-15)
+    line = short.figures()["distance"].axes[0].lines[0]
     assert np.array_equal(line.get_ydata(), distance)
 
 
-def test_a_frame_is_the_table_over_its_times() -> None:
+def test_measures_are_those_of_the_samples_until_a_time(short: hl.Run) -> None:
+    time, distance, angle = short.tracking()
+    for measures, count in ((short.measures(), len(time)), (short.measures(time[9]), 10)):
+        error = measures.tracking[""]
+        assert error.max_mm == distance[:count].max()
+        assert error.rms_mm == pytest.approx(np.sqrt(np.mean(distance[:count] ** 2)), rel=1e-14)
+        assert error.max_rad == angle[:count].max()
+        assert error.end_s == time[count - 1]
+        force = np.hypot(*short["controller.F_drift"][:count, :2].T)
+        assert measures.forces["virtual coupling, F_drift"] == force.max()
+        assert measures.closure_m == short["virtual_mechanism.closure_error"][:count].max()
+    counts = measures.constrained
+    assert counts
+    frames = short["virtual_environment.n_constraints"]
+    frames = frames[short.time("virtual_environment.n_constraints") <= time[9]]
+    assert counts.samples == {n: np.count_nonzero(frames == n) for n in {*frames}}
+    assert measures.port
+    assert asdict(measures.port) == short.run["user_port"]
+
+
+def test_a_frame_is_the_table_over_its_times(short: hl.Run) -> None:
     pandas = pytest.importorskip("pandas")
-    found = hl.run("closed-loop", SHORT)
+    found = short
     frame = found.frame("graphics")
     assert isinstance(frame, pandas.DataFrame)
     assert frame.index.name == "time"
@@ -119,7 +146,7 @@ def test_without_pandas_a_frame_says_what_to_install(
     bar: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(hl.InputFault, match="needs pandas: pip install pandas"):
+    with pytest.raises(hl.InputFault, match=re.escape(install_command("pandas"))):
         hl.run(bar).frame("haptics")
 
 

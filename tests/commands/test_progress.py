@@ -21,7 +21,7 @@ def test_a_long_command_tells_how_long_it_took(
         with progress.timed("bench it", "about 3 minutes"):
             pass
     told = re.findall("duration (.*)", capsys.readouterr().err)
-    known = "up to 1.5 minutes here, less what is done already"
+    known = "up to 1.5 minutes here, less if partly finished before"
     assert told == ["about 3 minutes", known, known]
 
 
@@ -29,6 +29,6 @@ def test_an_interrupted_command_keeps_no_duration(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
-    with pytest.raises(Fault, match="what was finished is kept"), progress.timed("bench it"):
+    with pytest.raises(Fault, match="finished runs are kept"), progress.timed("bench it"):
         raise Interrupted
     assert not [*tmp_path.iterdir()]

@@ -11,7 +11,7 @@ import pytest
 
 from hapticlink.orchestrator.results import tables
 
-RUN = f"{sys.executable} -m hapticlink run pendulum --set duration=0.01 --out out"
+RUN = f"{sys.executable} -m hapticlink run pendulum --set duration=0.01 --no-figures --out out"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell's redirections")

@@ -18,9 +18,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipkinc
 
 from hapticlink.commands import main
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 
 G = 9.81
 

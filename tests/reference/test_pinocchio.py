@@ -15,14 +15,13 @@ from hypothesis import strategies as st
 
 from benchmarks.mechanisms import chain, n_four_bar
 from benchmarks.peers import pinocchio_peer
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import parameters
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.mechanisms import five_bar, linkages
 
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 
 H = 1 / 512
 

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.linkage import Loop
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.reference.absolute_coordinates import Absolute
 
 H = 1 / 512

@@ -10,13 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from hapticlink.analysis.findings.user_port import user_port
-from hapticlink.components.blocks.virtual_environment import virtual_environment
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Mechanism
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
-from tests.blocks import Running
+from tests.blocks import Running, virtual_environment, virtual_mechanism
 from tests.reference.absolute_coordinates import Absolute
 
 SCENES = {"two-users": "left", "pantograph": "pen"}

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from hapticlink.analysis.findings.limits import FELT
+from hapticlink.analysis.findings.limits import NOTICEABLE_J
 from hapticlink.orchestrator.base.loop_names import (
     CLOSURE_ERROR,
     CONSTRAINT_COUNTS,
@@ -124,9 +124,9 @@ class Frames:
 
 def light(generated: float, put_in: float) -> str:
     """What the energies (J) of the last second say: red where sampling and holding generated more
-    than hands and mechanism put in, as in the judgement of a whole run, by more than is `FELT`;
-    amber from a tenth of that on; green otherwise."""
-    most = max(put_in, 0.0) + FELT
+    than hands and mechanism put in, as in the judgement of a whole run, by more than
+    `NOTICEABLE_J`; amber from a tenth of that on; green otherwise."""
+    most = max(put_in, 0.0) + NOTICEABLE_J
     return "red" if generated > most else "amber" if generated > 0.1 * most else "green"
 
 

@@ -12,9 +12,9 @@ from contextlib import suppress
 from typing import IO, Any
 
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.fmi.worker_process import APART
+from hapticlink.orchestrator.fmi.worker_process import OWN_GROUP
 
-MOST = 256
+MAX_WAITING = 256
 """Messages that wait in either direction; of older ones frames are dropped."""
 ENDING = 3.0
 """Seconds that the server may take to end."""
@@ -24,15 +24,18 @@ class Link:
     """The server's process, seen from the haptic loop. A context manager that ends it."""
 
     def __init__(self, module: str, *arguments: str) -> None:
-        command = [sys.executable, "-P", "-m", module, *arguments]
+        command = [sys.executable, "-P", "-m", module]  # arguments would be for all to read
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **APART
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **OWN_GROUP
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._requests, self._answers = self._process.stdin, self._process.stdout
-        self._sent: queue.Queue[bytes | None] = queue.Queue(MOST)
-        self._received: deque[Any] = deque(maxlen=MOST)
+        with suppress(OSError):  # it has ended, which `first` tells
+            pickle.dump(arguments, self._requests)
+            self._requests.flush()
+        self._sent: queue.Queue[bytes | None] = queue.Queue(MAX_WAITING)
+        self._received: deque[Any] = deque(maxlen=MAX_WAITING)
         self.first: Any = read(self._answers)
         """The first message of the server, None where it ended without one."""
         threading.Thread(target=self._receive, daemon=True).start()
@@ -46,7 +49,7 @@ class Link:
 
     def send(self, message: Any, frame: bool = False) -> None:
         """Send a message; a frame is dropped where the server is behind."""
-        if not (frame and self._sent.qsize() > MOST // 8):
+        if not (frame and self._sent.qsize() > MAX_WAITING // 8):
             with suppress(queue.Full):
                 self._sent.put_nowait(pickle.dumps(message))
 

@@ -1,4 +1,4 @@
-"""What a page may say, as JSON; anything else is refused as a whole."""
+"""The messages that a page may send, as JSON; anything else is refused as a whole."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationEr
 
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Place = Annotated[Number, Field(ge=-1e3, le=1e3)]
+Coordinate = Annotated[Number, Field(ge=-1e3, le=1e3)]
 Name = Annotated[str, Field(max_length=200)]
-MOST = 4096
-"""Bytes of a message."""
+MAX_CHARACTERS = 4096
+"""Of a message."""
 
 
 @dataclass(frozen=True)
 class Hand:
-    """The hand pulls to `at` (x, y m), or has let go; user: the point that it holds, "" for the
-    first user's."""
+    """The mouse pulls a handle, or releases it."""
 
     __pydantic_config__ = STRICT
     type: Literal["hand"]
-    at: tuple[Place, Place] | None
+    at: tuple[Coordinate, Coordinate] | None
+    """Where it pulls to, (x, y) in m; None where it releases the handle."""
     user: Name = ""
+    """The point whose handle it is, "" for that of the first user."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,8 @@ class Topology:
 
 @dataclass(frozen=True)
 class Time:
-    """What becomes of time; record: begin anew with a recording, or end it."""
+    """A button: pause, resume, step by one haptic tick, begin anew at t = 0 (reset), or begin anew
+    with a recording, or end it (record)."""
 
     __pydantic_config__ = STRICT
     type: Literal["time"]
@@ -94,16 +96,16 @@ class Time:
 
 
 Message = Hand | Rate | Jitter | Hold | Delay | Gain | Topology | Time
-OF = ("user", "connection", "name")
-"""What tells messages of a type apart."""
+ADDRESSES = ("user", "connection", "name")
+"""Fields that name what a message of its type is about."""
 _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Discriminator("type")])
 
 
 def newest(received: Sequence[Message]) -> list[Message]:
-    """The messages without those that a later one undoes: the newest of each control and user."""
+    """The messages without those that a later one replaces: the newest of each control and user."""
     kept: dict[object, Message] = {}
     for i, message in enumerate(received):
-        of = next((v for k in OF if (v := getattr(message, k, None)) is not None), "")
+        of = next((v for k in ADDRESSES if (v := getattr(message, k, None)) is not None), "")
         key: object = i if isinstance(message, Time) else (message.type, of)
         kept.pop(key, None)
         kept[key] = message
@@ -111,11 +113,11 @@ def newest(received: Sequence[Message]) -> list[Message]:
 
 
 def parse(text: str | bytes) -> Message:
-    """The message of a page. Raises ValueError, which says what is wrong."""
+    """Parse the message of a page. Raises ValueError, with the place and kind of the mistake."""
     if isinstance(text, bytes):
         raise ValueError("a message is text")
-    if len(text) > MOST:
-        raise ValueError(f"a message has at most {MOST} characters")
+    if len(text) > MAX_CHARACTERS:
+        raise ValueError(f"a message has at most {MAX_CHARACTERS} characters")
     try:
         return _ADAPTER.validate_json(text)
     except ValidationError as error:

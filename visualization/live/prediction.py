@@ -22,33 +22,34 @@ from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live.controls import Settings
 
-MOST = {"native": 1e8, "python": 1e7}
+MAX_COST = {"native": 1e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map
 is computed, by the packaging of the FMUs; 1e7 take about 2 s of processor time with native ones."""
 SEARCH = 0.25
 """Simulated time (s) within which an equilibrium is sought."""
 RATES = range(1, 201)
-"""Graphics rates (Hz) that may be told to be quicker."""
+"""Graphics rates (Hz) that may be suggested in place of a slow one."""
 
 Parameters = Mapping[str, Sequence[float]]
 """Tunable parameters, `fmu.port`, with their values."""
 
 
 def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
-    """The verdict, "" where there is none, what is said of it, and why."""
+    """`verdict` ("" where there is none), `said`, which is its one line on the page, and `why`, its
+    tooltip."""
     try:
         found = judged(scene, settings, parameters)
     except Fault as fault:
         short = str(fault).partition(";")[0].partition("\n")[0]
         return {"verdict": "", "said": f"not computed: {short}", "why": str(fault)}
-    return {"verdict": found.verdict, "said": _said(found), "why": "\n".join(found.lines())}
+    return {"verdict": found.verdict, "said": _summary(found), "why": "\n".join(found.lines())}
 
 
 def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Stability:
-    """The stability of the run. Raises InputFault where the map would take long, and as
+    """The stability of the run. Raises InputFault where its computation would take long, and as
     `stability` does."""
     if settings.jitter:
-        raise InputFault("frames of random lengths never repeat; set the jitter to 0")
+        raise InputFault("with jitter the system never repeats; set the jitter to 0")
     changed = _at_rate(scene, settings.rate)
     with (
         interrupt.held(),
@@ -60,7 +61,7 @@ def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Stabilit
         system = replace(
             whole,
             timeline=timeline(changed),
-            fmus=tuple(_with(fmu, parameters) for fmu in whole.fmus),
+            fmus=tuple(_with_parameters(fmu, parameters) for fmu in whole.fmus),
             connections=tuple(
                 held_by(c, s.holds.get(c.name), s.delays.get(c.name)) for c in whole.connections
             ),
@@ -79,17 +80,17 @@ def _at_rate(scene: Scene, rate: float | None) -> Scene:
 
 
 def _require_quick(scene: Scene, system: System) -> None:
-    """Raises InputFault for a map that would take long, with the nearest rate whose map would not,
-    if there is one."""
-    most = MOST[scene.packaging] / size(system) ** 2
+    """Raises InputFault where the lifted map would take long to compute, with the nearest rate at
+    which it would not, if there is one."""
+    most = MAX_COST[scene.packaging] / size(system) ** 2
     if (count := _ticks(scene)) <= most:
         return
     if scene.graphics is None or not isinstance(scene.graphics.rate, int | float):
-        raise InputFault(f"all repeats only after {count} ticks")
+        raise InputFault(f"the system repeats only after {count} ticks")
     rate = scene.graphics.rate
     quick = [r for r in RATES if _ticks(_at_rate(scene, r)) <= most]
     nearest = min(quick, key=lambda r: abs(r - rate), default=None)
-    remedy = f", {nearest} Hz would be quick" if nearest else ""
+    remedy = f", {nearest} Hz would be fast" if nearest else ""
     raise InputFault(f"{rate:g} Hz repeats only after {count} ticks{remedy}")
 
 
@@ -99,7 +100,7 @@ def _ticks(scene: Scene) -> int:
     return hyperperiod(time) // time.clocks[0].longest
 
 
-def _with(fmu: Fmu, parameters: Parameters) -> Fmu:
+def _with_parameters(fmu: Fmu, parameters: Parameters) -> Fmu:
     """An FMU with other start values of parameters."""
     starts = {scalar.name: (scalar, value) for scalar, value in fmu.starts}
     for name, values in parameters.items():
@@ -110,7 +111,7 @@ def _with(fmu: Fmu, parameters: Parameters) -> Fmu:
     return replace(fmu, starts=tuple(starts.values()))
 
 
-def _said(found: Stability) -> str:
+def _summary(found: Stability) -> str:
     rate = f"{abs(found.growth):.2g} 1/s"
     if found.verdict == "stable":
         return f"stable at rest, decays {rate}"

@@ -1,7 +1,8 @@
 """Serves the page on localhost, in a process of its own: files, and a websocket to each window.
 
-Arguments: host, port (0: a free one), token, as text. Pickled messages come from the haptic loop by
-the standard input, whose end ends the process; those of the pages leave by the standard output.
+Pickled messages come from the haptic loop by the standard input, whose end ends the process: first
+host, port (0: a free one) and token, as text, which no other process can read there. Those of the
+pages leave by the standard output.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from websockets.http11 import Request, Response
 
 from hapticlink.visualization.live import messages
 from hapticlink.visualization.live.link import read
-from hapticlink.visualization.live.stability_process import MapBeside
+from hapticlink.visualization.live.stability_process import StabilityProcess
 from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
 from hapticlink.visualization.mechanism.picture import Picture
 
@@ -57,7 +58,7 @@ class Pages:
         self._holding: dict[str, ServerConnection | None] = {"": None}
         self._picture: Picture | None = None
         self._kept: dict[str, str] = {}
-        self._map = MapBeside(self.show)
+        self._map = StabilityProcess(self.show)
         self._files = {p.name: p for p in PAGE.iterdir() if p.suffix in TYPES}
 
     # --- from the haptic loop -----------------------------------------------------------------
@@ -145,7 +146,7 @@ def _response(status: HTTPStatus, file: Path | None = None) -> Response:
 
 async def _bound(pages: Pages, host: str, port: int) -> Server:
     return await serve(
-        pages.window, host, port, process_request=pages.answer, max_size=messages.MOST,
+        pages.window, host, port, process_request=pages.answer, max_size=messages.MAX_CHARACTERS,
         compression=None, server_header=None, open_timeout=5, close_timeout=1,
     )  # fmt: skip
 
@@ -185,8 +186,13 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints must not get between the messages
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # connections that fail are no news
-    host, port, token = sys.argv[1:]
-    asyncio.run(_served(host, int(port), token, out))
+    if (arguments := read(sys.stdin.buffer)) is None:
+        return
+    host, port, token = arguments
+    try:
+        asyncio.run(_served(host, int(port), token, out))
+    except BrokenPipeError:  # nobody is left to be told
+        os._exit(1)
 
 
 if __name__ == "__main__":

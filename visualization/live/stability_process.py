@@ -1,8 +1,8 @@
-"""The lifted map of the run behind a page, in a process of its own below the page's server: neither
-the haptic loop nor the server waits for it.
+"""The stability verdict of the run behind a page, in a process of its own below the page's server:
+neither the haptic loop nor the server waits for it.
 
 The process gets two pickles by its standard input, the end of which ends it: the scene, and what
-was changed of it. Its answer is JSON (`prediction`).
+was changed of it. Its answer is JSON (`prediction.predicted`).
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.fmi.worker_process import APART
+from hapticlink.orchestrator.fmi.worker_process import OWN_GROUP
 
 REST = 1.0
-"""Time (s) for which nothing was changed before the map is computed."""
+"""Time (s) for which nothing was changed before the verdict is computed."""
 ENDING = 1.0
 """Time (s) that the process may take to end."""
 NICE = 10
 """Its priority: all others get ten times its share; with 19 it would not end beside busy ones."""
 
 
-class MapBeside:
-    """Computes the map of what was asked for last, and hands its messages to `tell`."""
+class StabilityProcess:
+    """Computes the verdict on the newest request, and hands its messages to `tell`."""
 
     def __init__(self, tell: Callable[[dict[str, Any]], None]) -> None:
         self._tell, self._asked = tell, b""
         self._answering: asyncio.Task[None] | None = None
 
     def ask(self, asked: bytes) -> None:
-        """Compute the map of a run, instead of that which is being computed."""
+        """Compute the verdict on a run, instead of that which is being computed."""
         if asked == self._asked:
             return
         self._asked = asked
@@ -48,7 +48,7 @@ class MapBeside:
         self._answering = asyncio.get_running_loop().create_task(self._answer(asked))
 
     async def end(self) -> None:
-        """End what is being computed."""
+        """End the computation."""
         if self._answering:
             self._answering.cancel()
             await asyncio.wait([self._answering])
@@ -56,7 +56,9 @@ class MapBeside:
     async def _answer(self, asked: bytes) -> None:
         await asyncio.sleep(REST)
         command = (sys.executable, "-P", "-m", __name__)
-        process = await asyncio.create_subprocess_exec(*command, stdin=PIPE, stdout=PIPE, **APART)
+        process = await asyncio.create_subprocess_exec(
+            *command, stdin=PIPE, stdout=PIPE, **OWN_GROUP
+        )
         assert process.stdin
         assert process.stdout
         try:

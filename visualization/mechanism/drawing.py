@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 Points = NDArray[np.float64]
 Frame = Mapping[str, Any]
 Look = dict[str, Any]
-NAMED = 10
-"""Number of bodies up to which names are written beside them."""
+MAX_NAMED_BODIES = 10
+"""Bodies of a linkage of which the names are written beside them."""
 MM = 1e3
-SHORTEST, LONGEST = 3.0, 120.0
-"""Of arrows (pt); shorter ones are not drawn."""
-UNDER = ("obstacle", "device", "directions", "ground", "rail", "spring")
-"""Roles that are behind paths."""
+MIN_ARROW, MAX_ARROW = 3.0, 120.0
+"""Lengths of arrows (pt); shorter ones are not drawn."""
+ROLES_BEHIND_PATHS = ("obstacle", "device", "directions", "ground", "rail", "spring")
+"""Roles of marks that are drawn behind paths."""
 
 
 def draw(
@@ -90,15 +90,15 @@ def figure(scene: Scene, q: Sequence[float]) -> Figure:
 
 def paint(axes: Axes, marks: Iterable[Mark], frame: Frame, zorder: float | None = None) -> None:
     """The marks that a frame has the places of."""
-    told: set[str] = {""}
+    labelled: set[str] = {""}
     for mark in marks:
         at = [found for each in mark.at if (found := place(frame, each)) is not None]
         if not at or (mark.when and mark.when not in frame.get("states", ())):
             continue
-        layer = (1.0 if mark.role in UNDER else 3.0) if zorder is None else zorder
-        look = {"zorder": layer, "label": None if mark.label in told else mark.label}
+        layer = (1.0 if mark.role in ROLES_BEHIND_PATHS else 3.0) if zorder is None else zorder
+        look = {"zorder": layer, "label": None if mark.label in labelled else mark.label}
         if PAINTERS.get(mark.kind, _shape)(axes, mark, np.array(at), frame, look):
-            told.add(mark.label)
+            labelled.add(mark.label)
 
 
 def place(frame: Frame, of: Place) -> Points | None:
@@ -171,9 +171,9 @@ def _shape(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool
 def _arrow(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
     force = np.array(reach(frame, mark.vector) or (0.0, 0.0))[:2]
     length = mark.size * float(np.hypot(*force))
-    if length < SHORTEST:
+    if length < MIN_ARROW:
         return False
-    tip = (*(force * mark.size * min(1.0, LONGEST / length)),)
+    tip = (*(force * mark.size * min(1.0, MAX_ARROW / length)),)
     line: Any = {"color": mark.stroke, "lw": mark.width}
     axes.annotate(
         "", at[0], tip, textcoords="offset points", annotation_clip=False, zorder=look["zorder"],
@@ -215,7 +215,7 @@ def _limits(axes: Axes) -> Points:
 def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
     """The names of bodies, and of joints away from the middle of the mechanism; those of joints at
     one place are below each other."""
-    if len(linkage.body) > NAMED:
+    if len(linkage.body) > MAX_NAMED_BODIES:
         return
     corners = {
         body.name: outline([*_world(frame, body.name, [*attached(linkage, body.name)] or [ORIGIN])])

@@ -1,7 +1,7 @@
 """A drawing of a mechanism as a list of marks: what is drawn where, in which order and how.
 
 It is the one description of figures, live page, replays and animations. Their painters,
-`mechanism_drawing.py` and `painter.js`, know lines and colours, but no linkage.
+`drawing.py` and `page/painter.js`, know lines and colours, but no linkage.
 """
 
 from __future__ import annotations

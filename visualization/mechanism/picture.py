@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from hapticlink.analysis.findings.limits import FELT, FULL
+from hapticlink.analysis.findings.limits import FULL_TORQUE, NOTICEABLE_J
 from hapticlink.components.device.torques import torque_function
 from hapticlink.components.device.workspace import link_function
 from hapticlink.components.linkage.poses import pose_function
@@ -37,7 +37,7 @@ class Picture:
         self._names, self._poses = pose_function(linkage)
         self._arms = {user: link_function(each) for user, each in devices.items()}
         self._limits = {
-            user: (torque_function(each), FULL * each.torque_limit)
+            user: (torque_function(each), FULL_TORQUE * each.torque_limit)
             for user, each in devices.items()
         }
 
@@ -82,7 +82,7 @@ class Picture:
         kinds = {
             "folded": reach(found, ("branch_ok", 0)) == 0,
             "saturated": self._saturated(user, found),
-            "energy": (reach(found, ("energy", PORT)) or 0.0) > FELT,
+            "energy": (reach(found, ("energy", PORT)) or 0.0) > NOTICEABLE_J,
             "contacts": (reach(found, ("gap", 0)) or 0.0) < 0 and any(found.get("F_env", ())),
             "outside": (reach(found, ("margin", 0)) or 0.0) < 0,
         }

@@ -12,7 +12,7 @@ export function fitted(canvas) {
   return { context, width, height };
 }
 
-// Below it a value is rounding, which a chart does not magnify and a number leaves out.
+// Magnitudes below which a value is rounding error: charts do not magnify it, numbers show 0.
 export const ROUNDING = { mm: 1e-6, N: 1e-6, m: 1e-15, mJ: 1e-6 };
 
 // A number with its unit, in three digits; a count, without a unit, as it is.

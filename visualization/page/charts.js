@@ -3,7 +3,7 @@ import { ROUNDING, fitted, text } from "./canvas.js";
 
 const SPAN = 10, LEFT = 44, COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee"];
 const size = (v) => v && Math.hypot(v[0], v[1]);
-// Series of every user are read from what a frame has of that one.
+// `each`: series of every user, from that user's part of a frame; `series`: from the whole frame.
 const CHARTS = [
   { title: "tracking error", unit: "mm", each: { error: (u) => u.arms && 1e3 * Math.hypot(u.x[0] - u.handle[0], u.x[1] - u.handle[1]) } },
   { title: "force", unit: "N", colors: ["#b85c00", "#aa3377", "#cc3311", "#4477aa", "#66ccee", "#228833"], each: { hand: (u) => size(u.F_hand), topology: (u) => size(u.F_constraint), others: (u) => size(u.F_env) } },
@@ -40,7 +40,7 @@ export class Charts {
   }
 }
 
-// The series of each user, named by the user where there are several.
+// The series of each user, whose name stands first for further users.
 function ofUsers(each, users) {
   const of = (frame, user) => (user ? frame.others?.[user] : frame);
   const read = (user) => Object.entries(each ?? {}).map(([name, value]) => [
@@ -50,21 +50,21 @@ function ofUsers(each, users) {
   return Object.fromEntries(users.flatMap(read));
 }
 
-// The user's port, or what is held by a connection, and where.
-function named(connection) {
+// Short name of an energy: the user's port, or the signal that a connection holds and its target.
+function shortName(connection) {
   const [source, target] = connection.split(" -> ");
   if (!target) return source;
-  const what = source.startsWith("hand") ? "F_hand" : source.split(".")[1];
+  const signal = source.startsWith("hand") ? "F_hand" : source.split(".")[1];
   const [fmu, ...port] = target.split("."); // the port of a further user has that one's name first
   const user = port.length > 1 ? ` ${port[0]}` : "";
-  return `${what} to ${fmu.replace("virtual_", "").replace("haptic_", "").replace("_", " ")}${user}`;
+  return `${signal} to ${fmu.replace("virtual_", "").replace("haptic_", "").replace("_", " ")}${user}`;
 }
 
 class Chart {
   constructor({ title, unit, series, energies, colors = COLORS }, connections, runs) {
     this.unit = unit;
     this.colors = colors;
-    this.names = energies ? connections.map(named) : Object.keys(series);
+    this.names = energies ? connections.map(shortName) : Object.keys(series);
     this.read = energies
       ? connections.map((name) => (f) => f.energy && 1e3 * f.energy[name])
       : Object.values(series);
@@ -136,8 +136,8 @@ class Chart {
         const after = at === undefined ? -1 : times.findIndex((t) => t > at + 1e-9);
         return (after < 0 ? rows.at(-1) : rows[Math.max(after - 1, 0)])?.[i] ?? null;
       });
-      const said = found.map((v) => (v === null ? "-" : text(v, this.unit))).join(" | ");
-      value.textContent = (several ? `${this.names[i]} ` : "") + (this.runs.length > 1 ? said : text(found[0] ?? 0, this.unit));
+      const values = found.map((v) => (v === null ? "-" : text(v, this.unit))).join(" | ");
+      value.textContent = (several ? `${this.names[i]} ` : "") + (this.runs.length > 1 ? values : text(found[0] ?? 0, this.unit));
     });
   }
 }

@@ -1,4 +1,4 @@
-// The controls of the running FMUs; what they show is what the run says.
+// The controls of the running FMUs. They show the values that the run reports, not those last set.
 import { text } from "./canvas.js";
 
 const NAMES = {
@@ -9,7 +9,7 @@ const NAMES = {
   "virtual_mechanism.k_contact": "Contact: stiffness", "virtual_mechanism.b_contact": "Contact: damping",
   "virtual_mechanism.hysteresis": "Constrained directions: hysteresis", "virtual_environment.hysteresis": "Constrained directions: hysteresis",
 };
-// Rates (Hz) of which whole numbers soon fit whole numbers of haptic periods, for which the map is quick.
+// Rates (Hz) with a short common period with the haptic rate, for which stability is computed fast.
 const RATES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 24, 25, 26, 28, 30, 32, 36, 40, 44, 48, 50, 56,
   60, 64, 72, 75, 80, 90, 96, 100, 110, 120, 128, 144, 160, 180, 200];
 const named = (connection) => connection.split(" -> ")[0].split(".").slice(1).join(" ");
@@ -92,9 +92,9 @@ export class Controls {
     const output = this.labelled(id, title, input);
     input.addEventListener("input", () => this.send(message(Number(input.value))));
     this.updates.push((found) => {
-      const [value, said] = shown(found);
+      const [value, label] = shown(found);
       if (!input.matches(":active")) input.value = value;
-      output.textContent = said;
+      output.textContent = label;
     });
   }
 

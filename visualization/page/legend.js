@@ -1,4 +1,4 @@
-// What the marks of a drawing mean, with the newest forces, and what happens now.
+// The legend of a drawing, with the newest forces, and labels of the current states.
 import { place, reach } from "./painter.js";
 import { text } from "./canvas.js";
 
@@ -37,12 +37,12 @@ export class Legend {
   }
 }
 
-// Labels of a colour and a text each.
+// Replaces the labels of an element; each has a colour and a text.
 export function tags(host, shown) {
-  host.replaceChildren(...shown.map(([color, said]) => {
+  host.replaceChildren(...shown.map(([color, label]) => {
     const tag = document.createElement("li");
     tag.style.background = color;
-    tag.textContent = said;
+    tag.textContent = label;
     return tag;
   }));
 }

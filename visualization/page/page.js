@@ -50,14 +50,14 @@ const HANDLERS = {
   },
 };
 
-// The light, with what each of its two judges says.
-function show(judged) {
-  Object.assign(view, judged);
-  const said = { green: "none", amber: "little", red: "much" }[view.energy];
+// The light, with the level of the sampling energy and the stability verdict.
+function show(change) {
+  Object.assign(view, change);
+  const level = { green: "none", amber: "low", red: "high" }[view.energy];
   $("light").className = `light ${view.map?.verdict === "unstable" ? "red" : view.energy ?? ""}`;
-  $("energy").textContent = said ? `energy of sampling and holding: ${said}` : "energy";
-  $("map").textContent = view.map ? `map: ${view.map.said}` : "";
-  $("map").title = `Lifted map of small motions about the start pose, in a hand that holds on there. ${view.map?.why ?? ""}`;
+  $("energy").textContent = level ? `sampling energy: ${level}` : "sampling energy";
+  $("map").textContent = view.map ? `stability: ${view.map.said}` : "";
+  $("map").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${view.map?.why ?? ""}`;
 }
 
 function note() {

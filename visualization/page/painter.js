@@ -1,6 +1,6 @@
-// Paints marks (results/marks.py) on a canvas: `frame` has what they name, `toScreen` turns places
+// Paints marks (visualization/mechanism/marks.py) on a canvas: `frame` has what they name, `toScreen` turns places
 // of the plane (m) into pixels, `scale` is pixels to a metre. Sizes of marks are in points.
-const PX = 96 / 72, SHORTEST = 4, LONGEST = 160; // px
+const PX = 96 / 72, MIN_ARROW = 4, MAX_ARROW = 160; // px
 
 export const reach = (frame, keys) => keys.reduce((found, key) => found?.[key], frame);
 
@@ -38,7 +38,7 @@ export function paint(context, marks, frame, { shapes, toScreen, scale }) {
       spring: () => [zigzag(...at)],
       disc: () => [[]],
       arrow: () => arrow(at[0], vector, mark.size * PX),
-      directions: () => (vector ?? []).map((way) => across(at[0], way)),
+      directions: () => (vector ?? []).map((way) => lineThrough(at[0], way)),
     }[mark.kind];
     for (const points of lines ? lines() : [corners(shapes[mark.kind], at[0], angle)]) {
       context.beginPath();
@@ -51,9 +51,9 @@ export function paint(context, marks, frame, { shapes, toScreen, scale }) {
   }
 }
 
-const FAR = 4000; // px
+const BEYOND_PAGE = 4000; // px
 
-const across = ([x, y], [dx, dy]) => [[x - FAR * dx, y + FAR * dy], [x + FAR * dx, y - FAR * dy]];
+const lineThrough = ([x, y], [dx, dy]) => [[x - BEYOND_PAGE * dx, y + BEYOND_PAGE * dy], [x + BEYOND_PAGE * dx, y - BEYOND_PAGE * dy]];
 
 function corners(shape, [x, y], angle) {
   const found = shape.map((corner) => turned(corner, angle)).map(([dx, dy]) => [x + dx * PX, y - dy * PX]);
@@ -78,8 +78,8 @@ export function zigzag(a, b) {
 
 // Shaft and head; none where the force is too small to be seen.
 function arrow([x, y], force, perNewton) {
-  const size = force ? Math.hypot(force[0], force[1]) : 0, length = Math.min(perNewton * size, LONGEST);
-  if (!(length > SHORTEST)) return [];
+  const size = force ? Math.hypot(force[0], force[1]) : 0, length = Math.min(perNewton * size, MAX_ARROW);
+  if (!(length > MIN_ARROW)) return [];
   const ux = force[0] / size, uy = -force[1] / size, tip = [x + length * ux, y + length * uy];
   const long = Math.min(10, length), wide = long / 2;
   const head = [wide, -wide].map((w) => [tip[0] - long * ux + w * uy, tip[1] - long * uy - w * ux]);

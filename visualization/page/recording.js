@@ -1,4 +1,4 @@
-// The frames of a recorded run: of each name its values, and the frames from which on they stand.
+// A recorded run. For each name, `is` are its distinct values and `at` the frames from which on they hold.
 export class Recording {
   constructor(run) {
     Object.assign(this, run);

@@ -5,7 +5,7 @@ import { Legend } from "./legend.js";
 import { paint, place, zigzag } from "./painter.js";
 
 const HAND = "#b85c00";
-const APART = 8; // ms at least between two targets that are sent, faster than frames come
+const SEND_INTERVAL = 8; // ms, the least between two targets that are sent; frames are slower
 const FITTED = ["obstacle", "body", "handle"]; // roles of marks that the picture contains
 
 export class Stage {
@@ -15,41 +15,41 @@ export class Stage {
     this.pulls = new Map(); // by pointer: the user, the target, when it was sent, the next timer
     this.limits = null;
     this.bounds = null; // the part of the plane to show, in place of what the first frame has
-    const at = (event) => {
+    const pointAt = (event) => {
       const box = canvas.getBoundingClientRect();
       return this.toWorld(event.clientX - box.left, event.clientY - box.top);
     };
-    const tell = (held) => {
-      held.sent = performance.now();
-      held.later = null;
-      pull(held.target, held.user);
+    const sendTarget = (pulling) => {
+      pulling.sent = performance.now();
+      pulling.later = null;
+      pull(pulling.target, pulling.user);
     };
     const release = ({ pointerId }) => {
-      const held = this.pulls.get(pointerId);
-      if (!held) return;
-      clearTimeout(held.later);
+      const pulling = this.pulls.get(pointerId);
+      if (!pulling) return;
+      clearTimeout(pulling.later);
       this.pulls.delete(pointerId);
       canvas.classList.toggle("held", this.pulls.size > 0);
-      pull(null, held.user);
+      pull(null, pulling.user);
     };
     if (pull) canvas.addEventListener("pointerdown", (event) => {
       if (!this.limits || event.button) return;
-      const target = at(event), user = this.nearest(target);
+      const target = pointAt(event), user = this.nearest(target);
       if (user === undefined) return;
       canvas.setPointerCapture(event.pointerId);
-      const held = { user, target };
-      this.pulls.set(event.pointerId, held);
+      const pulling = { user, target };
+      this.pulls.set(event.pointerId, pulling);
       canvas.classList.add("held");
-      tell(held);
+      sendTarget(pulling);
     });
     canvas.addEventListener("pointermove", (event) => {
-      const held = this.pulls.get(event.pointerId);
-      if (!held) return;
-      held.target = at(event);
-      if (held.later) return; // it sends the newest target, where the mouse stops, too
-      const wait = held.sent + APART - performance.now();
-      if (wait > 0) held.later = setTimeout(tell, wait, held);
-      else tell(held);
+      const pulling = this.pulls.get(event.pointerId);
+      if (!pulling) return;
+      pulling.target = pointAt(event);
+      if (pulling.later) return; // the timer sends the newest target, also where the mouse has stopped
+      const wait = pulling.sent + SEND_INTERVAL - performance.now();
+      if (wait > 0) pulling.later = setTimeout(sendTarget, wait, pulling);
+      else sendTarget(pulling);
     });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
@@ -73,10 +73,10 @@ export class Stage {
 
   // The user whose handle is nearest to a place, of those that no pointer here pulls.
   nearest([x, y]) {
-    const pulled = [...this.pulls.values()].map((held) => held.user);
+    const pulled = [...this.pulls.values()].map((pulling) => pulling.user);
     const free = users(this.frame).filter(([name]) => !pulled.includes(name));
-    const apart = ([, { handle }]) => Math.hypot(handle[0] - x, handle[1] - y);
-    return free.sort((a, b) => apart(a) - apart(b))[0]?.[0];
+    const distance = ([, { handle }]) => Math.hypot(handle[0] - x, handle[1] - y);
+    return free.sort((a, b) => distance(a) - distance(b))[0]?.[0];
   }
 
   // The part of the plane that is shown (m): all that the first frame has, with a margin.
@@ -119,9 +119,9 @@ export class Stage {
 
   // The mouse's spring.
   drawPull(context, user, name) {
-    const held = [...this.pulls.values()].find((pull) => pull.user === name);
-    if (!held) return;
-    const target = this.toScreen(held.target);
+    const pulling = [...this.pulls.values()].find((pull) => pull.user === name);
+    if (!pulling) return;
+    const target = this.toScreen(pulling.target);
     context.strokeStyle = context.fillStyle = HAND;
     context.lineWidth = 1.4;
     context.beginPath();

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from PIL.Image import Image
 
-MOST, PERIOD = 60, 1 / 20
+MAX_FRAMES, MIN_PERIOD = 60, 1 / 20
 """Largest number of frames, and the least time (s) of one."""
-SHORTEST, REST = 2.0, 1.0
+MIN_DURATION, LAST_FRAME = 2.0, 1.0
 """Times (s) that an animation takes at least, and for which its last frame stays."""
 COLORS = 64
 SIZE, DPI = (4.6, 5.0), 80
@@ -43,13 +43,13 @@ def write(runs: Sequence[Recorded], names: Sequence[str], path: Path) -> None:
     """Writes a GIF, WebP or animated PNG, by the ending of the path's name, which begins anew after
     its end. The same runs give the same bytes."""
     end = max(float(run.times[-1]) for run in runs)
-    times = np.linspace(0.0, end, int(np.clip(np.ceil(end / PERIOD) + 1, 2, MOST)))
+    times = np.linspace(0.0, end, int(np.clip(np.ceil(end / MIN_PERIOD) + 1, 2, MAX_FRAMES)))
     panels = [_Panel(run, name, times) for run, name in zip(runs, names, strict=True)]
     first, *others = _with_palette(list(_pictures(panels, times)))
-    each = round(1e3 * max(end, SHORTEST) / len(times))
+    each = round(1e3 * max(end, MIN_DURATION) / len(times))
     first.save(
         path, save_all=True, append_images=others, loop=0, optimize=True, lossless=True,
-        duration=[each] * (len(times) - 1) + [round(1e3 * REST)],
+        duration=[each] * (len(times) - 1) + [round(1e3 * LAST_FRAME)],
     )  # fmt: skip
 
 

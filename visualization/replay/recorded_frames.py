@@ -30,9 +30,9 @@ from hapticlink.visualization.mechanism.picture import PORT, Picture
 PLACES = ("q", "x", "handle")
 """What a frame cannot be drawn without, of each user."""
 NEEDED = (JOINT_COORDINATES, POINT_POSE)
-MOST = 4000
+MAX_FRAMES = 4000
 """Frames of a run; of longer ones every second, third, ... sample is shown."""
-DIGITS = 7
+SIGNIFICANT_DIGITS = 7
 """Significant digits of the numbers of a frame."""
 
 
@@ -63,7 +63,7 @@ class Recorded:
         self.signals, self.missing = _shown(results)
         tables = [t for s in self.signals.values() if (t := table_of(results, s))]
         times = max((t["time"] for t in tables), key=len)
-        self.every = -(-len(times) // MOST)
+        self.every = -(-len(times) // MAX_FRAMES)
         self.times: Vector = times[:: self.every]
         places = [v for k, v in self.values().items() if k.rpartition(".")[2] in PLACES]
         drawn = np.all([np.isfinite(v).all(axis=1) for v in places], axis=0)
@@ -171,7 +171,7 @@ def _changes(values: Sequence[Any]) -> dict[str, list[Any]]:
 
 def _rounded(value: Any) -> Any:
     if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}")
+        return float(f"{value:.{SIGNIFICANT_DIGITS}g}")
     if isinstance(value, dict):
         return {k: _rounded(v) for k, v in value.items()}
     return [_rounded(v) for v in value] if isinstance(value, list | tuple) else value

@@ -19,7 +19,8 @@ HERE = Path(__file__).parent
 LAWS = runpy.run_path(str(HERE / "generate_laws.py"))
 SOURCES = (
     "loop.h", "loop.c", "events.c", "pace.c", "fmu_calls.c", "step_check.c", "meters.c", "holds.c",
-    "manifolds.c", "energy_account.c", "energy_tank.c", "platform.c", "python_errors.c",
+    "manifolds.c", "energy_account.c", "energy_tank.c", "platform.c", "process_state.c",
+    "python_errors.c",
 )  # fmt: skip
 # No contraction: a fused multiply-add rounds once where Python rounds twice.
 FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", "-g0", "-fvisibility=hidden", "-ffp-contract=off")

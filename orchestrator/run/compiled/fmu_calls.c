@@ -97,6 +97,7 @@ int fmu_get(const Fmu *f, int64_t judged, At *at) {
         if (code) return code;
         if (gets[i].kind.type != DOUBLE && !from_buffer(gets + i)) return CALL;
     }
+    keep_arithmetic(f->place);
     if (!judged) return 0;
     int kept = 1;
     for (int64_t i = 0; i < f->n_outputs; i++)
@@ -133,15 +134,20 @@ int fmu_set(const Setter *s, const double *board, At *at) {
         const int code = call(s->sets + i, i, &p->sets, at);
         if (code) return code;
     }
+    keep_arithmetic(p);
     p->setter = s->key;
     return 0;
 }
 
 int fmu_do_step(const Fmu *f, double time, double size) {
     f->place->steps++;
-    if (f->kind.fmi == 2) return ((DoStep2)f->do_step)(f->fmu, time, size, (int)f->forward);
-    return ((DoStep3)f->do_step)(f->fmu, time, size, f->forward != 0, f->event, f->terminate,
-                                 f->early, f->reached);
+    const int status =
+        f->kind.fmi == 2
+            ? ((DoStep2)f->do_step)(f->fmu, time, size, (int)f->forward)
+            : ((DoStep3)f->do_step)(f->fmu, time, size, f->forward != 0, f->event, f->terminate,
+                                    f->early, f->reached);
+    keep_arithmetic(f->place);
+    return status;
 }
 
 /* The status of saving an FMU's state. */

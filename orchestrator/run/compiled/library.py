@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from hapticlink.fmus import cache as fmu_cache
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.run.compiled import build
 
 CHOICE = "HAPTICLINK_LOOP"
@@ -24,11 +25,13 @@ def load() -> ctypes.CDLL:
     compiled."""
     if os.environ.get(CHOICE) == "python":
         raise Unavailable(f"{CHOICE}=python")
-    return _loaded()
+    return loaded()
 
 
 @cache
-def _loaded() -> ctypes.CDLL:
+def loaded() -> ctypes.CDLL:
+    """The library, whatever CHOICE says. Raises Unavailable where it can neither be found nor
+    be compiled."""
     built = build.HERE / build.name()
     found = ctypes.CDLL(str(built if built.exists() else _compiled()))
     pointer, integer, number = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -38,6 +41,7 @@ def _loaded() -> ctypes.CDLL:
         "push": (pointer, pointer, integer, integer),
         "value": (pointer, pointer, integer, number, pointer),
         "watch": (ctypes.c_int,),
+        "guard": (ctypes.c_int,),
         "now": (),
         "wait": (integer,),
         "python": (pointer,) * 3,
@@ -59,10 +63,10 @@ def _compiled() -> Path:
     library = root / build.name()
     if library.exists():
         return library
-    why = "it is not built, and there is no C compiler: pip install '.[native]'"
+    why = f"it is not built, and there is no C compiler: {install_command('native')}"
     for compiler in build.compilers():
         try:
-            root.mkdir(parents=True, exist_ok=True)
+            fmu_cache.private(root)
             build.compile_loop(library, compiler)
         except subprocess.CalledProcessError as error:
             why = f"{compiler[0]} could not compile it: {error.stderr.decode(errors='replace')}"

@@ -110,6 +110,9 @@ EXPORT void hapticlink_wait(int64_t until) { wait_until(until); }
 /* Whether to notice signals; Windows has none that Python would not notice. */
 EXPORT void hapticlink_watch(int on) { watch_signals(on); }
 
+/* Whether a run is going on, which no FMU may end with the status of a success. */
+EXPORT void hapticlink_guard(int on) { guard_exit(on); }
+
 /* PyGILState_Ensure, PyErr_Occurred and PyGILState_Release. */
 EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int)) {
     use_python(ensure, occurred, release);

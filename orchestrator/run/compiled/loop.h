@@ -20,10 +20,10 @@
 
 /* Where an instance stands (s), and how often its functions were called; shared with its Python
  * object. waiting: settings that it is to take before its next step. setter: the Setter whose values
- * its inputs have, 0 where that is not known. */
+ * its inputs have, 0 where that is not known. altered: calls that changed how numbers are rounded. */
 typedef struct {
     double time, begin, size, end, step_time;
-    int64_t ended, waiting, setter, gets, sets, steps, saves, rollbacks;
+    int64_t ended, waiting, setter, altered, gets, sets, steps, saves, rollbacks;
 } Place;
 
 /* What kind of number a call moves, of which version of FMI, and whether the FMU holds a Python
@@ -340,6 +340,9 @@ void watch_signals(int on);
 int signal_came(void);
 void use_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
 int exception_left(void);
+void note_arithmetic(void);      /* how numbers are rounded from here on */
+void keep_arithmetic(Place *p);  /* restored where an FMU has changed it, and counted */
+void guard_exit(int on);         /* while it is on, exit() ends the process with status 1 */
 double *hold_scratch(const Hold *h); /* (2, n) */
 int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
 int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);

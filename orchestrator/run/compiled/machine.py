@@ -63,10 +63,10 @@ class Machine:
     def __init__(self, library: ctypes.CDLL, simulation: Simulation) -> None:
         self.library, self._simulation = library, simulation
         self.in_python: dict[str, str] = {}
-        base, system = simulation.system.timeline.base, simulation.system
+        system = simulation.system
         self.loop = structures.Loop()
-        self.loop.numerator, self.loop.denominator = base.numerator, base.denominator
-        self.loop.values = simulation.signals.values.ctypes.data
+        self.loop.fill(system.timeline.base, "numerator", "denominator")
+        self.loop.fill(simulation.signals, "values")
         self._memory = Memory()
         self._kept: list[object] = []
         self._bound: Bound = []
@@ -81,28 +81,25 @@ class Machine:
         self._make_holds()
 
     def _array(self, name: str, kind: Any, n: int) -> Any:
-        made = (kind * max(n, 1))()
-        setattr(self.loop, name, ctypes.addressof(made))
-        self._kept.append(made)
-        return made
+        array = (kind * max(n, 1))()
+        self.loop.fill(**{name: array})
+        self._kept.append(array)
+        return array
 
     def _make_holds(self) -> None:
         simulation, system = self._simulation, self._simulation.system
-        rolls_back = (
-            system.coupling.scheme == "iterated" or system.coupling.step_control is not None
-        )
-        shared = tanks(simulation.holds.values(), rolls_back)
+        repeats = system.coupling.scheme == "iterated"
+        shared = tanks(simulation.holds.values(), repeats)
         for name, hold in simulation.holds.items():
             own = parts(hold).own
             needed = getattr(own, "tank", None)
             tank = shared.get(id(needed))
-            if not can(hold, rolls_back) or (needed and tank is None):
+            if not can(hold, repeats) or (needed and tank is None):
                 continue
             simulation.holds[name] = self._made(name, hold, tank)
         compiled = [h for h in simulation.holds.values() if isinstance(h, CompiledHold)]
         for hold in compiled:
             hold.join(compiled)
-        simulation.springs[:] = [shared.get(id(tank), tank) for tank in simulation.springs]
 
     def _made(self, name: str, hold: Hold, tank: CompiledTank | None = None) -> CompiledHold:
         signals = self._simulation.signals
@@ -114,7 +111,7 @@ class Machine:
         """Replace the hold of a connection. Raises InputFault where the old or the new one has no
         C."""
         for each in (hold, self._simulation.holds[name]):
-            if not isinstance(each, CompiledHold) and not can(each, rolls_back=False):
+            if not isinstance(each, CompiledHold) and not can(each, repeats=False):
                 kind = type(parts(each).own).__name__
                 raise InputFault(f"hold of {name}: there is no C for {kind}: take `reset`")
         self._simulation.holds[name] = made = self._made(name, hold)
@@ -143,7 +140,7 @@ class Machine:
         self._bound += bound
         rows = [self._record(instruction) for instruction, _ in bound]
         self._ops = np.concatenate([self._ops, np.array(rows, np.dtype(Op))])
-        self.loop.ops = self._ops.ctypes.data
+        self.loop.fill(ops=self._ops)
         return first, len(self._bound)
 
     def joined(self, bound: Bound) -> Call:
@@ -190,7 +187,7 @@ class Machine:
                 first = len(self._points)
                 self._points += [(weight, float(ahead)) for weight, ahead in points]
                 self._kept.append(of := np.array(self._points))
-                self.loop.points = of.ctypes.data
+                self.loop.fill(points=of)
                 return structures.BLEND, at, first, len(self._points)
             case Sample(connection, ahead):
                 return structures.SAMPLE, self._meter(connection), ahead
@@ -256,7 +253,7 @@ class Machine:
             self._meters[at] = ctypes.addressof(c)
             for kind in ("source", "held", "x"):
                 fill_reader(getattr(c, kind), getattr(meter, kind))
-            c.counts = meter.counts.ctypes.data
+            c.fill(meter, "counts")
             meter.changed = partial(_fill_meter, c, meter)
             meter.changed()
             return c
@@ -269,19 +266,10 @@ class Machine:
         def make(at: int) -> object:
             c = self._tables[at]
             if recorder.files:
-                c.block, c.rows = (
-                    recorder.block.rows.ctypes.data,
-                    ctypes.addressof(recorder.block.filled),
-                )
-            for name in ("room", "due", "count", "reached"):
-                setattr(c, name, ctypes.addressof(getattr(recorder, name)))
-            c.n, c.every, c.where = (
-                len(recorder.places),
-                recorder.every,
-                recorder.places.ctypes.data,
-            )
-            if recorder.view is not None:
-                c.view, c.where = recorder.view.ctypes.data, None
+                c.fill(block=recorder.block.rows, rows=recorder.block.filled)
+            c.fill(recorder, "room", "due", "count", "reached", "every", "view")
+            where = recorder.places if recorder.view is None else None
+            c.fill(n=len(recorder.places), where=where)
             return recorder
 
         return self._index("table", clock, make)
@@ -348,7 +336,5 @@ class Machine:
 
 
 def _fill_meter(c: structures.Meter, meter: Meter) -> None:
-    c.stamps, c.samples = meter.stamps.ctypes.data, meter.samples.ctypes.data
-    c.ticks, c.moves = meter.ticks.ctypes.data, meter.moves.ctypes.data
-    c.efforts, c.totals = meter.efforts.ctypes.data, meter.totals.ctypes.data
-    c.room, c.full, c.least = len(meter.stamps), meter.full, ROWS
+    c.fill(meter, "stamps", "samples", "ticks", "moves", "efforts", "totals", "full")
+    c.fill(room=len(meter.stamps), least=ROWS)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -105,11 +104,6 @@ class Reader:
         if np.any(factor != 1.0) or np.any(offset != 0.0):
             self.factor = np.array(factor, dtype=np.float64)
             self.offset = np.full(len(self.where), offset, dtype=np.float64)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Reader:
-        """Returns the reader itself: it has no state, and a hold that a rollback restores has to
-        read the signals, not a copy of them."""
-        return self
 
     def __call__(self) -> Vector:
         if self.factor is not None and self.offset is not None:

@@ -38,10 +38,9 @@ class Meters:
             meter.sample(0)
             meter.move(0)
 
-    def checkpoint(self, deep: bool = False) -> list[Mark]:
-        """Checkpoint of all meters for `rollback`; `deep` checkpoints may enclose others."""
-        rows = 16 if deep else 4
-        return [meter.checkpoint(rows) for meter in self.of.values()]
+    def checkpoint(self) -> list[Mark]:
+        """Checkpoint of all meters for `rollback`."""
+        return [meter.checkpoint(4) for meter in self.of.values()]
 
     def rollback(self, marks: list[Mark]) -> None:
         """Remove what all meters recorded since the checkpoint `marks`."""

@@ -116,7 +116,7 @@ def _tree(linkage: Linkage, frames: Mapping[str, int]) -> Iterator[Problem]:
             yield ("linkage", "body", i), "its joints run in a circle: start the tree at 'ground'"
         elif not way and name not in held:
             yield ("linkage", "body", i), "no joint holds this body: give it one as child"
-        held |= way.keys()  # told once
+        held |= way.keys()  # reported once
 
 
 def _limits(linkage: Linkage) -> Iterator[Problem]:

@@ -373,7 +373,7 @@ def held_by_spring() -> tuple[dict[str, Any], float]:
     """A spring hand that holds `closed-loop-direct`, and its spectral radius with zoh."""
     hand = {"type": "spring", "stiffness": [300.0, 300.0, 1.0], "damping": [5.0, 5.0, 0.01]}
     target = [[0.0, 0.0445, 0.0148, -0.7878]]
-    options = {"graphics.rate": 128, "hand": hand | {"target": target}}
+    options = {"graphics.rate": 64, "hand": hand | {"target": target}}
     return options, hl.stability("closed-loop-direct", options).radius
 
 

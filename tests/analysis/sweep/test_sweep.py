@@ -22,6 +22,7 @@ from hapticlink.analysis.sweep import grid, pool, row, table
 from hapticlink.analysis.sweep import job as points_of
 from hapticlink.analysis.sweep.grid import Axis, listed, parse
 from hapticlink.analysis.sweep.job import Job
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
@@ -489,7 +490,7 @@ def test_without_dask_the_scheduler_says_what_to_install(
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
     arguments = ("--vary", "duration=0.1", "--out", tmp_path / "out", "--scheduler", "tcp://a:1")
     assert status("sweep", bar, *arguments) == 2
-    assert "pip install '.[distributed]'" in capsys.readouterr().err
+    assert install_command("distributed") in capsys.readouterr().err
 
 
 def test_a_cluster_makes_the_same_table(bar: Path, tmp_path: Path, in_this_process: None) -> None:

@@ -5,11 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.dynamics.assembly import AssemblyError
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.linkage import Directions, Mechanism
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.components import appendix_a
 from tests.mechanisms import Q0, TABLE_6_1, WRENCH, five_bar, open_arm
 

@@ -9,8 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.blocks.virtual_environment import virtual_environment
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Signals
 from hapticlink.components.dynamics import closure_diagnostics
 from hapticlink.components.dynamics.operational_space import OperationalSpace
@@ -18,7 +16,7 @@ from hapticlink.components.dynamics.variables import parameters
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Directions, FurtherPoint, GraphicsCopy, Mechanism
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running
+from tests.blocks import Running, virtual_environment, virtual_mechanism
 from tests.components import appendix_a
 from tests.mechanisms import TABLE_6_1, WRENCH, five_bar, linkages
 

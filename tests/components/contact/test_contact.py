@@ -9,8 +9,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
-from hapticlink.components.blocks.virtual_environment import virtual_environment
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.contact.broad_phase import near, out_of_reach, reach
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
@@ -23,7 +21,7 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running
+from tests.blocks import Running, virtual_environment, virtual_mechanism
 from tests.components import appendix_a
 from tests.mechanisms import TABLE_6_1, five_bar
 

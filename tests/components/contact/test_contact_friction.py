@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from hapticlink.components.blocks.virtual_environment import virtual_environment
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import (
     Body,
@@ -17,7 +15,7 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running
+from tests.blocks import Running, virtual_environment, virtual_mechanism
 from tests.components.contact import piecewise
 
 MASS, INERTIA, G, R, LENGTH, K = 2.0, 0.03, 9.81, 0.05, 0.4, 15000.0

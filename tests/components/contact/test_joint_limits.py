@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.contact.joint_limits import damping_ratio
 from hapticlink.components.specs.linkage import (
     Body,
@@ -17,7 +16,7 @@ from hapticlink.components.specs.linkage import (
     OperationalPoint,
 )
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.components import appendix_a
 from tests.components.contact import piecewise
 from tests.mechanisms import TABLE_6_1, five_bar

@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.contacts import Contacts, Disc
 from hapticlink.components.specs.linkage import (
     Mechanism,
 )
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.components import appendix_a
 from tests.components.contact import piecewise
 from tests.components.contact.test_contact import BAR, FLOOR, LENGTH, R, link4, loose, shaped

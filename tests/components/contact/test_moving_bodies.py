@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from hapticlink.components.blocks.virtual_environment import virtual_environment
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.bodies import uniform
 from hapticlink.components.specs.contacts import Contacts, Polygon, pairs
 from hapticlink.components.specs.linkage import (
@@ -20,7 +18,7 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running
+from tests.blocks import Running, virtual_environment, virtual_mechanism
 from tests.components.contact import piecewise
 
 K, B, G = 15000.0, 60.0, 9.81

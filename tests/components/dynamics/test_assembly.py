@@ -8,12 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hapticlink.components.blocks.virtual_environment import virtual_environment
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.dynamics.assembly import AssemblyError
 from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running
+from tests.blocks import Running, virtual_environment, virtual_mechanism
 
 
 def moving(name: str, **rates: float) -> tuple[Linkage, Running]:

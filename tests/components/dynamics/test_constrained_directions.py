@@ -6,8 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.blocks.virtual_environment import virtual_environment
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.dynamics import constrained_directions
 from hapticlink.components.specs.linkage import (
     Body,
@@ -19,7 +17,7 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running
+from tests.blocks import Running, virtual_environment, virtual_mechanism
 
 A = ca.SX.sym("A", 3, 3)
 EIGEN = ca.Function("eigen", [A], list(constrained_directions.eigen(A)))

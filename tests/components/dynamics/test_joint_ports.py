@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.orchestrator.foreign_fmus import python_fmu_of
 
 SERVO = """

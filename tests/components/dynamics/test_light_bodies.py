@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import tests.components.dynamics.extended_precision as exact
-from hapticlink.components.blocks.virtual_environment import virtual_environment
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.massless_bodies import MasslessError
 from hapticlink.components.dynamics.operational_space import OperationalSpace
@@ -28,7 +26,7 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running
+from tests.blocks import Running, virtual_environment, virtual_mechanism
 from tests.mechanisms import five_bar, linkages
 
 G, RATE = 9.81, 1000

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.linkage import (
     Body,
     Joint,
@@ -15,7 +14,7 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 
 
 def rod(name, length):

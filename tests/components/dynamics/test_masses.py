@@ -11,9 +11,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.linkage import Mechanism
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.mechanisms import five_bar
 
 RATE = 512

@@ -3,14 +3,13 @@
 import casadi as ca
 import numpy as np
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.dynamics.variables import parameters
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Mechanism
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.components import appendix_a
 from tests.mechanisms import TABLE_6_1, five_bar
 

@@ -9,13 +9,12 @@ import pytest
 from scipy.linalg import expm
 
 from hapticlink.components.blocks.hand import hand
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.drives import PDDrive
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Mechanism, OperationalPoint
 from hapticlink.components.specs.paths import CoordinateSine, Interpolation, PoseSine
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 
 TABLE = ((0.0, 0.1), (0.25, 0.4), (0.5, 0.3), (1.0, 0.3), (1.25, -0.2))
 Rows = tuple[tuple[float, float], ...]

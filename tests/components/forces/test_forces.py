@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.drives import ConstantDrive, PDDrive, ProfileDrive
 from hapticlink.components.specs.linkage import (
     Body,
@@ -15,7 +14,7 @@ from hapticlink.components.specs.linkage import (
     OperationalPoint,
     Spring,
 )
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.components import appendix_a
 from tests.mechanisms import TABLE_6_1, five_bar
 

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.drives import PDDrive
 from hapticlink.components.specs.linkage import (
     Body,
@@ -20,7 +19,7 @@ from hapticlink.components.specs.linkage import (
     OperationalPoint,
 )
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.mechanisms import five_bar
 
 MASS, G, SLOPE = 2.0, 9.81, 0.4

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.linkage import Mechanism
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.mechanisms import WRENCH, five_bar
 
 RATE = 512

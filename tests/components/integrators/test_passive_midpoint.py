@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.integrators.base import Integrator
 from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
@@ -25,7 +24,7 @@ from hapticlink.components.specs.linkage import (
     Spring,
 )
 from hapticlink.orchestrator.open_scene import load
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 from tests.mechanisms import five_bar, linkages, terms
 
 PASSIVE = Mechanism(integrator="passive-midpoint")

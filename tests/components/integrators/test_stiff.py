@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Mechanism, OperationalPoint
-from tests.blocks import Running
+from tests.blocks import Running, virtual_mechanism
 
 
 def after(integrator, steps, stiffness, damping):

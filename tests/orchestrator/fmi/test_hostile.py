@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
+import hapticlink as hl
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results import tables
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
 
 pytest.importorskip("resource")  # the FMU needs POSIX
@@ -44,3 +51,117 @@ def test_a_state_that_is_saved_or_restored_in_part_is_none(
     options = ["faults.discard=retry"]
     fault = str(simulate(scene, tmp_path / "out", options).outcome.fault)
     assert "returned status -1 at t = 0.0" in fault
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+@pytest.mark.parametrize(
+    ("place", "where"), [("step", "root"), ("step", "gone"), ("enter", "root"), ("make", "gone")]
+)
+def test_a_change_of_the_current_directory_is_undone_and_told(
+    tmp_path: Path,
+    fmi: str,
+    place: str,
+    where: str,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    hostile_fmu(tmp_path, fmi)
+    hostile_scene(tmp_path, name := f"{place}_{where}_7")
+    monkeypatch.chdir(tmp_path)
+    run = hl.run("hostile.toml", out="out", figures=False)
+    assert run.fault is None
+    assert Path.cwd() == tmp_path
+    to = "/" if where == "root" else "a folder that was removed"
+    assert f"changed the current directory to {to}: it is {tmp_path} again" in caplog.text
+    assert name in caplog.text
+    assert {p.name for p in (tmp_path / "out").iterdir()} == set(run.run["files"])
+    assert len(tables.load(tmp_path / "out").haptics["time"]) == 33
+
+
+def test_runs_in_threads_leave_the_current_directory_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ends: list[object] = []
+
+    def runs() -> None:
+        for _ in range(6):
+            ends.append(hl.run("pendulum", {"duration": 0.02}).run["end"]["reason"])
+
+    threads = [threading.Thread(target=runs) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        assert Path.cwd() == tmp_path
+    assert ends == ["duration"] * 18
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+@pytest.mark.parametrize(
+    ("place", "act"),
+    [("step", "upward"), ("step", "zero"), ("step", "flush"), ("get", "upward"), ("set", "zero"),
+     ("enter", "upward"), ("make", "upward")],
+)  # fmt: skip
+def test_another_rounding_mode_is_restored_and_told(
+    tmp_path: Path,
+    loop: str,
+    fmi: str,
+    place: str,
+    act: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The numbers of the other FMU are the same to the bit."""
+    hostile_fmu(tmp_path, fmi)
+    good = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").results.haptics
+    assert "rounds" not in caplog.text
+    scene = hostile_scene(tmp_path, name := f"{place}_{act}_3")
+    bad = simulate(scene, tmp_path / "bad").results.haptics
+    assert bad["source.slope"].tolist() == good["source.slope"].tolist()
+    assert f"{name} changed how this process rounds numbers" in caplog.text
+    assert 1.0 + 2.0**-53 == 1.0  # of this process, too
+    assert 2.0**-1074 > 0.0
+
+
+@pytest.mark.parametrize("loop", ["compiled", "python"])
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
+    hostile_fmu(tmp_path, fmi)
+    scene, out = hostile_scene(tmp_path, "step_exit_20"), tmp_path / "out"
+    command = [sys.executable, "-m", "hapticlink", "run", str(scene), "--out", str(out)]
+    environment = os.environ | {"HAPTICLINK_LOOP": loop}
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert "the process of the run ended after t = 0.296875 s" in ended.stderr
+    found = tables.load(out)
+    assert found.run["fault"]["kind"] == "Crash"
+    assert found.haptics["time"].tolist() == [k / 64 for k in range(20)]
+
+
+def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path: Path) -> None:
+    """A tool that never answers would hang the run; one signal ends it while it loads."""
+    hostile_fmu(tmp_path, "2", needsExecutionTool="true")
+    run = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").run
+    assert set(run["isolated"]) == {"good_none_0", "source"}
+    scene = hostile_scene(tmp_path, "make_sleep_0")
+    command = [sys.executable, "-m", "hapticlink", "run", str(scene), "--out", str(tmp_path / "o")]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(4.0)
+        assert process.poll() is None
+        process.terminate()
+        _, said = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert "interrupted" in said
+
+
+def test_what_a_run_does_not_use_of_fmi_3_is_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    scene = hostile_scene(tmp_path, "good_none_0")
+    hostile_fmu(tmp_path, "3")
+    simulate(scene, tmp_path / "out")
+    assert "not used" not in caplog.text
+    flags = ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate")
+    hostile_fmu(tmp_path, "3", **dict.fromkeys(flags, "true"))
+    simulate(scene, tmp_path / "out")
+    offered = "event mode, early return, intermediate update, which is not used"
+    assert f"good_none_0 offers {offered}" in caplog.text

@@ -11,6 +11,6 @@ def test_the_newest_messages_are_kept_and_no_novel() -> None:
     kept = messages.newest(key)
     messages.closed(key)
     assert [said.split()[0] for said in kept] == [str(i) for i in range(19_995, 20_000)]
-    assert {len(said) for said in kept} == {messages.LONGEST}
+    assert {len(said) for said in kept} == {messages.MAX_LENGTH}
     messages.keep(key, 3, b"after the end")
     assert messages.newest(key) == []

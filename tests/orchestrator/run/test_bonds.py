@@ -5,16 +5,12 @@ from __future__ import annotations
 
 import uuid
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.passive import Passive
-from hapticlink.orchestrator.run.energy.bonds import Reader
 from tests.orchestrator.foreign_fmus import python_fmu_of, scene, with_units
 
 SLAVE = """
@@ -144,36 +140,3 @@ def test_a_vector_whose_entries_stand_apart_is_booked_as_one(tmp_path: Path) -> 
     found = experiment.results.run["energies_within_a_rate"]["spring.F -> moves.f"]
     for key, values in one_by_one.items():
         assert found[key] == pytest.approx(values.sum(), rel=1e-12)
-
-
-def test_step_control_by_energy_sees_the_energy_of_the_target(tmp_path: Path) -> None:
-    head = """[step_control]
-method = "ecco"
-tolerance = 1e-4
-energy = 0.1
-min = "1/8192"
-"""
-    steps = []
-    for units, how in (((), ""), (("mm", "kN", 1), "factor = -1.0\n")):
-        fmus(tmp_path, *units)
-        text = FMUS.replace('timing = "sampled"\n', "")
-        text += "".join(BACK.format(i) + PULL.format(i) + how for i in (1, 2))
-        experiment = simulate(str(scene(tmp_path, text + head)), tmp_path / "out")
-        assert experiment.outcome.fault is None
-        steps.append(experiment.outcome.details.controlled_steps["haptics"])
-    assert steps[0] == steps[1]
-    assert steps[0].shortest < 0.5 * steps[0].longest
-
-
-def test_a_hold_that_was_restored_reads_the_signals_that_are() -> None:
-    signals = SimpleNamespace(values=np.zeros(2), view=lambda places: None)
-    reader = Reader(signals, [0], np.ones(1))  # type: ignore[arg-type]
-    hold = Passive(HoldContext(1, displacement=reader))
-    saved = hold.saved()
-    hold.restore(saved)
-    signals.values[0] = 5.0
-    for value in vars(hold).values():
-        if isinstance(value, Reader):
-            assert value() == 5.0
-            return
-    raise AssertionError("no reader in the hold")

@@ -127,8 +127,8 @@ def test_power_across_rates_is_told_and_kept_in_check(tmp_path: Path) -> None:
         assert set(run["power_across_rates"]) == set(run["energies"]) == forces
         made[hold] = sum(e["generated"] for e in run["energies"].values())
     assert {run["holds"][name] for name in forces} == {"passive"}
-    reasons = run["holds_that_did_not_fit"]
-    assert "carries no power" in reasons["virtual_mechanism.x -> controller.x_S"]["reason"]
+    refused = run["holds_that_did_not_fit"]["virtual_mechanism.x -> controller.x_S"]
+    assert "not a declared power connection" in refused["reason"]
     assert made["zoh"] > 0.1
     assert made["passive"] < 0
 
@@ -138,7 +138,7 @@ def test_power_across_rates_is_told_and_kept_in_check(tmp_path: Path) -> None:
     [
         ("hold=passive", "no connection across rates carries power"),
         ("hold=nepce", "no connection across rates carries power"),
-        ("holds.virtual_environment.P_c=passive", "carries no power"),
+        ("holds.virtual_environment.P_c=passive", "not a declared power connection"),
         ("holds.virtual_environment.P_c=foh-derivative", "does not put out the derivative of P_c"),
         ("holds.controller.nothing=foh", "is no connection of this scene"),
     ],

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.fmus.native import compiler, host_platform
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene.blocks import blocks
@@ -130,5 +131,5 @@ def test_without_ziglang_it_is_bad_input(
 
     monkeypatch.setattr(compiler, "version", missing)
     assert status("run", "five-bar", "--set", "packaging=native", "--out", tmp_path / "out") == 2
-    assert "pip install '.[native]'" in capsys.readouterr().err
+    assert install_command("native") in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -75,6 +75,7 @@ def test_what_once_ran_is_refused(
         (["directions.hysteresis=10"], "10.0 times rank_tolerance = 0.1 is 1"),
         (["device.base_y_a=0.3"], "0.3 m is not below base_y_b = 0.2 m"),
         (["device.distal_length=0.005"], "leaves an arm nothing between its two stops"),
+        (["device.sensing=encoders"], "write `sensing` outside of [device]"),
         (["stop_when=hand.F[1] < nan"], "write a signal against a number"),
         (["linkage.family=n-four-bar", "linkage.n=1001"], ">= 1 and <= 1000"),
     ],

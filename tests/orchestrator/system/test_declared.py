@@ -86,7 +86,7 @@ def test_a_scene_says_what_a_foreign_matrix_is(tmp_path: Path) -> None:
     ("more", "why"),
     [
         ('[holds]\n"slow.x" = "foh-derivative"', "does not put out the derivative of x"),
-        ('[holds]\n"slow.x" = "passive"', "it carries no power that is known"),
+        ('[holds]\n"slow.x" = "passive"', "it is not a declared power connection"),
     ],
 )
 def test_nothing_is_guessed_from_the_name_of_a_foreign_port(

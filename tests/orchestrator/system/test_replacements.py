@@ -50,17 +50,28 @@ def spring(folder: Path, size: int = 3, output: str = "F_motor") -> Path:
     return Path(FmuBuilder.build_FMU(script, dest=folder))
 
 
+@pytest.fixture(scope="module")
+def own_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The FMU of each block."""
+    return hl.build("closed-loop", SHORT, out=tmp_path_factory.mktemp("fmus"))
+
+
+@pytest.fixture(scope="module")
+def own_run(tmp_path_factory: pytest.TempPathFactory) -> hl.Run:
+    return hl.run("closed-loop", SHORT, out=tmp_path_factory.mktemp("run"))
+
+
 @pytest.mark.parametrize("block", ["hand", "controller", "haptic_device", "virtual_environment"])
-def test_a_block_s_own_fmu_in_its_place_changes_no_byte(tmp_path: Path, block: str) -> None:
+def test_a_block_s_own_fmu_in_its_place_changes_no_byte(
+    tmp_path: Path, own_files: dict[str, Path], own_run: hl.Run, block: str
+) -> None:
     """Connections, order, rate and timing are those of the block."""
-    file = hl.build("closed-loop", SHORT, out=tmp_path)[block]
-    swap = {**SHORT, "fmu.+": {"replaces": block, "path": str(file)}}
-    ours = hl.run("closed-loop", SHORT, out=tmp_path / "a")
-    theirs = hl.run("closed-loop", swap, out=tmp_path / "b")
-    assert theirs.run["replaced"] == {block: {"lost": [], "unfed": []}}
-    assert theirs.run["connections"] == ours.run["connections"]
+    swap = {**SHORT, "fmu.+": {"replaces": block, "path": str(own_files[block])}}
+    swapped = hl.run("closed-loop", swap, out=tmp_path)
+    assert swapped.run["replaced"] == {block: {"lost": [], "unfed": []}}
+    assert swapped.run["connections"] == own_run.run["connections"]
     for table in ("haptics.csv", "graphics.csv"):
-        assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()
+        assert (own_run.folder / table).read_bytes() == (tmp_path / table).read_bytes()
 
 
 def test_by_one_option_and_what_does_not_meet_is_listed(

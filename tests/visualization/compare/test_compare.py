@@ -9,18 +9,18 @@ import re
 import shutil
 import tomllib
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.commands import main
 from hapticlink.orchestrator.results.named_runs import named
 from hapticlink.orchestrator.results.scene_file import scene_file
+from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, page, settings
 from hapticlink.visualization.figures.run_figures import figures as run_figures
+from tests.shared_fixtures import status
 
 
 @pytest.fixture(scope="module")
@@ -32,10 +32,21 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
-def called(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return int(ended.value.code or 0)
+def with_keys(root: Path, name: str, **keys: object) -> Results:
+    """A recorded run of which keys of run.json are others."""
+    run = hl.load(root / name)
+    return replace(run, run=run.run | keys)
+
+
+def titled(root: Path, name: str, title: str) -> Results:
+    """A recorded run of a scene with another title."""
+    return with_keys(root, name, scene=hl.load(root / name).run["scene"] | {"title": title})
+
+
+@pytest.fixture
+def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of a page's text: figures take most of its time."""
+    monkeypatch.setattr(page.of_a_run, "figures", lambda run: {})
 
 
 def test_settings_that_differ_are_all_of_them(root: Path) -> None:
@@ -56,7 +67,7 @@ def test_errors_are_compared_until_the_first_end(root: Path) -> None:
 
 
 def test_other_scenes_are_told(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert called("compare", str(root / "slow"), str(root / "other")) == 0
+    assert status("compare", str(root / "slow"), str(root / "other")) == 0
     said = capsys.readouterr().out
     assert "warning: different mechanisms: Closed-loop mechanism of Table 6.1; " in said
     assert "operational point from that of the first run" not in said
@@ -66,7 +77,7 @@ def test_the_command_draws_and_prints_json(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folders = str(root / "slow"), str(root / "fast")
-    assert called("compare", *folders, "--out", str(tmp_path), "--json") == 0
+    assert status("compare", *folders, "--out", str(tmp_path), "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert [*told["runs"]] == ["slow", "fast"]
     assert told["runs"]["slow"]["Settings that differ"]["graphics.rate"] == "10"
@@ -90,65 +101,38 @@ def test_bad_input(
     said: str,
 ) -> None:
     monkeypatch.chdir(root)
-    assert called(*given) == 2
+    assert status(*given) == 2
     assert said in capsys.readouterr().err
-
-
-class Parsed(HTMLParser):
-    """Headings, pictures and tags of a page."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.headings, self.pictures, self.tags, self._in = [""], list[bytes](), set[str](), ""
-        self.feed(html)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        self._in = tag
-        if tag == "h2":
-            self.headings.append("")
-        source = dict(attrs).get("src")
-        if source:
-            assert source.startswith("data:image/png;base64,")
-            self.pictures.append(base64.b64decode(source.partition(",")[2]))
-
-    def handle_endtag(self, tag: str) -> None:
-        self._in = ""
-
-    def handle_data(self, data: str) -> None:
-        if self._in == "h2":
-            self.headings[-1] += data
 
 
 def test_the_page_answers_in_the_order_in_which_one_asks(root: Path) -> None:
     runs = named([root / "slow", root / "fast"])
     html = page.page(runs)
     assert html == page.page(runs)
-    found = Parsed(html)
-    assert found.headings[1:] == [
+    assert re.findall("<h2>(.*?)</h2>", html) == [
         "What ran", "Outcome", "Performance, all until 0.699 s", "Energies, of the whole run",
         "Stability and steps", "Timing", "Settings that differ", "How to make it again",
     ]  # fmt: skip
-    assert len(found.pictures) == 7
-    assert all(picture.startswith(b"\x89PNG") for picture in found.pictures)
-    assert not {"script", "link", "iframe"} & found.tags
+    pictures = re.findall('src="data:image/png;base64,(.*?)"', html)
+    assert len(pictures) == 7
+    assert all(base64.b64decode(picture).startswith(b"\x89PNG") for picture in pictures)
+    assert not {"script", "link", "iframe"} & {*re.findall(r"<(\w+)", html)}
     assert not re.search(r"(src|href)=\"(?!data:)", html)
 
 
-def test_text_of_a_scene_is_text_in_the_page(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("without_figures")
+def test_text_of_a_scene_is_text_in_the_page(root: Path) -> None:
     title = "<script>alert(1)</script> & more"
-    hl.run("closed-loop", {"duration": 0.05, "title": title}, out=tmp_path, figures=False)
-    html = page.page(named([tmp_path]))
+    html = page.page({"run": titled(root, "other", title)})
     assert "<script" not in html
     assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; more" in html
 
 
-def test_dollar_signs_of_a_scene_are_no_formula(tmp_path: Path) -> None:
+def test_dollar_signs_of_a_scene_are_no_formula(root: Path) -> None:
     """Matplotlib fails at what two of them enclose if that is no formula, as here."""
     title = r"costs $1 \\g $& more $$ or _less"
-    hl.run("closed-loop", {"duration": 0.05, "title": title}, out=tmp_path / "$a$_{", figures=True)
-    hl.run("closed-loop", {"duration": 0.05}, out=tmp_path / "_b", figures=False)
-    runs = named([tmp_path / "$a$_{", tmp_path / "_b"])
+    runs = {"$a$_{": titled(root, "fast", title), "_b": hl.load(root / "slow")}
+    page.page({"$a$_{": runs["$a$_{"]})  # with all figures of a run
     page.page(runs)
     legend = overlay.figures(runs)["distance"].axes[0].get_legend()
     assert legend
@@ -156,10 +140,9 @@ def test_dollar_signs_of_a_scene_are_no_formula(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_letters_that_no_font_has_are_replaced(tmp_path: Path) -> None:
-    hl.run("closed-loop", {"duration": 0.05, "title": "闭环 Механизм"}, out=tmp_path / "环")
-    (name, run), *_ = named([tmp_path / "环"]).items()
-    assert "闭环" in page.page({name: run})
+def test_letters_that_no_font_has_are_replaced(root: Path) -> None:
+    run = titled(root, "fast", "闭环 Механизм")
+    assert "闭环" in page.page({"环": run})
     title = run_figures(run)["mechanism"].axes[0].get_title()
     assert title.startswith("\N{REPLACEMENT CHARACTER}\N{REPLACEMENT CHARACTER} Механизм at the")
 
@@ -177,21 +160,16 @@ def test_letters_that_no_font_has_are_replaced(tmp_path: Path) -> None:
     ],
 )
 def test_a_run_json_that_was_changed_is_bad_input(
-    root: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    keys: tuple[str | int, ...],
-    value: object,
+    root: Path, tmp_path: Path, keys: tuple[str | int, ...], value: object
 ) -> None:
-    folder = shutil.copytree(root / "fast", tmp_path / "run")
-    run = json.loads((folder / "run.json").read_text())
+    run = json.loads((root / "fast" / "run.json").read_text())
     place = run
     for key in keys[:-1]:
         place = place[key]
     place[keys[-1]] = value
-    (folder / "run.json").write_text(json.dumps(run))
-    assert called("report", str(folder), "--out", str(tmp_path / "page.html")) == 2
-    assert "run.json: " in capsys.readouterr().err
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    with pytest.raises(hl.InputFault, match=r"run\.json: .*: run the scene again"):
+        named([tmp_path])
 
 
 @pytest.mark.parametrize(
@@ -225,14 +203,13 @@ def test_a_run_without_a_finite_value_has_a_page(root: Path, tmp_path: Path) -> 
     assert 'alt="mechanism"' not in page.page(named([run]))
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_warnings_alone_are_red(root: Path) -> None:
-    (run,) = named([root / "fast"]).values()
     lines = ["one: 7 steps were repeated"]
-    noted = replace(run, run=run.run | {"warnings": lines})
-    assert 'class="bad"' not in page.page({"fast": noted})
+    assert 'class="bad"' not in page.page({"fast": with_keys(root, "fast", warnings=lines)})
     lines = [*lines, "warning: a contact is too stiff"]
-    warned = replace(run, run=run.run | {"warnings": lines})
-    assert '<td class="bad">a contact is too stiff</td>' in page.page({"fast": warned})
+    html = page.page({"fast": with_keys(root, "fast", warnings=lines)})
+    assert '<td class="bad">a contact is too stiff</td>' in html
 
 
 def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The lifted map on the page: its verdict is that of `stability`; its process leaves nothing."""
+"""The stability verdict on the page is that of `stability`; its process leaves nothing behind."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SCENE, OPTIONS = "closed-loop-direct", ("graphics.rate=12.8",)
 HELD = {"x": "x_S", "v": "v_S", "Lambda_inv": "Lambda_inv", "P_c": "P_c"}
 """What the mechanism sends to the controller."""
 QUICK = 120.0
-"""Time (s) within which a map is there even beside other tests."""
+"""Time (s) within which a verdict is computed even beside other tests."""
 
 
 @pytest.fixture
@@ -62,10 +62,10 @@ def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
 
 @pytest.mark.parametrize(
     ("settings", "said"),
-    [(Settings(rate=30.1), "30.1 Hz repeats only after 5120 ticks, 30 Hz would be quick"),
-     (Settings(jitter=0.1), "frames of random lengths never repeat")],
+    [(Settings(rate=30.1), "30.1 Hz repeats only after 5120 ticks, 30 Hz would be fast"),
+     (Settings(jitter=0.1), "with jitter the system never repeats")],
 )  # fmt: skip
-def test_what_is_not_cheap_enough_is_told_beforehand(settings: Settings, said: str) -> None:
+def test_what_would_take_long_is_refused(settings: Settings, said: str) -> None:
     found = predicted(viewed(SCENE, OPTIONS), settings, {})
     assert (found["verdict"], found["said"]) == ("", f"not computed: {said}")
 

@@ -26,11 +26,12 @@ def test_the_operational_point_is_drawn_where_it_is() -> None:
 
 def test_a_body_of_three_joints_is_a_triangle_of_them() -> None:
     """Corners apart by the distances of the scene's coupler."""
-    run = hl.run("six-bar", {"duration": 0.05})
-    axes = run.figures()["mechanism"].axes[0]
+    scene = hl.scene("six-bar")
+    assert scene.linkage is not None
+    start = [scene.linkage.start.get(joint.name, 0.0) for joint in scene.linkage.joint]
+    (axes,) = drawing.figure(scene, start).axes
     (coupler,) = (p for p in axes.patches if isinstance(p, Polygon))
     corners = coupler.get_xy()[:-1]
-    scene = hl.scene("six-bar")
     places = [j.at_parent for j in scene.linkage.joint if j.parent == "coupler"]
     places += [at for loop in scene.linkage.loop
                for b, at in zip(loop.bodies, loop.at, strict=True) if b == "coupler"]  # fmt: skip
@@ -59,10 +60,13 @@ def test_info_draws_and_names_what_it_drew(
     assert all(str(tmp_path / name) in capsys.readouterr().out for name in sorted(files)[:1])
 
 
-def test_the_terminal_ends_with_the_numbers_of_the_figures(
+def test_the_terminal_ends_with_the_numbers_of_the_tables(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert status("run", "closed-loop", "--set", "duration=0.2", "--out", tmp_path) == 0
+    assert (
+        status("run", "closed-loop", "--set", "duration=0.2", "--no-figures", "--out", tmp_path)
+        == 0
+    )
     told = capsys.readouterr().out
     run = hl.load(tmp_path)
     apart = run.haptics["virtual_mechanism.x"] - run.haptics["haptic_device.x_true"]

@@ -1,0 +1,55 @@
+/* What an FMU may change of the whole process: how numbers are rounded, and that it goes on. */
+
+#include "loop.h"
+
+#include <fenv.h>
+#include <stdio.h>
+#include <stdlib.h>
+#ifdef _WIN32
+#include <process.h>
+#else
+#include <unistd.h>
+#endif
+
+#if defined(__x86_64__) || defined(_M_X64)
+#include <xmmintrin.h>
+enum { CONTROL = 0xffc0, USUAL = 0x1f80 }; /* of MXCSR: rounding, masks of exceptions, tiny numbers taken for zero */
+
+static inline unsigned control(void) { return _mm_getcsr() & CONTROL; }
+
+static void set_control(unsigned value) {
+    fesetround(FE_TONEAREST); /* of the x87 unit, too */
+    _mm_setcsr((_mm_getcsr() & ~(unsigned)CONTROL) | value);
+}
+#else
+enum { USUAL = FE_TONEAREST };
+
+static inline unsigned control(void) { return (unsigned)fegetround(); }
+
+static void set_control(unsigned value) { fesetround((int)value); }
+#endif
+
+static unsigned before = USUAL;
+
+void note_arithmetic(void) { before = control(); }
+
+void keep_arithmetic(Place *p) {
+    if (control() == before) return;
+    set_control(before);
+    p->altered++;
+}
+
+static int running;
+
+/* Called by exit(), and not when Python ends the process, which has left every run by then. */
+static void ended(void) {
+    if (!running) return;
+    fflush(NULL);
+    _exit(1);
+}
+
+void guard_exit(int on) {
+    static int registered;
+    if (!registered) registered = !atexit(ended);
+    running += on ? 1 : -1;
+}
