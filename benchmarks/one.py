@@ -33,7 +33,7 @@ SCENES = (
 )
 FORMS = {"run": 0, "one FMU, 1 tick a step": 1, "one FMU, 16 ticks a step": 16}
 COLUMNS = ("scene", "form", "tick_us", "times_real_time", "bytes", "build_s")
-ROUNDS = 20
+ROUNDS = 15
 Told = Callable[[str, int, int], None]
 
 
