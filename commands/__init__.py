@@ -136,7 +136,7 @@ def _status(arguments: Sequence[str] | None) -> int:
                 f"hapticlink: {error}: `hapticlink doctor` reports what is missing", file=sys.stderr
             )
             return 1
-        from hapticlink.orchestrator.base import internal_error  # slow to load
+        from hapticlink.commands import internal_error  # slow to load
 
         say(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)
         return 1

@@ -23,7 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hapticlink import commands
-from hapticlink.orchestrator.base import internal_error
+from hapticlink.commands import internal_error
 
 ENOUGH = 0.5
 """Seconds from a run's first row on after which it is ended."""

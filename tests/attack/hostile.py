@@ -8,7 +8,7 @@ the process of the run may crash it; then the rows are there nevertheless, and r
 crash. Where it hangs the process of the run, two signals end that. And nothing is believed that is
 wrong: a status that FMI does not define never counts as success, and the other FMU's numbers are
 those of a run without a hostile FMU. _exit(0) of C code in the process of the run, which nobody is
-asked about, is left out.
+asked about, and a process that it forks there are left out.
 """
 
 from __future__ import annotations
@@ -187,7 +187,7 @@ def attack(number: int, seed: int) -> Iterator[Made]:
             keys = draw.choice(("", "isolate = true"))
             loop = draw.choice(("compiled", "python"))
             step = draw.randrange(1, 30)
-            if act == "leave":
+            if act in ("leave", "child"):
                 keys = "isolate = true"
             case = (fmi, place, act, step, keys, loop)
             outcome, wrong = made.made(*case)

@@ -45,6 +45,11 @@ def folder_in_the_list(out: Path) -> None:
     (out / "run.json").write_text(json.dumps(story))
 
 
+def one_line(out: Path) -> None:
+    (out / "haptics.csv").unlink()
+    (out / "haptics.rows").write_text("x" * 2_000_000)
+
+
 def folder_as_story(out: Path) -> None:
     (out / "run.json").unlink()
     (out / "run.json").mkdir()
@@ -77,7 +82,7 @@ def test_a_folder_in_the_place_of_run_json_is_told(
 
 
 @pytest.mark.parametrize(
-    "spoil", [fifo, endless, endless_rows, brackets, folder_as_story, endless_story]
+    "spoil", [fifo, endless, endless_rows, one_line, brackets, folder_as_story, endless_story]
 )
 def test_what_reads_them_refuses_them(out: Path, spoil: Callable[[Path], None]) -> None:
     spoil(out)

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.scene import load_scene, overrides
-from hapticlink.orchestrator.scene.json_schema import json_schema
 from hapticlink.orchestrator.scene.scene_source import Source
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.orchestrator.scene_numbers import SCENES, beyond, key, of_scene, put, tables, toml
