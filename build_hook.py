@@ -16,7 +16,8 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 FOLDERS = (
-    "components", "fmus", "orchestrator", "analysis", "visualization", "api", "commands", "scenes",
+    "components", "fmus", "orchestrator", "programs", "analysis", "visualization", "api",
+    "commands", "scenes",
 )  # fmt: skip
 LOOP = Path("orchestrator", "run", "compiled")
 

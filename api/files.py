@@ -31,6 +31,8 @@ def build(
     *,
     out: str | Path,
     all_platforms: bool = False,
+    as_one: bool = False,
+    without: str | None = None,
 ) -> dict[str, Path]:
     """Build the FMUs of a scene, changed by `options`, in the folder `out`: `<block>.fmu` for each
     block. Returns the paths by block.
@@ -39,10 +41,21 @@ def build(
     sets once (the device's `x_start`) is the value that it gets there.
 
     `all_platforms` compiles native FMUs for Linux, Windows and macOS instead of this machine only.
-    Raises InputFault if the scene is invalid, has nothing to build, or `out` cannot be written to;
-    Fault if the compiler fails.
+    `as_one` builds one native FMU that holds all blocks with their rates and holds, by the name of
+    the scene's file; without: a block that it leaves out, whose outputs become its inputs.
+
+    Raises InputFault if the scene is invalid, has nothing to build, cannot become one FMU, or `out`
+    cannot be written to; Fault if the compiler fails.
     """
     read = open_scene.load(scene, options)
+    if as_one:
+        from hapticlink.programs.build import build_program  # loads casadi
+
+        name = scene if isinstance(scene, str | Path) else read.title
+        path = build_program(read, name, out=out, without=without, all_platforms=all_platforms)
+        return {path.stem: path}
+    if without:
+        raise InputFault("--without leaves a block out of one FMU: add --as-one")
     if all_platforms and read.packaging != "native":
         raise InputFault("--all-platforms compiles: add --set packaging=native")
     planned = blocks(read)

@@ -21,6 +21,7 @@ Benchmark = Literal[
     "real-time",
     "stress",
     "view",
+    "one",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores."""
 FOLDERS = {"stress": "stability"}
@@ -45,6 +46,7 @@ def bench(
     - real-time: deadlines missed in real time
     - stress: hard scenes at the edge of stability and beyond, each with the outcome it has to have
     - view: deadlines missed and latencies while a browser drags
+    - one: a scene as one FMU, beside its run through FMUs
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.

@@ -13,20 +13,38 @@ AllPlatforms = Annotated[
     bool,
     Parameter(negative="", help="Compile for Linux, Windows and macOS, not this machine alone."),
 ]
+AsOne = Annotated[
+    bool,
+    Parameter(negative="", help="One native FMU with all blocks, their rates and holds."),
+]
+Without = Annotated[
+    str | None,
+    Parameter(help="With --as-one: a block to leave out, whose outputs become inputs."),
+]
 
 
 def build(
-    scene: Scene, /, *, out: Out = None, set: Set = None, all_platforms: AllPlatforms = False
+    scene: Scene,
+    /,
+    *,
+    out: Out = None,
+    set: Set = None,
+    all_platforms: AllPlatforms = False,
+    as_one: AsOne = False,
+    without: Without = None,
 ) -> int:
-    """Build the FMUs of a scene in OUT (default fmus/SCENE), one file per block.
+    """Build the FMUs of a scene in OUT (default fmus/SCENE), one file per block, or one for all.
 
     For example:
 
         hapticlink build closed-loop --set packaging=native --all-platforms
+        hapticlink build closed-loop --as-one --without hand
     """
     import hapticlink as hl
 
     folder = out or default_folder("fmus", scene)
-    made = hl.build(scene, set or (), out=folder, all_platforms=all_platforms)
+    made = hl.build(
+        scene, set or (), out=folder, all_platforms=all_platforms, as_one=as_one, without=without
+    )
     say(*made.values(), sep="\n")
     return 0

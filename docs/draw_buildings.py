@@ -41,6 +41,7 @@ BUILDINGS = {
         "ssp",
         ".",
     ),
+    "programs": (".",),
     "analysis": ("findings", "stability", "sweep", "maps", "tune"),
     "visualization": (".", "mechanism", "figures", "live", "replay", "compare"),
     "api": (".",),
@@ -52,13 +53,14 @@ PURPOSES = {
     "components": "equations, without FMI, files or clocks",
     "fmus": "components as FMUs",
     "orchestrator": "co-simulation of FMUs",
+    "programs": "a scene as one FMU",
     "analysis": "what is computed about a scene or a run",
     "visualization": "what is drawn",
     "api": "import hapticlink",
     "commands": "the command line",
 }
 CODE = {".py", ".c", ".h", ".js", ".css", ".html"}
-COLORS = ("#777777", "#997700", "#0077bb", "#009988", "#ee7733", "#aa3377", "#333333")
+COLORS = ("#777777", "#997700", "#0077bb", "#009988", "#cc3311", "#ee7733", "#aa3377", "#333333")
 """Of the buildings and of the arrows that leave them."""
 WIDTH, LEFT, ROW, LETTER = 840, 250, 30, 7.6
 """Of a building, of its name, height of a row of rooms, width of a letter (px)."""

@@ -43,7 +43,7 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
             *(f"#define {name} {value}" for name, value in sizes.items()),
             _table("char *const names", map(json.dumps, names)),
             _table("char *const state_names", map(json.dumps, component.state_texts)),
-            _table("double starts", map(_number, starts)),
+            _table("double starts", map(number, starts)),
             _table("char is_fixed", (str(int(flag)) for flag in fixed)),
             text,
         ]
@@ -56,7 +56,7 @@ def _table(declared: str, entries: Iterable[str]) -> str:
     return f"static const {declared}[] = {{{', '.join([*entries, '0'])}}};"
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     if math.isfinite(value):
         return repr(float(value))
     return "NAN" if math.isnan(value) else "INFINITY" if value > 0 else "-INFINITY"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from typing import overload
 
@@ -29,6 +30,11 @@ class Frames(Sequence[int]):
     def repeats(self) -> int:
         """The ticks after which the spacing repeats, however many frames there are."""
         return self._at(self.round + 1) - self._at(1)
+
+    @property
+    def endless(self) -> Frames:
+        """The same instants, with as many more as can be counted."""
+        return Frames(self._at, sys.maxsize, self.round)
 
     def times(self, factor: int) -> Frames:
         """The same instants in ticks that are shorter by `factor`."""

@@ -114,8 +114,8 @@ def periodic(
     begin = first / base
     if begin.denominator != 1:
         raise ValueError(f"a phase of {first} s is not a whole number of ticks of {base} s")
-    later = range(int(begin), end + 2 * int(ticks) + 1, int(ticks))
-    return Frames(lambda i: later[i - 1] if i else 0, len(later) + 1, 1)
+    count = len(range(int(begin), end + 2 * int(ticks) + 1, int(ticks)))
+    return Frames(lambda i: int(begin) + (i - 1) * int(ticks) if i else 0, count + 1, 1)
 
 
 def aligned(period: Fraction, base: Fraction, end: int, first: Fraction | None = None) -> Frames:

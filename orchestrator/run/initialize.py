@@ -25,8 +25,9 @@ SWEEPS = 50
 TOLERANCE = 1e-12
 
 
-def initialize(system: System, instances: Mapping[str, Instance], signals: SignalVector) -> None:
-    """Initialise every instance; the outputs of t = 0 are in the signal vector afterwards.
+def initialize(system: System, instances: Mapping[str, Instance], signals: SignalVector) -> bool:
+    """Initialise every instance; the outputs of t = 0 are in the signal vector afterwards. Returns
+    whether sweeps sufficed, without Newton's method.
 
     Sweeps over all FMUs carry values through connections, parameters set from outputs among
     them. Raises FmuFault where they don't agree to 1e-12 within 50 sweeps and 50 steps of Newton,
@@ -68,6 +69,7 @@ def initialize(system: System, instances: Mapping[str, Instance], signals: Signa
     require_finite(instances)
     for instance in instances.values():
         instance.exit_initialization()
+    return bool(agree.all())
 
 
 def _solve(

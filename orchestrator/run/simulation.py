@@ -36,7 +36,8 @@ class Simulation:
 
     pace: the schedule of a run in real time. beside: the FMUs whose steps are then taken beside the
     loop, each with its clock; `sides` and `arrivals`, tables of their samples, are by clock. late:
-    ticks by which the current event comes after its own.
+    ticks by which the current event comes after its own. swept: whether sweeps alone have
+    initialised the FMUs.
     """
 
     def __init__(self, system: System, results: RunFolder, stack: ExitStack) -> None:
@@ -46,6 +47,7 @@ class Simulation:
         self.sides: Mapping[str, Side] = {}
         self.arrivals: dict[str, Recorder] = {}
         self.late = 0
+        self.swept = False
         self.seconds = system.timeline.seconds
         self._results, self._stack = results, stack
         self.isolated = isolated(system.fmus)
@@ -74,7 +76,7 @@ class Simulation:
     def start(self) -> None:
         """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and
         create the recorders."""
-        initialize(self.system, self.instances, self.signals)
+        self.swept = initialize(self.system, self.instances, self.signals)
         values = self.signals.values
         for c in self.system.connections:
             if c.hold:

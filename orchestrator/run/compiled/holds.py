@@ -223,7 +223,7 @@ class CompiledHold(Hold, State):
             self._account = CompiledAccount(own)
             c.fill(account=self._account.c)
             self._account.c.fill(tank=tank and tank.words)
-        self._room = 0
+        self.room = 0
         self.grow()
         if tank and isinstance(own, PassiveSetPosition):
             c.fill(own, "row", tank=tank.words)
@@ -246,12 +246,12 @@ class CompiledHold(Hold, State):
 
     def grow(self) -> None:
         """Make room for more samples."""
-        self._room = 2 * self._room or FEW
+        self.room = 2 * self.room or FEW
         if self.link is not None:
-            self._transit.to(self._room)
-            self.link.room = self._room
+            self._transit.to(self.room)
+            self.link.room = self.room
         if self._account:
-            self._account.to(self._room)
+            self._account.to(self.room)
 
     def serve(self, code: int) -> None:
         """Do what `push` or `value` in C have returned for."""

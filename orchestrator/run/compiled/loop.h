@@ -4,6 +4,10 @@
  * them. Every field has 8 bytes, so that there is no padding to agree on. What one operation reads
  * lies together (memory.py), the fields of each step first: the cost of a loop over many FMUs is
  * that of the cache lines that it touches.
+ *
+ * A comment [n] behind a pointer is the number of entries that it points to, where that is not one:
+ * an expression in fields of its structure or of the one that leads there. What has no such field,
+ * n_values, n_ops ..., is known to Python. `programs` writes a whole run as C by them.
  */
 
 #ifndef LOOP_H
@@ -32,9 +36,9 @@ typedef struct {
  * as doubles. These are the same memory where the FMU has doubles. A cache line long. */
 typedef struct {
     void *call, *fmu;
-    const uint32_t *references;
-    void *buffer;
-    double *values;
+    const uint32_t *references /* [n_references] */;
+    void *buffer /* [n] */;
+    double *values /* [n] */;
     int64_t n_references, n;
     Kind kind;
 } Transfer;
@@ -47,8 +51,10 @@ enum { DOUBLE, FLOAT, INT64, INT32, INT16, INT8, UINT64, UINT32, UINT16, UINT8, 
 typedef struct {
     void *get_state, *set_state, *state;
     int64_t *steps, *count;
-    const int64_t *bases, *rates, *ports;
-    double *scales, *jumps, *last, *errors, *times, *weights, *size, *before, *halves;
+    const int64_t *bases /* [n] */, *rates /* [n] */, *ports /* [n] */;
+    double *scales /* [n_ports] */, *jumps /* [n_ports] */, *last /* [n] */;
+    double *errors /* [room * n_ports] */, *times /* [room] */, *weights /* [room] */, *size;
+    double *before /* [n_outputs] */, *halves /* [n_outputs] */;
     int64_t every, first, n, n_ports, room;
     double at_rest, jump, share;
 } Check;
@@ -59,15 +65,15 @@ typedef struct {
     Kind kind;
     int64_t forward;                      /* noSetFMUStatePriorToCurrentPoint */
     void *get_state;                      /* before each step that may be repeated, or NULL */
-    const Transfer *gets;
+    const Transfer *gets /* [n_gets] */;
     int64_t n_gets;
-    double *outputs;
-    const double *inverse;                /* 1/bound */
-    double *good;                         /* the last finite outputs, or NULL */
+    double *outputs /* [n_outputs] */;
+    const double *inverse /* [n_outputs] */; /* 1/bound */
+    double *good /* [n_outputs] */;       /* the last finite outputs, or NULL */
     int64_t n_outputs, n_steps, sparse;   /* sparse: steps so short that few of them are timed */
     Check *check;                         /* NULL if there is none */
     const int64_t *due;                   /* whether the next row is written; else `fewer` suffice */
-    const Transfer *fewer;
+    const Transfer *fewer /* [n_fewer] */;
     int64_t n_fewer;
     void *state;                          /* saved by get_state */
     uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
@@ -81,12 +87,12 @@ typedef struct {
 typedef struct {
     Place *place;
     int64_t n, key;
-    const int64_t *where;
-    double *values;
-    const Transfer *sets;
+    const int64_t *where /* [n] */;
+    double *values /* [n] */;
+    const Transfer *sets /* [n_sets] */;
     int64_t n_sets;
-    const double *factors, *offsets;      /* NULL where all are 1 and 0 */
-    const int64_t *into;
+    const double *factors /* [n] */, *offsets /* [n] */; /* NULL where all are 1 and 0 */
+    const int64_t *into /* [n] */;
     double *whole;
 } Setter;
 
@@ -96,33 +102,34 @@ typedef struct {
  * sample. */
 typedef struct {
     int64_t started, newest, sent, lost, overtaken;
-    int64_t *late;
+    int64_t *late /* [n_late] */;
     int64_t n_late, at_late;
-    int64_t *arrivals, *stamps;
-    double *samples;
+    int64_t *arrivals /* [room] */, *stamps /* [room] */;
+    double *samples /* [room * width] */;
     int64_t n, room;
 } Link;
 
 /* Of a spring-damper: energy_tank.py. `velocity` is NULL where the near end has none. */
 typedef struct {
     int64_t n, tick, sampled;
-    const double *stiffness, *damping, *turns;
-    const int64_t *where, *velocity;
+    const double *stiffness /* [n] */, *damping /* [n] */, *turns /* [n] */;
+    const int64_t *where /* [n] */, *velocity /* [n] */;
     double period, available, needed, credited;
-    double *newest, *modulated, *x, *moved, *force, *withheld; /* (2, n), (2, n), (n,) */
+    double *newest /* [2 * n] */, *modulated /* [2 * n] */;
+    double *x /* [n] */, *moved /* [n] */, *force /* [n] */, *withheld /* [n] */;
 } Tank;
 
 /* factor board[where] + offset; factor is NULL where it is 1 and offset 0. */
 typedef struct {
-    const int64_t *where;
-    const double *factor, *offset;
+    const int64_t *where /* [n] */;
+    const double *factor /* [n] */, *offset /* [n] */;
     int64_t n;
 } Reader;
 
 /* Vectors with their ticks, oldest first. */
 typedef struct {
-    int64_t count, *ticks;
-    double *values;
+    int64_t count, *ticks /* [room] */;
+    double *values /* [room * n] */;
 } Queue;
 
 /* Of a hold that observes its energy: energy_account.py. `passive` or `nepce`. path: of the target,
@@ -131,7 +138,7 @@ typedef struct {
 typedef struct {
     int64_t n, passive, tick, stamp, steps, delayed, room;
     Reader displacement, velocity;
-    double *vectors;
+    double *vectors /* [18 * n] */;
     Queue path, until, fresh;
     Tank *tank;                           /* of a spring on whose far side it is, or NULL */
     double promised, promise;
@@ -144,14 +151,14 @@ typedef struct {
 typedef struct {
     int64_t kind, n, width, depth, count;
     int64_t stamps[3];
-    double *samples, *vectors;
+    double *samples /* [depth * width] */, *vectors /* [8 * n] */;
     int64_t arrival, span, interval, begun;
-    const int64_t *sources;
-    double *held;                         /* where `evaluate` puts the value */
+    const int64_t *sources /* [width] */;
+    double *held /* [n] */;               /* where `evaluate` puts the value */
     int64_t n_angles;
-    const int64_t *angles;
-    const double *turns;
-    double *last;
+    const int64_t *angles /* [n_angles] */;
+    const double *turns /* [n_angles] */;
+    double *last /* [n_angles] */;
     int64_t unwrapped;
     Link *link;
     Tank *tank;
@@ -160,7 +167,7 @@ typedef struct {
     const Account *far;                   /* on the far side of the spring that it sets, or NULL */
     double *credit;                       /* where what that has put in belongs */
     int64_t manifold, rows, rank;         /* of a matrix: its kind, its rows, a projector's rank */
-    double *scale;                        /* (2, rows) */
+    double *scale /* [2 * rows] */;
 } Hold;
 
 enum { NO_MATRIX, PROJECTOR, SEMIDEFINITE };
@@ -175,8 +182,9 @@ enum {
 /* The rows of meter.py; counts: of stamps, ticks, efforts. */
 typedef struct {
     Reader source, held, x;
-    int64_t *counts, *stamps, *ticks;
-    double *samples, *moves, *efforts, *totals;
+    int64_t *counts /* [3] */, *stamps /* [room] */, *ticks /* [full] */;
+    double *samples /* [room * source.n] */, *moves /* [full * x.n] */, *efforts /* [full * x.n] */;
+    double *totals /* [3] */;
     int64_t room, full, least;            /* of stamps and samples; of the others; these at least */
 } Meter;
 
@@ -185,9 +193,9 @@ typedef struct {
  * are filled; NULL where there is no table. due: whether the next one is. room: 0 before the
  * first. reached: time of the newest, written or not. */
 typedef struct {
-    double *block;
-    const double *view;
-    const int64_t *where;
+    double *block /* [room[0] * (1 + n)] */;
+    const double *view /* [n] */;
+    const int64_t *where /* [n] */;
     int64_t *rows;
     const int64_t *room;
     int64_t *due, *count;
@@ -225,7 +233,7 @@ typedef struct {
 
 /* A window of a clock's communication points (ticks), at the current one; `next` after its event. */
 typedef struct {
-    const int64_t *starts;
+    const int64_t *starts /* [n] */;
     int64_t n, at, next;
     Side *side;                           /* NULL where all steps are taken in the loop */
 } Clock;
@@ -247,14 +255,14 @@ typedef struct {
 } Block;
 
 typedef struct {
-    double (*points)[2];
-    double *values;
-    Op *ops;
-    Fmu *fmus;
-    Setter *setters;
-    Hold **holds;
-    Meter **meters;
-    Table *tables;
+    double (*points)[2] /* [n_points] */;
+    double *values /* [n_values] */;
+    Op *ops /* [n_ops] */;
+    Fmu *fmus /* [n_fmus] */;
+    Setter *setters /* [n_setters] */;
+    Hold **holds /* [n_holds] */;
+    Meter **meters /* [n_meters] */;
+    Table *tables /* [n_tables] */;
     double numerator, denominator;        /* of a tick (s) */
     int64_t late;                         /* ticks by which the event comes after its own */
 } Loop;
@@ -265,10 +273,11 @@ typedef struct {
 } At;
 
 typedef struct {
-    Clock *clocks;
+    Clock *clocks /* [n_clocks] */;
     int64_t n_clocks, end;
-    int64_t *keys, *key;                  /* of the kinds, and of the current event */
-    Block *kinds;
+    int64_t *keys /* [n_kinds * (1 + n_clocks)] */; /* of the kinds */
+    int64_t *key /* [1 + n_clocks] */;    /* of the current event */
+    Block *kinds /* [n_kinds] */;
     int64_t n_kinds, kind;
     int64_t tick, events;                 /* events that are complete */
     int64_t patience, since;              /* ns after which, and from when, Python gets a turn */
@@ -299,10 +308,12 @@ static inline double tick_time(const Loop *l, int64_t tick) { /* s */
     return (double)tick * l->numerator / l->denominator;
 }
 
+#ifndef EXPORT
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
 #else
 #define EXPORT __attribute__((visibility("default")))
+#endif
 #endif
 
 /* Of FMI: ok (0) and warning (1) are a success, and no other number is; status.py. */

@@ -118,6 +118,19 @@ class Machine:
         self._kept.append(made)
         self._holds[self._index("hold", name, lambda at: made)] = made.address
 
+    # --- what the arrays of `loop` hold -----------------------------------------------------
+
+    def names(self, kind: str) -> list[Any]:
+        """The keys of the objects of a kind ("fmu", "setter", "hold", "meter" or "table"), in the
+        order of their array."""
+        return [key for of, key in self._indices if of == kind]
+
+    def counts(self) -> dict[str, int]:
+        """The number of entries of each array, by the names that loop.h uses."""
+        kinds = ("fmu", "setter", "hold", "meter", "table")
+        found = {f"n_{kind}s": len(self.names(kind)) for kind in kinds}
+        return {**found, "n_ops": len(self._ops), "n_points": len(self._points)}
+
     # --- records --------------------------------------------------------------------------
 
     def block(self, bound: Bound) -> tuple[int, int]:

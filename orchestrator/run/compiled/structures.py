@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,11 +14,29 @@ import numpy as np
 from hapticlink.orchestrator.fmi.instance_location import Place
 from hapticlink.orchestrator.run.compiled.build import HERE
 
+_COUNT = re.compile(r"/\* \[(.*?)\] \*/")
 _COMMENT = re.compile(r"/\*.*?\*/", re.S)
 _DECLARED = re.compile(
     r"typedef struct \{(?P<fields>.*?)\} (?P<name>\w+);|enum \{(?P<numbers>[^=]*?)\}", re.S
 )
-_FIELD = re.compile(r"\(?(?P<stars>\**)(?P<name>\w+)\)?(\[(?P<n>\d+)\]|\(.*\))?")
+_FIELD = re.compile(
+    r"\(?(?P<stars>\**)(?P<name>\w+)\)?(\[(?P<n>\d+)\]|\(.*\))?\s*(<(?P<count>.*)>)?"
+)
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """A field that is a pointer: to `count` entries, an expression in fields, each of `width`
+    times `type`, or a pointer to that where it has two stars."""
+
+    type: str
+    stars: int
+    width: int
+    count: str
+
+
+POINTERS: dict[str, dict[str, Pointer]] = {}
+"""The pointers of each structure, by field."""
 
 
 class Structure(ctypes.Structure):
@@ -51,18 +70,21 @@ def _declared(text: str) -> dict[str, Any]:
         "double": ctypes.c_double, "int64_t": ctypes.c_int64, "int16_t": ctypes.c_int16
     }  # fmt: skip
 
-    def fields(body: str) -> Iterator[tuple[str, Any]]:
+    def fields(name: str, body: str) -> Iterator[tuple[str, Any]]:
         for declaration in body.split(";")[:-1]:
             kind, names = declaration.replace("const ", "").split(maxsplit=1)
             for field in map(_FIELD.fullmatch, re.split(r",\s*", names)):
                 assert field, declaration
                 entry = found[kind] if not field["stars"] else ctypes.c_void_p
                 several = field["n"] and not field["stars"]
+                if stars := len(field["stars"]):
+                    of = Pointer(kind, stars, int(field["n"] or 1), field["count"] or "1")
+                    POINTERS.setdefault(name, {})[field["name"]] = of
                 yield field["name"], entry * int(field["n"]) if several else entry
 
-    for declared in _DECLARED.finditer(_COMMENT.sub("", text)):
+    for declared in _DECLARED.finditer(_COMMENT.sub("", _COUNT.sub(r"<\1>", text))):
         if name := declared["name"]:
-            rows = [*fields(declared["fields"])]
+            rows = [*fields(name, declared["fields"])]
             found[name] = type(name, (Structure,), {"__slots__": (), "_fields_": rows})
         else:
             names = re.findall(r"\w+", declared["numbers"])

@@ -1,0 +1,1 @@
+"""A scene as one program: its blocks, rates and holds as one native FMU."""

@@ -1,0 +1,158 @@
+"""Builds the FMU of a scene as one program."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+import uuid
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from fmpy.validation import validate_fmu
+
+from hapticlink.components.component import Component
+from hapticlink.fmus import cache
+from hapticlink.fmus.archive import digest, icon, write
+from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.fmus.blocks import component
+from hapticlink.fmus.errors import CompilerError, FmuError
+from hapticlink.fmus.native.compiler import (
+    FLAGS,
+    PLATFORMS,
+    SUFFIX,
+    compile_library,
+    compiler_version,
+    host_platform,
+)
+from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.step_sizes import sizes
+from hapticlink.programs.description import documentation, model_description
+from hapticlink.programs.ports import ports
+from hapticlink.programs.resolved import Resolved, resolved
+from hapticlink.programs.sources import sources
+
+OPTIONS = ("-DEXPORT=",)
+"""The functions of the loop are not exported."""
+
+
+def build_program(
+    scene: Scene,
+    name: str | Path,
+    *,
+    out: str | Path,
+    without: str | None = None,
+    all_platforms: bool = False,
+) -> Path:
+    """Write a scene as one native FMU into the folder `out`, and return its path. It needs no
+    Python, and its outputs have the bits of a run of the scene.
+
+    name: of the scene or its file, by which the FMU is called.
+
+    without: a block to leave out, whose outputs that others need are inputs of the FMU.
+    all_platforms: compiles for Linux, Windows and macOS instead of this machine alone. Raises
+    InputFault if the scene is invalid or cannot become a program, with what stands in the way;
+    Fault if the compiler fails.
+    """
+    identifier = _identifier(name)
+    with temporary_folders.room() as room:
+        try:
+            compiler_version()
+            platforms = PLATFORMS if all_platforms else (host_platform(),)
+            files = program_files(scene, identifier, without)
+            material = {"block": identifier, "program": digest(files), "platforms": platforms,
+                        "compiler": [compiler_version(), *FLAGS]}  # fmt: skip
+
+            def make(folder: Path) -> Path:
+                return _built(files, identifier, platforms, folder)
+
+            path = cache.cached(material, make, room, interrupt.check)
+        except CompilerError as error:
+            interrupt.check()
+            raise Fault(str(error)) from error
+        except FmuError as error:
+            raise InputFault(str(error)) from error
+        target = folders.ensure(out) / f"{identifier}.fmu"
+        with atomic_file(target) as unfinished:
+            shutil.copyfile(path, unfinished)
+    return target
+
+
+def _identifier(name: str | Path) -> str:
+    """The C identifier by which the FMU is called."""
+    known = str(name).endswith((".toml", ".ssp"))
+    plain = re.sub(r"\W", "_", Path(name).stem if known else Path(name).name, flags=re.ASCII)
+    return plain if plain.isidentifier() else f"scene_{plain}"
+
+
+def program_files(scene: Scene, identifier: str, without: str | None = None) -> dict[str, bytes]:
+    """All files of the FMU but its binaries. Raises InputFault as `build_program`."""
+    with resolved(scene, without) as program:
+        components = _components(program)
+        variables = ports(program, components)
+        texts = sources(program, components, variables)
+        haptic = program.system.timeline.clocks[0]
+        step_size = program.system.timeline.seconds(haptic.longest)
+    page = documentation(scene, variables)
+    content = {name: text.encode() for name, text in texts.items()}
+
+    def described(guid: str) -> bytes:
+        return model_description(
+            scene, identifier, variables, guid=guid, step_size=step_size,
+            files=(name for name in texts if name.endswith(".c")),
+        )  # fmt: skip
+
+    whole = digest({**content, "xml": described(""), "page": page})
+    guid = f"{{{uuid.UUID(whole[:32])}}}"
+    content["scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["scene.h"]
+    return {
+        "modelDescription.xml": described(guid),
+        "documentation/index.html": page,
+        "model.png": icon("continuous"),
+        **{f"sources/{name}": text for name, text in content.items()},
+    }
+
+
+def _components(program: Resolved) -> dict[str, Component]:
+    """The component of each member, with the step sizes of the scene."""
+    timeline, plans = program.system.timeline, {b.name: b for b in blocks(program.scene).built}
+    made = {}
+    for name in program.members:
+        plan = plans[name]
+        known = component(plan.block, plan.settings)
+        steps = sizes(timeline.of[name], timeline)
+        given = {v.name: (steps[v.name],) for v in known.parameters if v.name in steps}
+        made[name] = component(plan.block, plan.settings, given) if given else known
+    return made
+
+
+def _built(
+    files: Mapping[str, bytes], identifier: str, platforms: Sequence[str], folder: Path
+) -> Path:
+    """The FMU with a binary for each platform, written once FMPy finds nothing wrong with it."""
+    with tempfile.TemporaryDirectory(dir=folder) as name:
+        room, entries = Path(name), dict(files)
+        for entry in files:
+            if entry.startswith("sources/"):
+                (room / Path(entry).name).write_bytes(files[entry])
+        texts = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
+
+        def compiled(platform: str) -> tuple[str, bytes]:
+            library = compile_library(texts, room / f"library-{platform}", platform, OPTIONS)
+            return platform, library.read_bytes()
+
+        with ThreadPoolExecutor(len(platforms)) as pool:
+            for platform, library in pool.map(compiled, platforms):
+                entries[f"binaries/{platform}/{identifier}{SUFFIX[platform]}"] = library
+    target = folder / f"{identifier}.fmu"
+    with atomic_file(target) as unfinished:
+        with unfinished.open("xb") as file:
+            write(entries, file)
+        if findings := validate_fmu(str(unfinished)):
+            raise FmuError(f"`{identifier}` fails validation:\n  " + "\n  ".join(findings))
+    return target

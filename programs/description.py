@@ -1,0 +1,142 @@
+"""modelDescription.xml of a program, FMI 2.0.5 co-simulation, and its page of documentation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from xml.etree import ElementTree as ET
+
+from hapticlink.fmus.documentation import STYLE
+from hapticlink.fmus.model_description import CAPABILITIES, LOG_CATEGORIES
+from hapticlink.fmus.units import base_unit
+from hapticlink.fmus.versions import version
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.programs.ports import Port
+
+CAUSALITY = {
+    "INPUT": "input",
+    "OUTSIDE": "input",
+    "PARAMETER": "parameter",
+    "OUTPUT": "output",
+    "ENERGY": "local",
+    "STEP_ERROR": "local",
+}
+
+
+def model_description(
+    scene: Scene,
+    identifier: str,
+    ports: Sequence[Port],
+    *,
+    guid: str,
+    step_size: float,
+    files: Iterable[str],
+) -> bytes:
+    """The XML text, the same for the same arguments. step_size (s): of the default experiment.
+    files: the C files of the program, in sources/."""
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=identifier,
+        guid=guid,
+        description=scene.title,
+        version=version("hapticlink"),
+        license="MIT",
+        generationTool=f"hapticlink {version('hapticlink')}",
+        variableNamingConvention="structured",
+    )
+    runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
+    simulation = ET.SubElement(root, "CoSimulation", runs | CAPABILITIES)
+    listed = ET.SubElement(simulation, "SourceFiles")
+    for name in sorted(files):
+        ET.SubElement(listed, "File", name=name)
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for unit in sorted({port.unit for port in ports}):
+        exponents = {base: str(power) for base, power in base_unit(unit).items()}
+        ET.SubElement(ET.SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
+    categories = ET.SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        ET.SubElement(categories, "Category", name=name, description=text)
+    times = {"startTime": 0.0, "stopTime": float(scene.duration), "stepSize": step_size}
+    ET.SubElement(root, "DefaultExperiment", {name: repr(t) for name, t in times.items()})
+    _variables(root, ports)
+    _structure(root, ports)
+    ET.indent(root)
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def _variables(root: ET.Element, ports: Sequence[Port]) -> None:
+    parent = ET.SubElement(root, "ModelVariables")
+    index = {port.name: str(i + 1) for i, port in enumerate(ports)}
+    for reference, port in enumerate(ports):
+        about = {"name": port.name, "valueReference": str(reference)}
+        about["description"] = port.description
+        about["causality"] = CAUSALITY[port.kind]
+        if port.kind == "PARAMETER":
+            about |= {"variability": "fixed" if port.fixed else "tunable", "initial": "exact"}
+        elif port.start is None:
+            kind = "discrete" if port.sampled else "continuous"
+            about |= {"variability": kind, "initial": "calculated"}
+        else:
+            about["variability"] = "continuous"
+        real = ET.SubElement(ET.SubElement(parent, "ScalarVariable", about), "Real", unit=port.unit)
+        if port.start is not None:
+            real.set("start", repr(float(port.start)))
+        if port.max is not None:
+            real.set("max", repr(float(port.max)))
+        if port.derivative_of:
+            real.set("derivative", index[port.derivative_of])
+
+
+def _structure(root: ET.Element, ports: Sequence[Port]) -> None:
+    """Outputs with the inputs that they depend on at a communication point; at t = 0 outputs may
+    depend on all that is set."""
+    structure = ET.SubElement(root, "ModelStructure")
+    index = {port.name: str(i + 1) for i, port in enumerate(ports)}
+    outputs = [port for port in ports if port.kind == "OUTPUT"]
+    if not outputs:
+        return
+    parent = ET.SubElement(structure, "Outputs")
+    for port in outputs:
+        depends = " ".join(index[name] for name in port.depends)
+        ET.SubElement(parent, "Unknown", index=index[port.name], dependencies=depends)
+    parent = ET.SubElement(structure, "InitialUnknowns")
+    for port in outputs:
+        ET.SubElement(parent, "Unknown", index=index[port.name])
+
+
+def documentation(scene: Scene, ports: Sequence[Port]) -> bytes:
+    """One HTML page without external references."""
+    body = [
+        f"<h1>{escape(scene.title)}</h1>",
+        *(f"<p>{escape(part)}</p>" for part in scene.description.split("\n\n") if part.strip()),
+        "<p>A scene of hapticlink as one FMU: its blocks, each at its own rate, with the holds "
+        "between them. A communication step that ends between two ticks of the scene takes it to "
+        "the last tick before.</p>",
+    ]
+    for title, kinds in (
+        ("Inputs", ("INPUT", "OUTSIDE")),
+        ("Parameters", ("PARAMETER",)),
+        ("Outputs", ("OUTPUT",)),
+        ("Measured", ("ENERGY", "STEP_ERROR")),
+    ):
+        if chosen := [port for port in ports if port.kind in kinds]:
+            body += [f"<h2>{title}</h2>", *_table(chosen)]
+    page = [
+        "<!DOCTYPE html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        f"<title>{escape(scene.title)}</title><style>{STYLE}</style></head><body>",
+        *body,
+        "</body></html>",
+    ]
+    return "\n".join(page).encode() + b"\n"
+
+
+def _table(ports: Iterable[Port]) -> list[str]:
+    rows = []
+    for port in ports:
+        start = "" if port.start is None else repr(float(port.start))
+        cells = (port.name, port.unit, start, port.description)
+        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+    head = "".join(f"<th>{name}</th>" for name in ("name", "unit", "start", "description"))
+    return [f"<table><tr>{head}</tr>", *rows, "</table>"]

@@ -1,0 +1,147 @@
+"""The variables of a program: those of its blocks, `block.variable`, and what is measured of it.
+
+Value references count [inputs | parameters | outputs | energies | step errors] from 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component, Variable
+from hapticlink.fmus.model_description import feed_through, scalars
+from hapticlink.orchestrator.system.system import System
+from hapticlink.programs.resolved import Resolved
+
+Kind = Literal["INPUT", "OUTSIDE", "PARAMETER", "OUTPUT", "ENERGY", "STEP_ERROR"]
+
+
+@dataclass(frozen=True)
+class Port:
+    """A scalar variable of the program."""
+
+    kind: Kind
+    """INPUT, PARAMETER and OUTPUT are a block's; OUTSIDE is an output of the block that is left
+    out, and thus an input."""
+    name: str
+    unit: str
+    description: str
+    member: int = 0
+    """Index of its block among the members, of an energy that of its meter."""
+    reference: int = 0
+    """Its value reference in that block."""
+    place: int = -1
+    """Its index in the signal vector."""
+    start: float | None = None
+    fixed: bool = False
+    """A parameter that is set before the run only."""
+    max: float | None = None
+    sampled: bool = False
+    """Of an output: changes at the steps of its block only."""
+    derivative_of: str | None = None
+    """The output of the program of which it is the time derivative."""
+    depends: tuple[str, ...] = field(default=())
+    """The inputs of the program that an output depends on at a communication point."""
+
+
+def ports(resolved: Resolved, components: Mapping[str, Component]) -> list[Port]:
+    """The variables, in the order of their value references. components: by member."""
+    return [
+        *_inputs(resolved, components),
+        *_parameters(resolved, components),
+        *_outputs(resolved, components),
+        *_energies(resolved),
+        *_step_errors(resolved),
+    ]
+
+
+def fed(system: System, fmu: str) -> set[str]:
+    """The scalars of an FMU that connections set."""
+    return {s.name for c in system.connections if c.target == fmu for s in c.inputs}
+
+
+def _inputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
+    if resolved.outside:
+        span = resolved.simulation.signals.fmu(resolved.outside)
+        outputs = resolved.system.fmu[resolved.outside].description.outputs
+        used = {s.name for c in resolved.system.out_of(resolved.outside) for s in c.outputs}
+        values = resolved.simulation.signals.values[span].tolist()
+        for place, (scalar, start) in enumerate(zip(outputs, values, strict=True), span.start):
+            if scalar.name in used:
+                name, unit = f"{resolved.outside}.{scalar.name}", scalar.unit or "1"
+                text = f"{scalar.port} of the {resolved.outside}, which is left out."
+                yield Port("OUTSIDE", name, unit, text, place=place, start=start)
+    for member, (fmu, component) in enumerate(components.items()):
+        taken = fed(resolved.system, fmu)
+        for reference, (v, name, unit, start) in enumerate(scalars(component.inputs)):
+            if name not in taken:
+                yield Port(
+                    "INPUT", f"{fmu}.{name}", unit, v.description, member, reference, start=start
+                )
+
+
+def _parameters(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
+    """Parameters that no connection sets; step sizes are those of the scene."""
+    for member, (fmu, component) in enumerate(components.items()):
+        taken = fed(resolved.system, fmu) | {STEP_SIZE, FRAME_SIZE}
+        first = len(component.start_inputs)
+        given = dict((s.name, float(v)) for s, v in resolved.system.fmu[fmu].starts)
+        for reference, (v, name, unit, start) in enumerate(scalars(component.parameters), first):
+            if name in taken:
+                continue
+            yield Port(
+                "PARAMETER", f"{fmu}.{name}", unit, v.description, member, reference,
+                start=given.get(name, start), fixed=v.variability == "fixed",
+            )  # fmt: skip
+
+
+def _outputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
+    """The outputs that the scene records, all by default."""
+    signals, chosen = resolved.simulation.signals, resolved.recorded
+    for member, (fmu, component) in enumerate(components.items()):
+        places = {s.name: s.reference for s in resolved.system.fmu[fmu].description.outputs}
+        taken, through = fed(resolved.system, fmu), feed_through(component)
+        inputs = [name for _, name, _, _ in scalars(component.inputs)]
+        first = len(component.start_inputs) + len(component.start_parameters)
+        sampled, bases = component.timing == "sampled", _bases(component)
+        for i, (v, name, unit, _) in enumerate(scalars(component.outputs)):
+            if name not in places or f"{fmu}.{name}" not in chosen:
+                continue
+            depends = () if sampled else tuple(inputs[k] for k in through[i])
+            of = bases.get(name)
+            yield Port(
+                "OUTPUT", f"{fmu}.{name}", unit, v.description, member, first + i,
+                signals.scalar(fmu, name), max=v.max, sampled=sampled,
+                derivative_of=f"{fmu}.{of}" if of and f"{fmu}.{of}" in chosen else None,
+                depends=tuple(f"{fmu}.{u}" for u in depends if u not in taken),
+            )  # fmt: skip
+
+
+def _bases(component: Component) -> dict[str, str]:
+    """By name of an output, that of which it is the time derivative."""
+    outputs: dict[str, Variable] = {v.name: v for v in component.outputs}
+    found: dict[str, str] = {}
+    for v in component.outputs:
+        if v.derivative_of:
+            found |= dict(zip(v.names, outputs[v.derivative_of].names, strict=True))
+    return found
+
+
+def _energies(resolved: Resolved) -> Iterator[Port]:
+    for index, connection in enumerate(resolved.meters):
+        c = resolved.system.connection[connection]
+        text = f"Energy that sampling and holding {connection} has generated."
+        yield Port("ENERGY", f"energy.{c.target}.{c.target_port}", "J", text, index)
+
+
+def _step_errors(resolved: Resolved) -> Iterator[Port]:
+    for fmu in _checked(resolved):
+        text = f"Estimated sum of the relative errors of the steps of {fmu}, by step doubling."
+        index = resolved.fmus.index(fmu)
+        yield Port("STEP_ERROR", f"step_error.{fmu}", "1", text, index)
+
+
+def _checked(resolved: Resolved) -> Sequence[str]:
+    checks = resolved.simulation.step_checks
+    return [fmu for fmu in resolved.members if fmu in checks]

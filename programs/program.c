@@ -1,0 +1,727 @@
+/* The FMI 2.0.5 co-simulation interface of a scene as one program.
+ *
+ * The run is the project's own loop (loop.h) on the data of scene.h, which Python has resolved; the
+ * blocks are linked in, each with the FMI functions of fmus/native/fmi2.c under its own prefix.
+ *
+ *     fmi2DoStep   all events from where the program stands up to, but not at, the last tick at or
+ *                  before the end of the step: what happens at a tick needs the inputs of that tick
+ *     fmi2GetReal  an output of a block at its newest communication point that is not past the
+ *                  program's: of the block itself, or of its clock's newest row while the block is
+ *                  ahead, as slow ones are
+ *     fmi2SetReal  inputs and parameters go to the block; those of the block that is left out stand
+ *                  in the vector of signals
+ *
+ * State is one structure, whose pointers are written again when it is restored, and the states of the
+ * blocks. Nothing is shared between instances. */
+#include <math.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+
+#include "program.h"
+
+typedef const fmi2ValueReference *References;
+
+typedef enum { INPUT, OUTSIDE, PARAMETER, OUTPUT, ENERGY, STEP_ERROR } VariableKind;
+
+typedef struct {
+    VariableKind kind;
+    int member, fixed;
+    fmi2ValueReference reference;
+    int64_t place; /* in the vector of signals */
+    const char *name;
+} Variable;
+
+/* A window of communication points begins again after `n` of them, `ticks` later. */
+typedef struct {
+    int64_t n, ticks;
+} Pattern;
+
+enum { GET_REAL, SET_REAL, DO_STEP, GET_STATE, SET_STATE };
+
+typedef struct {
+    const char *name, *guid;
+    fmi2InstantiateTYPE *instantiate;
+    fmi2FreeInstanceTYPE *free;
+    fmi2SetupExperimentTYPE *setup;
+    fmi2EnterInitializationModeTYPE *enter;
+    fmi2ExitInitializationModeTYPE *exit;
+    fmi2TerminateTYPE *terminate;
+    fmi2ResetTYPE *reset;
+    fmi2GetRealTYPE *get;
+    fmi2SetRealTYPE *set;
+    fmi2DoStepTYPE *step;
+    fmi2GetFMUstateTYPE *get_state;
+    fmi2SetFMUstateTYPE *set_state;
+    fmi2FreeFMUstateTYPE *free_state;
+    fmi2SerializedFMUstateSizeTYPE *state_size;
+    fmi2SerializeFMUstateTYPE *serialize;
+    fmi2DeSerializeFMUstateTYPE *deserialize;
+} Member;
+
+#include "scene.h"
+
+#define DECLARE(id, name, guid)                                                                     \
+    extern fmi2InstantiateTYPE id##_fmi2Instantiate;                                                \
+    extern fmi2FreeInstanceTYPE id##_fmi2FreeInstance;                                              \
+    extern fmi2SetupExperimentTYPE id##_fmi2SetupExperiment;                                        \
+    extern fmi2EnterInitializationModeTYPE id##_fmi2EnterInitializationMode;                        \
+    extern fmi2ExitInitializationModeTYPE id##_fmi2ExitInitializationMode;                          \
+    extern fmi2TerminateTYPE id##_fmi2Terminate;                                                    \
+    extern fmi2ResetTYPE id##_fmi2Reset;                                                            \
+    extern fmi2GetRealTYPE id##_fmi2GetReal;                                                        \
+    extern fmi2SetRealTYPE id##_fmi2SetReal;                                                        \
+    extern fmi2DoStepTYPE id##_fmi2DoStep;                                                          \
+    extern fmi2GetFMUstateTYPE id##_fmi2GetFMUstate;                                                \
+    extern fmi2SetFMUstateTYPE id##_fmi2SetFMUstate;                                                \
+    extern fmi2FreeFMUstateTYPE id##_fmi2FreeFMUstate;                                              \
+    extern fmi2SerializedFMUstateSizeTYPE id##_fmi2SerializedFMUstateSize;                          \
+    extern fmi2SerializeFMUstateTYPE id##_fmi2SerializeFMUstate;                                    \
+    extern fmi2DeSerializeFMUstateTYPE id##_fmi2DeSerializeFMUstate;
+MEMBERS(DECLARE)
+
+#define ROW(id, name, guid)                                                                         \
+    {name, guid, id##_fmi2Instantiate, id##_fmi2FreeInstance, id##_fmi2SetupExperiment,             \
+     id##_fmi2EnterInitializationMode, id##_fmi2ExitInitializationMode, id##_fmi2Terminate,         \
+     id##_fmi2Reset, id##_fmi2GetReal, id##_fmi2SetReal, id##_fmi2DoStep, id##_fmi2GetFMUstate,     \
+     id##_fmi2SetFMUstate, id##_fmi2FreeFMUstate, id##_fmi2SerializedFMUstateSize,                  \
+     id##_fmi2SerializeFMUstate, id##_fmi2DeSerializeFMUstate},
+static const Member members[] = {MEMBERS(ROW)};
+
+int hapticlink_events(Loop *l, Events *e);
+
+enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP_MODE = 4, ENDED = 8, FAILURE = 16, TERMINATED = 32 };
+enum { SWEEPS = 50 };
+static const double TOLERANCE = 1e-12; /* of start values: run/initialize.py */
+static const double GROWTH = 1e12;     /* of outputs without a bound: fmi/output_bounds.py */
+static const double NEAR = 1e-3;       /* of a tick, by which a time may be before it */
+
+typedef struct { /* what fmi2GetFMUstate saves, beside the states of the blocks */
+    char guid[40];
+    int64_t mode, settled, tick; /* settled: start values agree. tick: where the program stands */
+    double time;
+    Pcg64 generators[N_LATENCIES + 1];
+    double step_errors[N_FMUS][N_CHECKED + 1]; /* sums of the rows of step checks that are dropped */
+    Scene scene;
+} State;
+
+typedef struct {
+    State now;
+    fmi2CallbackFunctions callbacks, member_callbacks;
+    fmi2Component members[N_MEMBERS];
+    fmi2FMUstate slots[N_SLOTS + 1]; /* states that the loop saves */
+    double before[N_VALUES];
+    char name[];
+} Model;
+
+typedef struct {
+    State now;
+    fmi2FMUstate members[N_MEMBERS];
+} Saved;
+
+/* --- messages ------------------------------------------------------------------------------- */
+
+static void say(const Model *m, fmi2Status status, const char *text) {
+    static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
+                                             "logStatusError", "logStatusFatal"};
+    m->callbacks.logger(m->callbacks.componentEnvironment, m->name, status, categories[status], text);
+}
+
+static fmi2Status fail(const Model *m, fmi2Status status, const char *format, ...) {
+    if (!m) return fmi2Error; /* without an instance there is nobody to tell */
+    char message[1024], text[2 * sizeof message], *to_text = text;
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    for (const char *c = message; *c; *to_text++ = *c++)
+        if (*c == '%') *to_text++ = '%'; /* the logger takes a message for a format (2.1.5) */
+    *to_text = 0;
+    say(m, status, text);
+    return status;
+}
+
+/* Messages of a block, with its name. */
+static void member_logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+                          fmi2String category, fmi2String message, ...) {
+    char text[2200];
+    snprintf(text, sizeof text, "%s: %s", name, message);
+    say(environment, status, text);
+    (void)category;
+}
+
+static int out_of_order(const Model *m, const char *call, int allowed) {
+    const int64_t mode = m ? m->now.mode : 0;
+    if (mode & allowed) return 0;
+    fail(m, fmi2Error, "%s may not be called: the FMU %s", call,
+         mode == INSTANTIATED     ? "is instantiated"
+         : mode == INITIALIZATION ? "is in initialisation mode"
+         : mode == STEP_MODE      ? "is initialised"
+         : mode == ENDED          ? "has ended the simulation"
+         : mode == FAILURE        ? "has failed; reset it or restore a state"
+                                  : "is terminated");
+    return 1;
+}
+
+static int is_null(const Model *m, const char *call, size_t n, const void *a, const void *b) {
+    if (m && (!n || (a && b))) return 0;
+    fail(m, fmi2Error, "%s got a null pointer for %zu entries", call, n);
+    return 1;
+}
+
+/* --- the data of the scene ------------------------------------------------------------------- */
+
+static void put(Model *m, size_t at, const void *pointer) {
+    memcpy((char *)&m->now.scene + at, &pointer, sizeof pointer);
+}
+
+static const void *function(const Member *member, int which) {
+    switch (which) {
+    case GET_REAL: return (const void *)member->get;
+    case SET_REAL: return (const void *)member->set;
+    case DO_STEP: return (const void *)member->step;
+    case GET_STATE: return (const void *)member->get_state;
+    }
+    return (const void *)member->set_state;
+}
+
+/* Writes all pointers of the scene: into itself, to the blocks and to their functions. */
+static void relocate(Model *m) {
+    for (int i = 0; i < N_POINTERS; i++)
+        put(m, pointers[i].at, (char *)&m->now.scene + pointers[i].to);
+    for (int i = 0; i < N_HANDLES; i++) put(m, handles[i].at, m->members[handles[i].member]);
+    for (int i = 0; i < N_CALLS; i++)
+        put(m, calls[i].at, function(members + calls[i].member, calls[i].function));
+    for (int i = 0; i < N_SLOTS; i++) put(m, slots[i], m->slots + i);
+}
+
+static void restart(Model *m) {
+    memset(&m->now, 0, sizeof m->now);
+    memcpy(m->now.guid, GUID, sizeof GUID);
+    memcpy(&m->now.scene, &initial, sizeof initial);
+    m->now.mode = INSTANTIATED;
+    for (int i = 0; i < N_LATENCIES; i++) m->now.generators[i] = latencies[i].generator;
+    relocate(m);
+    for (int i = 0; i < N_SETTABLE; i++) {
+        const Variable *v = variables + i;
+        if (v->kind == OUTSIDE) m->now.scene.loop_values[v->place] = starts[i];
+        else members[v->member].set(m->members[v->member], &v->reference, 1, starts + i);
+    }
+}
+
+static double seconds(const Model *m, int64_t tick) { return tick_time(&m->now.scene.loop, tick); }
+
+/* --- initialisation: orchestrator/run/initialize.py ------------------------------------------- */
+
+static int agrees(double value, double before) {
+    if (value == before || (isnan(value) && isnan(before))) return 1;
+    return fabs(value - before) <= TOLERANCE + TOLERANCE * fabs(before);
+}
+
+/* Sets inputs and reads outputs until they agree. */
+static fmi2Status settle(Model *m) {
+    Scene *s = &m->now.scene;
+    Loop *l = &s->loop;
+    At at = {0};
+    int last = -1;
+    if (m->now.settled) return fmi2OK;
+    for (int i = 0; i < N_FMUS; i++)
+        if (fmu_get(l->fmus + i, 0, &at)) return fmi2Error;
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        memcpy(m->before, l->values, sizeof m->before);
+        for (int i = 0; i < N_START_SETTERS; i++) {
+            for (int k = 0; k < N_HOLDS; k++)
+                for (int64_t j = 0; j < l->holds[k]->n; j++)
+                    l->holds[k]->held[j] = l->values[l->holds[k]->sources[j]];
+            if (fmu_set(START_SETTERS(s) + i, l->values, &at)) return fmi2Error;
+            if (fmu_get(l->fmus + start_fmus[i], 0, &at)) return fmi2Error;
+        }
+        last = -1;
+        for (int i = 0; i < N_VALUES && last < 0; i++)
+            if (!agrees(l->values[i], m->before[i])) last = i;
+        if (last < 0) break;
+    }
+    if (last >= 0)
+        return fail(m, fmi2Error, "%s does not settle in initialisation: %.17g after %.17g",
+                    last < N_SIGNALS ? signals[last] : "a held value", l->values[last], m->before[last]);
+    m->now.settled = 1;
+    return fmi2OK;
+}
+
+/* Bounds of the outputs, and the samples of t = 0 for holds and meters. */
+static int begin(Model *m) {
+    Loop *l = &m->now.scene.loop;
+    for (int i = 0; i < N_FMUS; i++) {
+        const Fmu *f = l->fmus + i;
+        double *inverse = (double *)f->inverse;
+        const int64_t first = f->outputs - l->values;
+        for (int64_t k = 0; k < f->n_outputs; k++) {
+            const double start = fabs(f->outputs[k]), nominal = nominals[first + k];
+            const double grown = GROWTH * (start >= nominal ? start : nominal);
+            inverse[k] = 1.0 / (bounds[first + k] > 0.0 ? bounds[first + k] : grown);
+        }
+        if (f->good) memcpy(f->good, f->outputs, f->n_outputs * sizeof(double));
+    }
+    At at = {START_FIRST, START_LAST, 0, 0};
+    return loop_carry_out(l, 0, &at);
+}
+
+/* --- events ---------------------------------------------------------------------------------- */
+
+static int64_t next_tick(const Events *e) {
+    int64_t tick = INT64_MAX;
+    for (int64_t i = 0; i < e->n_clocks; i++) {
+        const Clock *c = e->clocks + i;
+        if (c->starts[c->at] < tick) tick = c->starts[c->at];
+    }
+    return tick;
+}
+
+/* The window of a clock moves on by its pattern; 0 where its communication points end. */
+static int next_window(Clock *c, const Pattern *p) {
+    int64_t *starts = (int64_t *)c->starts;
+    if (!p->n) return 0;
+    const int64_t phase = c->n - p->n; /* 1 where the first step is none of the pattern's */
+    for (int64_t i = 0; i < p->n; i++) starts[i] = starts[i + phase] + p->ticks;
+    c->n = p->n;
+    c->at = 0;
+    return 1;
+}
+
+static void draw(Model *m, int64_t hold) {
+    int i = 0;
+    while (latencies[i].hold != hold) i++;
+    Link *link = m->now.scene.loop.holds[hold]->link;
+    for (int64_t k = 0; k < link->n_late; k++)
+        link->late[k] = latency_draw(latencies + i, m->now.generators + i);
+    link->at_late = 0;
+}
+
+/* Adds the rows of step checks to their sums. */
+static void add_step_errors(Model *m, int64_t fmu) {
+    const Check *c = m->now.scene.loop.fmus[fmu].check;
+    for (int64_t k = 0; k < *c->count; k++)
+        for (int64_t i = 0; i < c->n_ports; i++)
+            m->now.step_errors[fmu][i] += c->weights[k] * c->errors[k * c->n_ports + i];
+    *c->count = 0;
+}
+
+static double step_error(const Model *m, int64_t fmu) {
+    const Check *c = m->now.scene.loop.fmus[fmu].check;
+    double largest = 0.0;
+    for (int64_t i = 0; i < c->n_ports; i++) {
+        double sum = m->now.step_errors[fmu][i];
+        for (int64_t k = 0; k < *c->count; k++) sum += c->weights[k] * c->errors[k * c->n_ports + i];
+        sum /= c->scales[i] > 0.0 ? c->scales[i] : 1.0;
+        if (sum > largest) largest = sum;
+    }
+    return largest;
+}
+
+/* Outputs that are not finite, which are held where the scene asks for it, or beyond a bound: judge of
+ * orchestrator/fmi/instance.py. */
+static int judge(Model *m, Fmu *f) {
+    const int64_t first = f->outputs - m->now.scene.loop.values;
+    for (int64_t k = 0; k < f->n_outputs; k++) {
+        if (!isfinite(f->outputs[k]) && f->good) f->outputs[k] = f->good[k];
+        if (isfinite(f->outputs[k]) && fabs(f->outputs[k]) * f->inverse[k] <= 1.0) continue;
+        fail(m, fmi2Error, "output %s is %.17g at t = %.17g s: the run has diverged; take a higher "
+             "rate, a finer integrator, or weaker gains", signals[first + k], f->outputs[k],
+             f->place->time);
+        return 0;
+    }
+    if (f->good) memcpy(f->good, f->outputs, f->n_outputs * sizeof(double));
+    return 1;
+}
+
+/* Does what the loop returned to its caller for; 0 where it cannot go on. */
+static int serve(Model *m, int code) {
+    Scene *s = &m->now.scene;
+    Loop *l = &s->loop;
+    At *at = &s->events.at;
+    const Op *op = at->op < 0 ? NULL : l->ops + at->op;
+    const double time = seconds(m, s->events.tick);
+    switch (code) {
+    case PAUSE: return 1;
+    case STARTS:
+        if (next_window(s->events.clocks + at->what, patterns + at->what)) return 1;
+        fail(m, fmi2Error, "the scene's communication points end at t = %.17g s: give it a longer "
+             "duration", seconds(m, next_tick(&s->events)));
+        return 0;
+    case DRAW: draw(m, op->a); return 1;
+    case JUDGE:
+        at->op++;
+        return judge(m, l->fmus + op->a);
+    case STOP:
+        m->now.mode = ENDED;
+        m->now.tick = s->events.tick;
+        fail(m, fmi2Discard, "the scene's condition to stop holds at t = %.17g s", time);
+        return 0;
+    case CALL:
+        if (op->code == STEP && l->fmus[op->a].check) {
+            Check *c = l->fmus[op->a].check;
+            if (*c->count == c->room) {
+                add_step_errors(m, op->a);
+                return 1;
+            }
+        }
+        if (op->code == RECORD) { /* a table holds the newest row */
+            *l->tables[op->a].rows = 0;
+            return 1;
+        }
+        if ((op->code == SAMPLE || op->code == MOVE) && meter_fold(l->meters[op->a])) return 1;
+        break;
+    case FAILED: case STEPPED: case UNSAVED: case UNRESTORED:
+        fail(m, fmi2Error, "%s failed at t = %.17g s", members[fmu_members[op->a]].name, time);
+        return 0;
+    case GROW:
+        fail(m, fmi2Error, "the hold of %s has no room for a sample at t = %.17g s", holds[op->a], time);
+        return 0;
+    }
+    fail(m, fmi2Error, "an event at t = %.17g s is none that the scene was resolved for", time);
+    return 0;
+}
+
+static int advance(Model *m, int64_t until) {
+    Scene *s = &m->now.scene;
+    while (next_tick(&s->events) < until)
+        if (!serve(m, hapticlink_events(&s->loop, &s->events))) return 0;
+    m->now.tick = until;
+    return 1;
+}
+
+/* --- life of an instance -------------------------------------------------------------------- */
+
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+const char *fmi2GetVersion(void) { return fmi2Version; }
+
+void fmi2FreeInstance(fmi2Component c) {
+    Model *m = c;
+    if (!m) return;
+    for (int i = 0; i < N_SLOTS; i++)
+        members[slot_members[i]].free_state(m->members[slot_members[i]], m->slots + i);
+    for (int i = 0; i < N_MEMBERS; i++) if (m->members[i]) members[i].free(m->members[i]);
+    free(m);
+}
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
+                              fmi2Boolean logging) {
+    if (!callbacks || !callbacks->logger || !name || !guid) return NULL;
+    Model *m = calloc(1, sizeof(Model) + strlen(name) + 1);
+    if (!m) return NULL;
+    strcpy(m->name, name);
+    m->callbacks = *callbacks;
+    const fmi2CallbackFunctions own = {member_logger, calloc, free, NULL, m};
+    memcpy(&m->member_callbacks, &own, sizeof own);
+    if (type != fmi2CoSimulation || strcmp(guid, GUID)) {
+        if (type != fmi2CoSimulation) fail(m, fmi2Error, "this FMU is for co-simulation only");
+        else fail(m, fmi2Error, "the guid %s is not that of this binary, %s", guid, GUID);
+        free(m);
+        return NULL;
+    }
+    for (int i = 0; i < N_MEMBERS; i++) {
+        m->members[i] = members[i].instantiate(members[i].name, fmi2CoSimulation, members[i].guid, "",
+                                               &m->member_callbacks, fmi2False, fmi2False);
+        if (m->members[i]) continue;
+        fail(m, fmi2Error, "no memory for %s", members[i].name);
+        fmi2FreeInstance(m);
+        return NULL;
+    }
+    restart(m);
+    return m;
+}
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
+                               const fmi2String categories[]) {
+    return c ? fmi2OK : fmi2Error; /* failures are always logged; there is nothing else to say */
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
+                               fmi2Real start, fmi2Boolean has_stop, fmi2Real stop) {
+    Model *m = c;
+    if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
+    if (start != 0.0) return fail(m, fmi2Error, "a scene starts at 0 s, not at %.17g s", start);
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    Model *m = c;
+    if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
+    for (int i = 0; i < N_MEMBERS; i++) {
+        members[i].setup(m->members[i], fmi2False, 0.0, 0.0, fmi2False, 0.0);
+        members[i].enter(m->members[i]);
+    }
+    m->now.mode = INITIALIZATION;
+    return fmi2OK;
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    Model *m = c;
+    if (out_of_order(m, __func__, INITIALIZATION)) return fmi2Error;
+    if (settle(m) != fmi2OK) return fmi2Error;
+    for (int i = 0; i < N_SIGNALS; i++)
+        if (!isfinite(m->now.scene.loop.values[i]))
+            return fail(m, fmi2Error, "output %s is %.17g after initialisation", signals[i],
+                        m->now.scene.loop.values[i]);
+    m->now.mode = FAILURE;
+    for (int i = 0; i < N_MEMBERS; i++)
+        if (members[i].exit(m->members[i]) > fmi2Warning) return fmi2Error;
+    if (begin(m)) return fail(m, fmi2Error, "holds and meters cannot take the samples of t = 0");
+    m->now.mode = STEP_MODE;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Terminate(fmi2Component c) {
+    Model *m = c;
+    if (out_of_order(m, __func__, STEP_MODE | ENDED)) return fmi2Error;
+    for (int i = 0; i < N_MEMBERS; i++) members[i].terminate(m->members[i]);
+    m->now.mode = TERMINATED;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Reset(fmi2Component c) {
+    Model *m = c;
+    if (!m) return fmi2Error;
+    for (int i = 0; i < N_MEMBERS; i++) members[i].reset(m->members[i]);
+    restart(m);
+    return fmi2OK;
+}
+
+/* --- values --------------------------------------------------------------------------------- */
+
+static int is_unknown(const Model *m, fmi2ValueReference reference) {
+    if (reference < N_VARIABLES) return 0;
+    fail(m, fmi2Error, "unknown value reference %u; %d are known", reference, N_VARIABLES);
+    return 1;
+}
+
+static fmi2Status value_of(Model *m, const Variable *v, double *value) {
+    const Loop *l = &m->now.scene.loop;
+    switch (v->kind) {
+    case OUTSIDE: *value = l->values[v->place]; return fmi2OK;
+    case ENERGY: *value = meter_energy(l->meters[v->member]); return fmi2OK;
+    case STEP_ERROR: *value = step_error(m, v->member); return fmi2OK;
+    case OUTPUT:
+        if (m->now.mode == INITIALIZATION && settle(m) != fmi2OK) return fmi2Error;
+        if (l->fmus[member_fmus[v->member]].place->end > seconds(m, m->now.tick)) {
+            const Table *t = l->tables + member_tables[v->member];
+            *value = t->block[1 + v->place - (t->view - l->values)];
+            return fmi2OK;
+        }
+    default: return members[v->member].get(m->members[v->member], &v->reference, 1, value);
+    }
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, References vr, size_t n, fmi2Real value[]) {
+    Model *m = c;
+    if (is_null(m, __func__, n, vr, value)) return fmi2Error;
+    for (size_t i = 0; i < n; i++)
+        if (is_unknown(m, vr[i]) || value_of(m, variables + vr[i], value + i) > fmi2Warning)
+            return fmi2Error;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real value[]) {
+    Model *m = c;
+    if (out_of_order(m, __func__, INSTANTIATED | INITIALIZATION | STEP_MODE)) return fmi2Error;
+    if (is_null(m, __func__, n, vr, value)) return fmi2Error;
+    for (size_t i = 0; i < n; i++) { /* all are looked at before any is set */
+        if (is_unknown(m, vr[i])) return fmi2Error;
+        const Variable *v = variables + vr[i];
+        if (vr[i] >= N_SETTABLE) return fail(m, fmi2Error, "%s is no input or parameter", v->name);
+        if (v->fixed && m->now.mode == STEP_MODE)
+            return fail(m, fmi2Error, "parameter %s is fixed; set it before the end of "
+                        "initialisation mode", v->name);
+        if (!isfinite(value[i])) return fail(m, fmi2Error, "%s cannot be %.17g", v->name, value[i]);
+    }
+    for (size_t i = 0; i < n; i++) {
+        const Variable *v = variables + vr[i];
+        if (v->kind == OUTSIDE) m->now.scene.loop_values[v->place] = value[i];
+        else if (members[v->member].set(m->members[v->member], &v->reference, 1, value + i)) return fmi2Error;
+    }
+    m->now.settled = 0;
+    return fmi2OK;
+}
+
+#define HAS_NO(verb, kind, type)                                                                \
+    fmi2Status fmi2##verb##kind(fmi2Component c, References vr, size_t n, type value[]) {       \
+        return c && !n ? fmi2OK : fail(c, fmi2Error, "no variable is of type " #kind);          \
+    }
+HAS_NO(Get, Integer, fmi2Integer)
+HAS_NO(Get, Boolean, fmi2Boolean)
+HAS_NO(Get, String, fmi2String)
+HAS_NO(Set, Integer, const fmi2Integer)
+HAS_NO(Set, Boolean, const fmi2Boolean)
+HAS_NO(Set, String, const fmi2String)
+
+/* --- stepping ------------------------------------------------------------------------------- */
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolean no_way_back) {
+    Model *m = c;
+    if (out_of_order(m, __func__, STEP_MODE)) return fmi2Error;
+    const Loop *l = &m->now.scene.loop;
+    const double tick = l->numerator / l->denominator, end = start + size;
+    if (!(fabs(start - m->now.time) <= NEAR * tick))
+        return fail(m, fmi2Error, "a step from t = %.17g s cannot begin: the program stands at %.17g s",
+                    start, m->now.time);
+    if (!(size > 0.0 && end * l->denominator < 0x1p52 * l->numerator))
+        return fail(m, fmi2Error, "a step by %.17g s from t = %.17g s has no end", size, start);
+    const int64_t until = (int64_t)floor(end * l->denominator / l->numerator + NEAR);
+    if (until > m->now.tick && !advance(m, until)) {
+        if (m->now.mode == ENDED) {
+            m->now.time = seconds(m, m->now.tick);
+            return fmi2Discard;
+        }
+        m->now.mode = FAILURE;
+        return fmi2Error;
+    }
+    m->now.time = end;
+    return fmi2OK;
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c) {
+    return fail(c, fmi2Error, "no step is ever pending");
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    if (!c || !value) return fmi2Error;
+    if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
+    *value = ((Model *)c)->now.time;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    if (!c || !value) return fmi2Error;
+    if (kind != fmi2Terminated) return fmi2Discard;
+    *value = ((Model *)c)->now.mode == ENDED;
+    return fmi2OK;
+}
+
+#define NOT_KEPT(name, type)                                                                    \
+    fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) { return fmi2Discard; }
+NOT_KEPT(fmi2GetStatus, fmi2Status)
+NOT_KEPT(fmi2GetIntegerStatus, fmi2Integer)
+NOT_KEPT(fmi2GetStringStatus, fmi2String)
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, References vr, size_t n,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+    return fail(c, fmi2Error, "inputs are constant over a step");
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, References vr, size_t n,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+    return fail(c, fmi2Error, "there are no derivatives of outputs");
+}
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, References unknown, size_t n,
+                                        References known, size_t k, const fmi2Real seed[],
+                                        fmi2Real derivative[]) {
+    return fail(c, fmi2Error, "there are no directional derivatives");
+}
+
+/* --- FMU state ------------------------------------------------------------------------------ */
+
+static int is_ours(const Model *m, const void *bytes) {
+    if (m && bytes && !memcmp(bytes, GUID, sizeof GUID)) return 1;
+    fail(m, fmi2Error, "this FMU state was not saved by this FMU");
+    return 0;
+}
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    Model *m = c;
+    if (is_null(m, __func__, 1, state, state)) return fmi2Error;
+    if (!*state) *state = calloc(1, sizeof(Saved));
+    if (!*state) return fail(m, fmi2Error, "no memory for an FMU state");
+    Saved *saved = *state;
+    memcpy(&saved->now, &m->now, sizeof m->now);
+    for (int i = 0; i < N_MEMBERS; i++)
+        if (members[i].get_state(m->members[i], saved->members + i) > fmi2Warning) return fmi2Error;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+    Model *m = c;
+    const Saved *saved = state;
+    if (!is_ours(m, state)) return fmi2Error;
+    memcpy(&m->now, &saved->now, sizeof m->now);
+    relocate(m);
+    for (int i = 0; i < N_MEMBERS; i++)
+        if (members[i].set_state(m->members[i], saved->members[i]) > fmi2Warning) return fmi2Error;
+    return fmi2OK;
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    Model *m = c;
+    if (!m) return fmi2Error;
+    if (!state || !*state) return fmi2OK;
+    Saved *saved = *state;
+    for (int i = 0; i < N_MEMBERS; i++) members[i].free_state(m->members[i], saved->members + i);
+    free(saved);
+    *state = NULL;
+    return fmi2OK;
+}
+
+static size_t member_state_size(const Model *m, int i, const Saved *saved) {
+    size_t size = 0;
+    members[i].state_size(m->members[i], saved->members[i], &size);
+    return size;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
+    Model *m = c;
+    if (is_null(m, __func__, 1, state, size) || !is_ours(m, state)) return fmi2Error;
+    *size = sizeof(State);
+    for (int i = 0; i < N_MEMBERS; i++) *size += member_state_size(m, i, state);
+    return fmi2OK;
+}
+
+/* The bytes hold no addresses: these are written again when the state is set. */
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[],
+                                 size_t size) {
+    Model *m = c;
+    Saved *saved = state;
+    size_t needed, at = sizeof(State);
+    if (is_null(m, __func__, 1, state, bytes)) return fmi2Error;
+    if (fmi2SerializedFMUstateSize(c, state, &needed) != fmi2OK) return fmi2Error;
+    if (size < needed) return fail(m, fmi2Error, "too few bytes for the FMU state");
+    memcpy(bytes, &saved->now, sizeof(State));
+    char *scene = (char *)bytes + offsetof(State, scene);
+    for (int i = 0; i < N_POINTERS; i++) memset(scene + pointers[i].at, 0, sizeof(void *));
+    for (int i = 0; i < N_HANDLES; i++) memset(scene + handles[i].at, 0, sizeof(void *));
+    for (int i = 0; i < N_CALLS; i++) memset(scene + calls[i].at, 0, sizeof(void *));
+    for (int i = 0; i < N_SLOTS; i++) memset(scene + slots[i], 0, sizeof(void *));
+    for (int i = 0; i < N_MEMBERS; i++) {
+        const size_t part = member_state_size(m, i, saved);
+        if (members[i].serialize(m->members[i], saved->members[i], bytes + at, part)) return fmi2Error;
+        at += part;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
+                                   fmi2FMUstate *state) {
+    Model *m = c;
+    size_t needed, at = sizeof(State);
+    fmi2FMUstate own = NULL;
+    if (is_null(m, __func__, 1, bytes, state)) return fmi2Error;
+    if (!is_ours(m, size >= sizeof(State) ? bytes : NULL)) return fmi2Error;
+    if (fmi2GetFMUstate(c, &own) != fmi2OK) return fmi2Error; /* for the sizes of the blocks' states */
+    if (fmi2SerializedFMUstateSize(c, own, &needed) != fmi2OK || size != needed) {
+        fmi2FreeFMUstate(c, &own);
+        return fail(m, fmi2Error, "the FMU state has %zu bytes instead of %zu", size, needed);
+    }
+    fmi2FreeFMUstate(c, state);
+    Saved *saved = *state = own;
+    memcpy(&saved->now, bytes, sizeof(State));
+    for (int i = 0; i < N_MEMBERS; i++) {
+        const size_t part = member_state_size(m, i, saved);
+        if (members[i].deserialize(m->members[i], bytes + at, part, saved->members + i)) return fmi2Error;
+        at += part;
+    }
+    return fmi2OK;
+}

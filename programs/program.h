@@ -1,0 +1,31 @@
+/* What the files of a program share. scene.h, generated, includes this and has the scene's data. */
+
+#ifndef PROGRAM_H
+#define PROGRAM_H
+
+#include "loop.h"
+
+/* Energy (J) that the connection of a meter has generated so far: orchestrator/run/energy/meter.py. */
+double meter_energy(const Meter *m);
+
+/* Adds rows of a meter to its sums and drops them; whether that made room. */
+int meter_fold(Meter *m);
+
+/* PCG64 as NumPy has it, with a state and an increment of 128 bits each, the high words first. */
+typedef struct {
+    uint64_t state[2], increment[2];
+} Pcg64;
+
+/* A latency is drawn: ceil((low + spread u) / unit) ticks, u uniform from 0 to 1 and before it the
+ * sample is lost with a probability `loss`; all but that are whole numbers. */
+typedef struct {
+    int64_t hold;
+    uint64_t low, spread, unit;
+    double loss;
+    Pcg64 generator;
+} Latency;
+
+/* Draws the next latency (ticks), -1 for a lost sample: Link.draw of orchestrator/system/latency.py. */
+int64_t latency_draw(const Latency *latency, Pcg64 *generator);
+
+#endif

@@ -1,0 +1,72 @@
+"""What stands in the way of making one program of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.run.compiled.library import Unavailable, load
+from hapticlink.orchestrator.run.compiled.machine import too_long
+from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import System
+
+
+def of_scene(scene: Scene) -> None:
+    """Raises InputFault for FMUs that are given as files, for what only Python does, and where
+    there is no compiled loop, on whose structures a program is resolved."""
+    try:
+        load()
+    except Unavailable as why:
+        _refuse(scene.title, [f"there is no compiled loop here: {why}"])
+    given = [fmu for fmu in scene.fmu if fmu.path]
+    reasons = [f"{fmu.name} ({fmu.path}) is an FMU that exists already" for fmu in given]
+    if reasons:
+        reasons.append("only blocks of this project are compiled into a program; FMUs that contain "
+                       "their sources are not yet")  # fmt: skip
+    if scene.coupling == "iterated":
+        reasons.append("coupling = 'iterated': steps are repeated by Python")
+    if scene.faults.discard == "retry":
+        reasons.append("faults.discard = 'retry': steps are repeated by Python")
+    _refuse(scene.title, reasons)
+
+
+def of_system(system: System, outside: str | None, title: str) -> None:
+    """Raises InputFault for a block to leave out that the scene does not have."""
+    if outside is not None and outside not in system.fmu:
+        raise InputFault(f"{title}: {unknown('block', outside, [*system.fmu])}")
+    if outside is not None and len(system.fmus) == 1:
+        raise InputFault(f"{title}: without {outside} there is no block left")
+
+
+def of_simulation(simulation: Simulation, title: str) -> None:
+    """Raises InputFault for times that are not exact, and for FMUs in processes of their own."""
+    reasons = [
+        f"{fmu} runs in a process of its own: {why}" for fmu, why in simulation.isolated.items()
+    ]
+    if why := too_long(simulation.system):
+        reasons.append(why)
+    for name, instance in simulation.instances.items():
+        if name in simulation.isolated:
+            continue
+        assert isinstance(instance, InProcess)
+        if instance.retry or any(t.type != "Real" for t in instance.gets):
+            reasons.append(f"{name} has variables or repeats steps that a program does not have")
+    _refuse(title, reasons)
+
+
+def of_start(simulation: Simulation, title: str) -> None:
+    """Raises InputFault for start values that sweeps over the blocks do not settle."""
+    if not simulation.swept:
+        _refuse(title, ["an algebraic loop at t = 0 is solved by Newton's method, in Python"])
+
+
+def of_machine(in_python: Mapping[str, str], title: str) -> None:
+    """Raises InputFault for operations that the compiled loop leaves to Python."""
+    _refuse(title, [f"{operation}: {why}" for operation, why in in_python.items()])
+
+
+def _refuse(title: str, reasons: Iterable[str]) -> None:
+    if lines := [f"  {reason}" for reason in reasons]:
+        raise InputFault("\n".join([f"{title} cannot become one program:", *lines]))

@@ -1,0 +1,198 @@
+"""The C files of a program."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import json
+import re
+import uuid
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+
+from hapticlink.components.component import Component
+from hapticlink.fmus.native.archive import WRAPPER
+from hapticlink.fmus.native.source import component_source, number
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.run.compiled import build as loop
+from hapticlink.programs.ports import Port
+from hapticlink.programs.regions import Regions
+from hapticlink.programs.resolved import Resolved
+from hapticlink.programs.typed_data import TypedData
+
+HERE = Path(__file__).parent
+OWN = ("program.h", "program.c", "platform.c", "latencies.c", "energies.c")
+REPLACED = ("platform.c", "process_state.c", "python_errors.c")
+"""Files of the loop in whose place a program has its own platform.c."""
+HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
+FUNCTIONS = {
+    "fmi2GetReal": "GET_REAL",
+    "fmi2SetReal": "SET_REAL",
+    "fmi2DoStep": "DO_STEP",
+    "fmi2GetFMUstate": "GET_STATE",
+    "fmi2SetFMUstate": "SET_STATE",
+}
+
+
+def sources(
+    resolved: Resolved, components: Mapping[str, Component], ports: Sequence[Port]
+) -> dict[str, str]:
+    """All C files by name; scene.h lacks the GUID. components: by member."""
+    files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in REPLACED}
+    files["hold_laws.h"] = loop.LAWS["text"]()
+    files |= {name: (HERE / name).read_text() for name in OWN}
+    headers = Path(fmpy.__file__).parent / "c-code"
+    files |= {name: (headers / name).read_text(errors="replace") for name in HEADERS}
+    ids = _identifiers(components)
+    guids = {}
+    for fmu, component in components.items():
+        guids[fmu], own = _member(ids[fmu], component)
+        files |= own
+    files["scene.h"] = _scene(resolved, ports, ids, guids)
+    return files
+
+
+def _identifiers(names: Iterable[str]) -> dict[str, str]:
+    """A C identifier for each block, by which its functions begin."""
+    return {name: f"{re.sub(r'[^A-Za-z0-9]', '_', name)}_{i}" for i, name in enumerate(names)}
+
+
+def _member(id_: str, component: Component) -> tuple[str, dict[str, str]]:
+    """The GUID of a block, and its files: fmi2.c with the component's functions, all names that the
+    linker sees with the block's prefix."""
+    header, pieces = component_source(component)
+    guid = f"{{{uuid.UUID(hashlib.sha256(header.encode()).hexdigest()[:32])}}}"
+    prefix = f"#undef fmi2FullName\n#define fmi2FullName(name) {id_}_ ## name\n"
+    own = f'{prefix}#define GUID "{guid}"\n{header}'
+    text = WRAPPER.read_text().replace('#include "component.h"', own)
+    files = {f"{id_}.c": text} | {f"{id_}_{k:03}.c": piece for k, piece in enumerate(pieces)}
+    return guid, {name: _prefixed(text, id_) for name, text in files.items()}
+
+
+def _prefixed(text: str, id_: str) -> str:
+    text = text.replace("component_ ## ID", f"{id_}_ ## ID")
+    return re.sub(r"\bpart(\d+)_", rf"{id_}_part\1_", text)
+
+
+def _scene(
+    resolved: Resolved, ports: Sequence[Port], ids: Mapping[str, str], guids: Mapping[str, str]
+) -> str:
+    members = [*ids]
+    handles = {_component(resolved.instance(fmu)): i for i, fmu in enumerate(members)}
+    functions = {
+        _address(resolved.instance(fmu).slave.dll[name]): name
+        for fmu in members
+        for name in FUNCTIONS
+    }
+    data = TypedData(Regions(resolved.roots, resolved.counts), handles, functions)
+    settable = [p for p in ports if p.kind in ("INPUT", "OUTSIDE", "PARAMETER")]
+    latencies = [*_latencies(resolved)]
+    slot_members = [member for _, member in data.slots]
+    checks = [c for fmu, c in resolved.simulation.step_checks.items() if fmu in members]
+    described = [(fmu, resolved.system.fmu[fmu].description) for fmu in resolved.signal_order]
+    outputs = [s for _, description in described for s in description.outputs]
+    names = [f"{fmu}.{s.name}" for fmu, description in described for s in description.outputs]
+    unbounded = [s.unit is None for s in outputs]
+    sizes = {
+        "N_MEMBERS": len(members),
+        "N_FMUS": len(resolved.fmus),
+        "N_HOLDS": len(resolved.holds),
+        "N_VALUES": resolved.counts["n_values"],
+        "N_SIGNALS": len(names),
+        "N_SETTABLE": len(settable),
+        "N_VARIABLES": len(ports),
+        "N_LATENCIES": len(latencies),
+        "N_CHECKED": max((len(c.scales) for c in checks), default=0),
+        "N_START_SETTERS": len(resolved.start_fmus),
+        "N_POINTERS": len(data.pointers),
+        "N_HANDLES": len(data.handles),
+        "N_CALLS": len(data.calls),
+        "N_SLOTS": len(data.slots),
+        "START_FIRST": resolved.start[0],
+        "START_LAST": resolved.start[1],
+    }
+    one = "&" if len(resolved.start_fmus) == 1 else ""
+    setters = f"({one}(s)->start_setters)" if resolved.start_fmus else "((Setter *)0)"
+    return "\n".join(
+        [
+            "/* The data of the scene, as Python has resolved it. */",
+            *(f"#define {name} {value}" for name, value in sizes.items()),
+            f"#define START_SETTERS(s) {setters}",
+            "#define MEMBERS(X) " + " ".join(
+                f"X({ids[fmu]}, {json.dumps(fmu)}, {json.dumps(guids[fmu])})" for fmu in members
+            ),
+            data.structure,
+            f"static const Scene initial = {data.values};",
+            _table("struct { size_t at, to; } pointers", (
+                f"{{{_at(a)}, {_at(b)}}}" for a, b in data.pointers)),
+            _table("struct { size_t at; int member; } handles", (
+                f"{{{_at(a)}, {member}}}" for a, member in data.handles)),
+            _table("struct { size_t at; int member, function; } calls", (
+                f"{{{_at(a)}, {member}, {FUNCTIONS[name]}}}" for a, member, name in data.calls)),
+            _table("size_t slots", (_at(place) for place, _ in data.slots)),
+            _table("int slot_members", map(str, slot_members)),
+            _table("int member_fmus", (str(resolved.fmus.index(fmu)) for fmu in members)),
+            _table("int fmu_members", (str(members.index(fmu)) for fmu in resolved.fmus)),
+            _table("int member_tables", (
+                str(resolved.tables.index(resolved.system.fmu[fmu].clock)) for fmu in members)),
+            _table("int start_fmus", map(str, resolved.start_fmus)),
+            _table("Pattern patterns", (f"{{{p.n}, {p.ticks}}}" for p in resolved.patterns)),
+            _table("Latency latencies", latencies),
+            _table("char *const holds", map(json.dumps, resolved.holds)),
+            _table("char *const signals", map(json.dumps, names)),
+            _table("double bounds", (number(s.bound or 0.0) for s in outputs)),
+            _table("double nominals", (
+                "INFINITY" if none else number(s.nominal)
+                for s, none in zip(outputs, unbounded, strict=True))),
+            _table("Variable variables", map(_variable, ports)),
+            _table("double starts", (number(p.start or 0.0) for p in settable)),
+            "",
+        ]
+    )  # fmt: skip
+
+
+def _component(instance: InProcess) -> int:
+    component: int = instance.slave.component
+    return component
+
+
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def _at(place: str) -> str:
+    return f"offsetof(Scene, {place})"
+
+
+def _table(declared: str, entries: Iterable[str]) -> str:
+    """A C array with an additional entry of zeros at its end, since a C array must not be empty."""
+    rows = [f"    {entry}," for entry in entries]
+    zero = "{0}" if any(row.endswith("},") for row in rows) else "0"
+    return "\n".join([f"static const {declared}[] = {{", *rows, f"    {zero}}};"])
+
+
+def _variable(port: Port) -> str:
+    place = f"{port.member}, {int(port.fixed)}, {port.reference}, {port.place}"
+    return f"{{{port.kind}, {place}, {json.dumps(port.name)}}}"
+
+
+def _latencies(resolved: Resolved) -> Iterator[str]:
+    """The latencies of holds, as whole numbers of a common unit."""
+    base = resolved.system.timeline.base
+    for index, connection in enumerate(resolved.holds):
+        if not (latency := resolved.system.connection[connection].latency):
+            continue
+        low = exact(latency.min) / base
+        high = low if latency.max is None else exact(latency.max) / base
+        unit = np.lcm(low.denominator, high.denominator)
+        low, spread = low * int(unit), (high - low) * int(unit)
+        state = np.random.PCG64(latency.seed).state["state"]
+        words = ", ".join(
+            f"{{{value >> 64}u, {value % 2**64}u}}" for value in (state["state"], state["inc"])
+        )
+        yield (f"{{{index}, {low}u, {spread}u, {unit}u, {number(latency.loss)}, {{{words}}}}}")

@@ -1,0 +1,69 @@
+"""Programs of scenes for tests: compiled by the machine's own compiler without optimisation, each C
+file once, since another hold or rate changes the data of a scene alone."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+from fmpy import platform, sharedLibraryExtension
+from fmpy.validation import validate_fmu
+
+from hapticlink.fmus.archive import write
+from hapticlink.orchestrator import open_scene
+from hapticlink.programs.build import OPTIONS, program_files
+
+COMPILER = shutil.which("cc")
+FLAGS = ("-std=gnu11", "-fPIC", "-O0", "-w", "-ffp-contract=off", "-fvisibility=hidden", *OPTIONS)
+needs_compiler = pytest.mark.skipif(
+    COMPILER is None or platform != "linux64", reason="no C compiler of the machine's own"
+)
+
+
+@cache
+def _folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix="hapticlink-programs-", dir="/tmp"))
+
+
+@cache
+def program(scene: str, options: tuple[str, ...] = (), without: str | None = None) -> Path:
+    """The FMU of a scene."""
+    files = program_files(open_scene.load(scene, options), "program", without)
+    library = compiled({Path(n).name: c for n, c in files.items() if n.startswith("sources/")})
+    whole = {**files, f"binaries/{platform}/program{sharedLibraryExtension}": library}
+    path = Path(tempfile.mkdtemp(dir=_folder())) / "program.fmu"
+    with path.open("xb") as file:
+        write(whole, file)
+    assert validate_fmu(str(path)) == []
+    return path
+
+
+def compiled(sources: dict[str, bytes], flags: Sequence[str] = FLAGS) -> bytes:
+    """The shared library of C files, as `cc *.c` makes it."""
+    headers = b"".join(sources[n] for n in sorted(sources) if n.endswith(".h") and n != "scene.h")
+    objects = []
+    with tempfile.TemporaryDirectory(dir=_folder()) as name:
+        room = Path(name)
+        for file, content in sources.items():
+            (room / file).write_bytes(content)
+        for file in sorted(n for n in sources if n.endswith(".c")):
+            uses = sources["scene.h"] if file == "program.c" else b""
+            key = sha256(b"\0".join([sources[file], headers, uses, *map(str.encode, flags)]))
+            kept = _folder() / f"{key.hexdigest()}.o"
+            if not kept.exists():
+                _run(flags, "-c", "-o", str(kept), str(room / file))
+            objects.append(str(kept))
+        library = room / "library"
+        _run(flags, "-shared", "-Wl,-Bsymbolic", "-o", str(library), *objects, "-lm")
+        return library.read_bytes()
+
+
+def _run(flags: Sequence[str], *arguments: str) -> None:
+    assert COMPILER
+    subprocess.run([COMPILER, *flags, *arguments], check=True)

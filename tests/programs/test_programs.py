@@ -1,0 +1,304 @@
+"""A scene as one FMU: the bits of a run, its life as an FMU, and what it refuses."""
+
+from __future__ import annotations
+
+import ctypes
+import random
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from hapticlink.fmus.check import check_fmu, initialize, session
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.programs.build import build_program, program_files
+from tests.programs.built import COMPILER, FLAGS, needs_compiler, program
+from tests.programs.comparison import differing, outputs, run
+
+pytestmark = needs_compiler
+
+DISCARD, LAST_SUCCESSFUL_TIME, IS_TERMINATED = 2, 2, 3
+HALF = "duration=0.5"
+DELAYED = (
+    HALF,
+    "graphics.rate=30",
+    "hold=foh",
+    'delays={"virtual_environment.P_c"={min=0.001,max=0.02,loss=0.05,seed=3}, '
+    '"haptic_device.x -> controller.x_D"=0.004}',
+)
+CASES = {
+    "zoh": ("closed-loop", (HALF,)),
+    "foh with delays, jitter and loss": ("closed-loop", DELAYED),
+    "smooth, jacobi": ("closed-loop", (HALF, "hold=smooth", "coupling=jacobi")),
+    "drawn rate": ("closed-loop", (HALF, "graphics.rate={min=20,max=90,seed=5}")),
+    "listed frames, a phase": (
+        "closed-loop",
+        (HALF, "graphics.rate=[0.01,0.05,0.3,0.6]", "phases={haptic_device=0.001}"),
+    ),
+    "passive": ("closed-loop-direct", (HALF, "graphics.rate=30", "hold=passive")),
+    "nepce, late": ("closed-loop-direct", (HALF, "graphics.rate=30", "hold=nepce")),
+    "pspm": ("closed-loop-direct", (HALF, "graphics.rate=30", "hold=pspm")),
+    "mechanism alone": ("pendulum", (HALF,)),
+    "derivatives and integrals": (
+        "closed-loop",
+        (
+            HALF,
+            "mechanism_at=graphics",
+            "graphics.rate=100",
+            'holds={"virtual_mechanism.x -> controller.x_S"="hermite",'
+            '"virtual_mechanism.v -> controller.v_S"="slope"}',
+        ),
+    ),
+    "a derivative": (
+        "closed-loop",
+        (
+            HALF,
+            "mechanism_at=graphics",
+            "graphics.rate=100",
+            'holds={"virtual_mechanism.x"="foh-derivative"}',
+        ),
+    ),
+    "mean": ("two-users", ("duration=0.2", "downsampling=mean")),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_outputs_are_those_of_a_run_to_the_bit(name: str, tmp_path: Path) -> None:
+    scene, options = CASES[name]
+    experiment = run(scene, options, tmp_path)
+    path, haptic = program(scene, options), experiment.system.timeline.clocks[0].longest
+    for step in (haptic, 16 * haptic, 7):
+        found = outputs(path, experiment, step)
+        assert [*differing(found, experiment)] == [], step
+        if step == haptic:
+            _measured(found.measured, experiment)
+
+
+def _measured(measured: dict[str, float], experiment) -> None:
+    """Energies and step errors are those that the run reports, but for the order of sums."""
+    energies, errors = experiment.outcome.details.meters, experiment.outcome.details.step_errors
+    connections = experiment.system.connection
+    for name, energy in energies.items():
+        c = connections[name]
+        value = measured[f"energy.{c.target}.{c.target_port}"]
+        scale = max(abs(energy.held), abs(energy.ideal), 1e-12)
+        assert abs(value - energy.generated) < 1e-9 * scale, name
+    timeline = experiment.system.timeline
+    for fmu, error in errors.items():
+        if timeline.end not in timeline.clock(timeline.of[fmu]).starts:
+            continue  # the run does not take its last step, which would end after the run
+        assert measured[f"step_error.{fmu}"] == pytest.approx(error.sum, rel=1e-9, abs=1e-15)
+
+
+HOLDS = ("zoh", "lead", "foh", "second-order", "delayed", "smooth")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_scenes_have_the_bits_of_their_runs(seed: int, tmp_path: Path) -> None:
+    draw = random.Random(seed)
+    options = [
+        "duration=0.3",
+        f"haptics.rate={draw.choice((250, 400, 512))}",
+        f"graphics.rate={draw.choice((17, 30, 60, 100))}",
+        f"hold={draw.choice(HOLDS)}",
+        f"coupling={draw.choice(('jacobi', 'gauss-seidel', 'gauss-seidel-plants'))}",
+        f"downsampling={draw.choice(('latest', 'mean'))}",
+    ]
+    if draw.random() < 0.7:
+        low = draw.uniform(0.0, 0.01)
+        options.append(
+            f'delays={{"virtual_environment.P_c"={{min={low:.4f},max={low + 0.02:.4f},'
+            f"loss={draw.choice((0.0, 0.1))},seed={seed}}}}}"
+        )
+    experiment = run("closed-loop", tuple(options), tmp_path)
+    step = draw.choice((1, 11, 100)) * experiment.system.timeline.clocks[0].longest
+    found = outputs(program("closed-loop", tuple(options)), experiment, step)
+    assert [*differing(found, experiment)] == [], options
+
+
+def test_it_lives_as_every_fmu_of_this_project() -> None:
+    """Two instances, reset, loading again, a state saved, restored, serialised and restored into
+    another instance."""
+    assert check_fmu(program("closed-loop", DELAYED)) == []
+
+
+def test_the_same_scene_gives_the_same_files() -> None:
+    scene = open_scene.load("closed-loop", DELAYED)
+    assert program_files(scene, "program") == program_files(scene, "program")
+
+
+def test_without_the_hand_its_force_is_an_input(tmp_path: Path) -> None:
+    """At its start value the scene's constant hand gives the bits of the run; another force moves
+    the device elsewhere."""
+    options = (HALF, "hand={type='constant', wrench=[0.4,0.1,0.0]}")
+    experiment = run("closed-loop", options, tmp_path)
+    path = program("closed-loop", options, "hand")
+    found = outputs(path, experiment, 240)
+    assert [*differing(found, experiment, skipped="hand.")] == []
+    with session(path) as opened:
+        inputs = {v.name: v for v in opened.description.modelVariables if v.causality == "input"}
+        assert [*inputs] == ["hand.F[1]", "hand.F[2]", "hand.F[3]"]
+        assert [float(v.start) for v in inputs.values()] == [0.4, 0.1, 0.0]
+        slave = opened.instance()
+        initialize(slave)
+        slave.setReal([inputs["hand.F[1]"].valueReference], [-0.4])
+        slave.doStep(0.0, 0.25)
+        x = next(v for v in opened.description.modelVariables if v.name == "haptic_device.x[1]")
+        moved = slave.getReal([x.valueReference])[0]
+    row = found.values[found.ticks.tolist().index(240 * 8), found.names.index("haptic_device.x[1]")]
+    assert moved < row
+
+
+def test_a_time_between_ticks_is_the_tick_before() -> None:
+    path = program("pendulum", (HALF,))
+    with session(path) as opened:
+        references = [v.valueReference for v in opened.description.modelVariables
+                      if v.causality == "output"]  # fmt: skip
+        one, two = opened.instance("one"), opened.instance("two")
+        initialize(one)
+        initialize(two)
+        one.doStep(0.0, 3.4 / 512)
+        two.doStep(0.0, 3 / 512)
+        assert one.getReal(references) == two.getReal(references)
+        one.doStep(3.4 / 512, 0.6 / 512)
+        two.doStep(3 / 512, 1 / 512)
+        assert one.getReal(references) == two.getReal(references)
+
+
+def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
+    path = program("closed-loop", DELAYED, "hand")
+    with session(path) as opened:
+        names = {v.name: v.valueReference for v in opened.description.modelVariables}
+        fixed = next(v for v in opened.description.modelVariables
+                     if v.causality == "parameter" and v.variability == "fixed")  # fmt: skip
+        slave = opened.instance()
+
+        def fails(call, *arguments) -> str:
+            with pytest.raises(FMICallException):
+                call(*arguments)
+            return opened.messages[-1]
+
+        assert "is instantiated" in fails(slave.doStep, 0.0, 0.1)
+        assert "starts at 0 s" in fails(slave.setupExperiment, None, 1.0)
+        initialize(slave)
+        assert "is initialised" in fails(slave.enterInitializationMode)
+        assert "unknown value reference 99999" in fails(slave.getReal, [99999])
+        assert "unknown value reference 99999" in fails(slave.setReal, [99999], [0.0])
+        assert "hand.F[1] cannot be nan" in fails(slave.setReal, [names["hand.F[1]"]], [np.nan])
+        message = fails(slave.setReal, [names["haptic_device.x[1]"]], [0.0])
+        assert message == "haptic_device.x[1] is no input or parameter"
+        message = fails(slave.setReal, [fixed.valueReference], [1.0])
+        assert message.startswith(f"parameter {fixed.name} is fixed")
+        slave.doStep(0.0, 0.1)
+        assert "the program stands at 0.1" in fails(slave.doStep, 0.0, 0.1)
+        assert "has no end" in fails(slave.doStep, 0.1, -0.1)
+        assert "has no end" in fails(slave.doStep, 0.1, float("inf"))
+        before = slave.getReal([*names.values()])
+        slave.doStep(0.1, 0.1)
+        assert before != slave.getReal([*names.values()])
+        slave.terminate()
+        assert "is terminated" in fails(slave.doStep, 0.2, 0.1)
+
+
+def test_a_run_that_diverges_names_the_output() -> None:
+    path = program("closed-loop", DELAYED, "hand")
+    with session(path) as opened:
+        force = [v.valueReference for v in opened.description.modelVariables
+                 if v.causality == "input"]  # fmt: skip
+        slave = opened.instance()
+        initialize(slave)
+        slave.setReal(force[:1], [1e300])
+        with pytest.raises(FMICallException):
+            slave.doStep(0.0, 0.4)
+        assert re.fullmatch(r"output [a-z_]+\.\S+ is .* at t = 0 s: .*", opened.messages[-1])
+        with pytest.raises(FMICallException):
+            slave.doStep(0.0, 0.1)
+        assert "has failed; reset it or restore a state" in opened.messages[-1]
+        slave.reset()
+        initialize(slave)
+        slave.doStep(0.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (("coupling=iterated",), "steps are repeated by Python"),
+        (("faults.discard=retry",), "faults.discard = 'retry'"),
+        (('fmu.+={name="other", path="FMU"}',), "is an FMU that exists already"),
+    ],
+)
+def test_what_cannot_go_is_refused_with_the_reason(options, reason: str, tmp_path) -> None:
+    options = tuple(o.replace("FMU", str(program("pendulum", (HALF,)))) for o in options)
+    with pytest.raises(InputFault, match="cannot become one program") as refused:
+        build_program(open_scene.load("closed-loop", options), "closed-loop", out=tmp_path)
+    assert reason in str(refused.value)
+    with pytest.raises(InputFault, match="no block 'foot'"):
+        build_program(open_scene.load("pendulum"), "pendulum", out=tmp_path, without="foot")
+
+
+def test_the_fmu_that_is_built_has_the_bits_of_the_run(tmp_path: Path) -> None:
+    """Compiled as for others, optimised and with sources inside."""
+    experiment = run("single-body", (HALF,), tmp_path / "run")
+    scene = open_scene.load("single-body", (HALF,))
+    path = build_program(scene, "single-body", out=tmp_path)
+    haptic = experiment.system.timeline.clocks[0].longest
+    assert [*differing(outputs(path, experiment, 16 * haptic), experiment)] == []
+
+
+def test_a_condition_to_stop_ends_the_simulation(tmp_path: Path) -> None:
+    """The doStep that finds it returns discard, the FMU is terminated, and stands where the run
+    ends."""
+    options = ("duration=0.5", "stop_when=virtual_mechanism.v[1] < -0.3")
+    experiment = run("pendulum", options, tmp_path)
+    assert experiment.outcome.reason == "stop_when"
+    with session(program("pendulum", options)) as opened:
+        slave = opened.instance()
+        initialize(slave)
+        with pytest.raises(FMICallException) as ended:
+            slave.doStep(0.0, 0.5)
+        assert ended.value.status == DISCARD
+        names = {v.name: v.valueReference for v in opened.description.modelVariables}
+        columns = experiment.results.haptics.columns[1:]
+        values = slave.getReal([names[column] for column in columns])
+        assert values == experiment.results.haptics.rows[-1, 1:].tolist()
+        time, terminated = ctypes.c_double(), ctypes.c_int()
+        slave.fmi2GetRealStatus(slave.component, LAST_SUCCESSFUL_TIME, ctypes.byref(time))
+        slave.fmi2GetBooleanStatus(slave.component, IS_TERMINATED, ctypes.byref(terminated))
+        assert time.value == experiment.outcome.end_time
+        assert terminated.value
+
+
+def test_it_has_the_outputs_that_the_scene_records(tmp_path: Path) -> None:
+    options = (HALF, 'record.signals=["virtual_mechanism.x"]')
+    experiment = run("closed-loop", options, tmp_path)
+    found = outputs(program("closed-loop", options), experiment, 240)
+    assert found.names == [f"virtual_mechanism.x[{i}]" for i in (1, 2, 3)]
+    assert [*differing(found, experiment)] == []
+
+
+def test_its_memory_is_its_own(tmp_path: Path) -> None:
+    """The life of two instances under the sanitizers for addresses and undefined behaviour."""
+    scene = open_scene.load("closed-loop-direct", ("graphics.rate=30", "hold=passive"))
+    files = program_files(scene, "program")
+    xml = files["modelDescription.xml"].decode()
+    for name, content in files.items():
+        if name.startswith("sources/"):
+            (tmp_path / Path(name).name).write_bytes(content)
+    shutil.copy(Path(__file__).with_name("life.c"), tmp_path)
+    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", *FLAGS]
+    life = tmp_path / "life"
+    command = [COMPILER, *flags, "-o", life, *tmp_path.glob("*.c"), "-lm"]
+    made = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "cannot find" in made.stderr:
+        pytest.skip("the compiler has no sanitizers")
+    assert made.returncode == 0, made.stderr
+    guid = re.search(r'guid="(.*?)"', xml)
+    assert guid
+    lived = [life, guid[1], str(xml.count("<ScalarVariable")), repr(1 / 512)]
+    done = subprocess.run(lived, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
