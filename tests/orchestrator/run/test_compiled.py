@@ -60,7 +60,7 @@ def test_every_shipped_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, na
 @pytest.mark.parametrize("hold", [*HOLDS.names()])
 def test_every_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str) -> None:
     kind = "downsampling" if HOLDS[hold].downsamples else "hold"
-    options = [f"{kind}={hold}", *NO_MATRICES, "graphics.rate=60", "duration=0.15"]
+    options = [f"{kind}={hold}", *NO_MATRICES, "graphics.rate=60", "duration=0.3"]
     run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options)
     assert hold in run["holds"].values()
     late = "delays.virtual_mechanism.x={ min = 0.001, max = 0.03, loss = 0.1, seed = 3 }"
