@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
+from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
@@ -11,6 +14,7 @@ from hapticlink.fmus.native import PLATFORMS
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.run import start_parameters
 from hapticlink.orchestrator.scene.blocks import blocks
@@ -66,7 +70,23 @@ def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path)
 
     read = open_scene.load(scene, options)
     with built(read, _starts(read)) as system:
+        for line in uneven(system.timeline):
+            logging.getLogger(__name__).warning(line)
         return write.write(read, start_parameters.settled(system), Path(out))
+
+
+def uneven(timeline: Timeline) -> Iterator[str]:
+    """A line for each rate whose steps are no whole number of haptic ones: tools that take whole
+    decimation factors step it at other instants than `run` does."""
+    haptics, *others = timeline.clocks
+    for clock in others:
+        if clock.longest != clock.shortest or clock.longest % haptics.longest:
+            factor = float(Fraction(clock.longest, haptics.longest))
+            yield (
+                f"a step of {clock.name} is {factor:.4g} of the haptic ones: tools that step FMUs "
+                "at whole multiples of the fastest rate, such as libcosim, run them at other "
+                f"instants; take a {clock.name} rate that divides the haptic one"
+            )
 
 
 def _starts(scene: Scene) -> dict[str, dict[str, tuple[float, ...]]]:

@@ -57,7 +57,9 @@ def run(
     Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
     A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
     results up to then. Ctrl-C raises RunInterrupted, with the results so far as its `run`. Tables
-    of more than 1 GiB in `out` are not read back; use `load` for them.
+    of more than 1 GiB in `out` are not read back; use `load` for them. Threads of one process may
+    run scenes at the same time, each into a folder of its own; the current directory stays as it
+    is, and Ctrl-C ends the runs of the main thread.
     """
     read = open_scene.load(scene, options)
     return run_paced(read, out, RealTimeRun() if real_time else None, figures, progress)

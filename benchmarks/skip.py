@@ -28,13 +28,13 @@ import hapticlink.orchestrator
 import hapticlink.scenes
 from benchmarks import state
 from benchmarks.rows import Rows
+from hapticlink.analysis.findings import block_costs
 from hapticlink.orchestrator import experiment
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.fmi import in_process, process_cache
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.scene import blocks, find_scene
-from hapticlink.orchestrator.system import costs
 from hapticlink.orchestrator.system.timeline import timeline
 
 COLUMNS = ("scene", "skipping", "round", "operations", "calls", "values", "run_s")
@@ -81,7 +81,7 @@ def run(scene: str, folder: Path, skipping: str, *options: str) -> Experiment:
 def counts(made: Experiment, skipping: str) -> tuple[int, int, int]:
     """Operations of the graphs of all steps, FMI calls, and values set or fetched by them."""
     scene, system, calls = made.scene, made.system, made.outcome.details.calls
-    found = costs.costs(scene, timeline(scene), skip=skipping == ON)
+    found = block_costs.costs(scene, timeline(scene), skip=skipping == ON)
     operations = sum(c.cost.step * calls[c.name]["step"] for c in found)
     moved = 0
     for fmu in system.fmus:

@@ -48,7 +48,8 @@ called; or a function itself. Its arguments and docstring define the command, an
 exit status."""
 
 app.register_install_completion_command(
-    help="Write the script that completes commands, options, scenes and keys in your shell."
+    add_to_startup=False,  # nobody has asked for a change of ~/.bashrc
+    help="Write the script that completes commands, options, scenes and keys in your shell.",
 )
 
 Plugin = Annotated[
@@ -135,7 +136,7 @@ def _status(arguments: Sequence[str] | None) -> int:
                 f"hapticlink: {error}: `hapticlink doctor` reports what is missing", file=sys.stderr
             )
             return 1
-        from hapticlink.orchestrator.base import internal_error  # slow to load
+        from hapticlink.commands import internal_error  # slow to load
 
         say(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)
         return 1

@@ -25,8 +25,8 @@ def scenes(context: CompletionContext | None = None) -> dict[str, str]:
 
 def keys(context: CompletionContext | None = None) -> list[str]:
     """Dotted keys of a scene, each followed by `=`."""
+    from hapticlink.commands.json_schema import json_schema
     from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # a scene names them too
-    from hapticlink.orchestrator.scene.json_schema import json_schema
 
     schema = json_schema()
     return [f"{key}=" for key in dict.fromkeys(_leaves(schema, schema["$defs"], ""))]

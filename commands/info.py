@@ -118,8 +118,7 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
 
 
 def _needs(scene: Any, time: Timeline) -> None:
-    from hapticlink.orchestrator.scene import requirements
-    from hapticlink.orchestrator.system import costs
+    from hapticlink.analysis.findings import block_costs, requirements
 
     found = list(requirements.needs(scene))
     for title, needed in (("needed", True), ("left out", False)):
@@ -130,7 +129,7 @@ def _needs(scene: Any, time: Timeline) -> None:
     say("\noperations of a step and its outputs, signals in and out")
     rows = {}
     for title, skip in (("as it is", True), ("nothing left out", False)):
-        rows[title] = costs.costs(scene, time, skip=skip)
+        rows[title] = block_costs.costs(scene, time, skip=skip)
         say(f"  {title}")
         for row in rows[title]:
             ports = sum(row.cost.inputs.values()), sum(row.cost.outputs.values())

@@ -21,13 +21,13 @@ def schema(*, markdown: Markdown = False) -> int:
     """
     import json
 
+    from hapticlink.commands import json_schema, scene_reference
     from hapticlink.orchestrator.base import plugins
     from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # a scene names them too
-    from hapticlink.orchestrator.scene import json_schema, reference
 
     plugins.load_installed()
     if markdown:
-        print(reference.page(), end="")
+        print(scene_reference.page(), end="")
     else:
         print(json.dumps(json_schema.json_schema(), indent=2))
     return 0

@@ -118,7 +118,9 @@ MAX_SHOWN = 100
 def near(name: str, known: Iterable[str]) -> str:
     """A hint with the known name nearest to `name`, or else with the known names."""
     known = list(known)
-    nearest = difflib.get_close_matches(name[:MAX_SHOWN], known[:MAX_SHOWN], 1)
+    # No word of twice the length is a slip of the pen.
+    alike = [k for k in known[:MAX_SHOWN] if abs(len(k) - len(name)) <= max(len(name) / 2, 2)]
+    nearest = difflib.get_close_matches(name[:MAX_SHOWN], alike, 1)
     more = f" and {len(known) - MAX_SHOWN} more" if len(known) > MAX_SHOWN else ""
     there = ", ".join(each[:MAX_SHOWN] for each in known[:MAX_SHOWN]) or "none"
     return f"did you mean {nearest[0]!r}?" if nearest else f"there are {there}{more}"

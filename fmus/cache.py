@@ -50,6 +50,13 @@ def user_folder() -> Path:
     return Path(base) / "hapticlink"
 
 
+def private(folder: Path) -> None:
+    """Creates a folder of the cache where it is missing, open to its user alone: what lies in it
+    is loaded as code. Raises OSError."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+
+
 def key(material: Mapping[str, Any]) -> str:
     """SHA-256 of the JSON `material`, the versions in VERSIONS and the sources of the equations,
     also those of plugins."""
@@ -138,9 +145,11 @@ def _exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator
         warned = True
         poll()
 
-    path = Path(tempfile.gettempdir()) / f"hapticlink-{sha(str(entry.absolute()))[:32]}.lock"
+    path = entry.parent / "locks" / f"{entry.name}.lock"
     with ExitStack() as stack:
-        with suppress(PermissionError):  # the file of another user, who has another cache
+        with suppress(OSError):  # a cache that cannot be written: reported when it is
+            private(entry.parent)
+            private(path.parent)
             stack.enter_context(lock.held(path, wait))
             _held.add(path)
         try:
@@ -180,7 +189,7 @@ def _built(
 
 def _stored(built: Path, root: Path, entry: Path) -> Path:
     """A copy of `built` in `entry`: from its first instant there it is whole."""
-    root.mkdir(parents=True, exist_ok=True)
+    private(root)
     _clear(root)
     unfinished = root / f".{uuid.uuid4().hex}"
     try:

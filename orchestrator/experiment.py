@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import current_directory, interrupt
 from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.record import content
@@ -108,6 +110,10 @@ def simulate(
             sides = dict.fromkeys(beside(plan)[0].values())
             tables += [f"{clock}_{SAMPLES}" for clock in sides]
         before = setup(read, plan, tables, _left_out(every, system))
+        for fmu in system.fmus:
+            if offered := capabilities.unused(fmu.description):
+                said = "%s offers %s, which is not used: its events act at ends of steps"
+                logging.getLogger(__name__).warning(said, fmu.name, offered)
         alone = isolated(system.fmus)
         csv = csv and read.record.format == "csv"
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from pathlib import Path
 
 import casadi as ca
 import pytest
 
+import hapticlink as hl
 from hapticlink.commands import main
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
+from hapticlink.orchestrator.scene.overrides import Options, written
 from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
 
@@ -41,6 +44,19 @@ def status(*arguments: object) -> int:
 def sets(options: Iterable[str]) -> list[str]:
     """Options as a command takes them."""
     return [text for option in options for text in ("--set", option)]
+
+
+@cache
+def _once(scene: str, options: tuple[str, ...]) -> hl.Run:
+    run = hl.run(scene, options, figures=False)
+    for table in run.tables.values():
+        table.rows.setflags(write=False)
+    return run
+
+
+def run_once(scene: str, options: Options = ()) -> hl.Run:
+    """A run of a shipped scene, which all tests of a process share that ask for it."""
+    return _once(scene, written(options))
 
 
 try:

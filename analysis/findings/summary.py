@@ -20,6 +20,7 @@ from hapticlink.orchestrator.base.loop_names import (
     CONSTRAINT_COUNTS,
     CONTACT_GAP,
     COPY_BRANCH_OK,
+    DEVICE,
     HAND,
     HAND_WRENCH,
     HANDLE_POSE,
@@ -247,6 +248,7 @@ def unrecorded(left_out: Collection[str], fmus: Iterable[str] = ()) -> Iterator[
         )
 
 
+LARGEST_PERCENT = 1000
 LARGEST_STEP_ERROR, LARGEST_SUM = 0.1, 0.1
 """Bounds of the relative error of a step, which may be an impact, and of the sum over all steps of
 the mechanism (`step_check`); the controller takes back what would add up in the device."""
@@ -256,12 +258,20 @@ def long_steps(fmu: str, errors: StepErrors, block: str | None) -> Iterator[str]
     """A line if the steps of an FMU were too long for its equations."""
     if errors.largest <= LARGEST_STEP_ERROR and (errors.sum <= LARGEST_SUM or block != MECHANISM):
         return
+    key = {MECHANISM: "more mechanism.substeps or ", DEVICE: "more device.substeps or "}
     yield (
-        f"warning: steps of {fmu} are too long: with half of them {errors.output} changes by up "
-        f"to {100 * errors.largest:.2g} % of its largest value in one (at {errors.time:.4g} "
-        f"s), and by about {100 * errors.sum:.2g} % in all: take more mechanism.substeps or a "
+        f"warning: steps of {fmu} are too long: with half of them {errors.output} changes by "
+        f"{_percent('up to', errors.largest)} of its largest value in one (at {errors.time:.4g} "
+        f"s), and by {_percent('about', errors.sum)} in all: take {key.get(block or '', '')}a "
         "higher rate"
     )
+
+
+def _percent(how: str, share: float) -> str:
+    """A share, which says nothing any more beyond LARGEST_PERCENT."""
+    percent = 100 * share
+    far = percent > LARGEST_PERCENT
+    return f"more than {LARGEST_PERCENT} %" if far else f"{how} {percent:.2g} %"
 
 
 def replaced(replacements: Mapping[str, Replacement]) -> Iterator[str]:

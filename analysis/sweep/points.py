@@ -25,6 +25,8 @@ def points(vary: Vary, runs: Runs) -> list[Point]:
         return grid(axes(vary))
     if isinstance(runs, str | Path):
         return listed(Path(runs))
+    if not all(isinstance(run, Mapping) for run in runs):
+        raise InputFault("runs: give a mapping of keys to values for each run, or a file")
     return [{key: text(value, key) for key, value in run.items()} for run in runs]
 
 
@@ -34,7 +36,9 @@ def axes(vary: Vary) -> list[Axis]:
         raise InputFault(f"vary {vary!r}: give a mapping, or a list of key=values")
     if isinstance(vary, Mapping):
         return [_axis(key, values) for key, values in vary.items()]
-    return [parse(text) for text in vary]
+    if not all(isinstance(values, str) for values in vary):
+        raise InputFault("vary: give a mapping of keys to values, or a list of key=values")
+    return [parse(values) for values in vary]
 
 
 def _axis(key: str, values: Iterable[Any]) -> Axis:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 from hapticlink.analysis.sweep.row import Row
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.files import write_json
 
 NOT_REPRODUCIBLE = "run_time_s"
@@ -25,8 +26,8 @@ class Rows:
     def find(self, key: str) -> Row | None:
         """The row of an earlier sweep; None if there is none or it cannot be read."""
         try:
-            row = json.loads((self._folder / f"{key}.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            row = json_file.read(self._folder / f"{key}.json", "a row")
+        except InputFault:
             return None
         return row if isinstance(row, dict) else None
 

@@ -10,12 +10,13 @@ import importlib
 import os
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
 from hapticlink.components import registry
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.faults import InputFault, shortened
 
 GROUP = "hapticlink.plugins"
 PACKAGE = f"{Path(registry.__file__).parent.parent}{os.sep}"
@@ -63,8 +64,12 @@ def blamed(error: BaseException) -> str | None:
 
 
 def _load(module: str, what: str) -> None:
+    if not all(part.isidentifier() for part in module.split(".")):
+        hint = ": give its name, without .py" if module.endswith(".py") else ""
+        raise InputFault(f"{shortened(what)}: this is no name of a module{hint}")
     try:
-        importlib.import_module(module)
+        with _goes_on():
+            importlib.import_module(module)
     except ModuleNotFoundError as error:
         if not f"{module}.".startswith(f"{error.name}."):
             raise InputFault(f"{what}: it imports {error.name!r}, which is not there") from error
@@ -73,15 +78,34 @@ def _load(module: str, what: str) -> None:
     except SyntaxError as error:
         place = f"{error.filename}, line {error.lineno}"
         raise InputFault(f"{what}: {place}: SyntaxError: {error.msg}") from error
-    except (Exception, SystemExit) as error:  # whatever a user's module can do
+    except BaseException as error:  # whatever a user's module can do; signals wait
         frames = traceback.extract_tb(error.__traceback__)
-        at = [f for f in frames if not f.filename.startswith((PACKAGE, "<"))][-1]
-        place = f"{at.filename}, line {at.lineno}"
-        raise InputFault(f"{what}: {place}: {type(error).__name__}: {error}") from error
+        own = [f for f in frames if not f.filename.startswith((PACKAGE, "<"))]
+        place = f"{own[-1].filename}, line {own[-1].lineno}: " if own else ""
+        try:
+            text = str(error)
+        except Exception:
+            text = "its message cannot be read"
+        raise InputFault(f"{what}: {place}{type(error).__name__}: {text}") from error
     package = module.partition(".")[0]
     if package not in {name.partition(".")[0] for name in registry.origins()}:
         file = getattr(sys.modules[module], "__file__", None)
         raise InputFault(f"{what}: {file} registers no part (docs/extending.md)")
+
+
+@contextmanager
+def _goes_on() -> Iterator[None]:
+    """Within the context os._exit raises SystemExit: an import ends no command without a word."""
+    exit_at_once = os._exit
+
+    def refused(status: int) -> None:
+        raise SystemExit(f"os._exit({status})")
+
+    os._exit = refused  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        os._exit = exit_at_once
 
 
 def _version(module: str) -> str | None:

@@ -6,12 +6,27 @@ from hapticlink.orchestrator.fmi.description import Description
 
 VARIABLE_STEP = "canHandleVariableCommunicationStepSize"
 INPUT_DERIVATIVES = "canInterpolateInputs"
+NEEDS_TOOL = "needsExecutionTool"
 STATE = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
 """FMI 2.0.5 section 4.3.1, FMI 3.0 section 4.3.1."""
 DIRECTIONAL_DERIVATIVES = {
     "2": "providesDirectionalDerivative",
     "3": "providesDirectionalDerivatives",
 }
+
+
+UNUSED = {
+    "hasEventMode": "event mode",
+    "canReturnEarlyAfterIntermediateUpdate": "early return",
+    "providesIntermediateUpdate": "intermediate update",
+}
+"""What an FMU of FMI 3.0 may offer and a run does not use, by capability flag (FMI 3.0 section
+4.3.1)."""
+
+
+def unused(description: Description) -> str:
+    """What of UNUSED the FMU offers, "" if nothing."""
+    return ", ".join(name for flag, name in UNUSED.items() if flag in description.flags)
 
 
 def varies_step(description: Description) -> bool:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.status import succeeded
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 Matrix = NDArray[np.float64]
@@ -24,25 +23,19 @@ def derivatives(
     fmi2GetDirectionalDerivative, FMI 2.0.5 section 2.1.9; in FMI 3.0, section 2.2.11, arrays are
     derived whole, in the order of their entries.
     """
-    call = slave.dll[f"fmi{description.fmi}GetDirectionalDerivative"]
     unknowns = _whole(description, outputs)
-    column, rows = np.zeros(len(unknowns)), [unknowns.index(_key(s)) for s in outputs]
+    rows = [unknowns.index(_key(s)) for s in outputs]
+    sizes = (len(unknowns),) if description.fmi == "3" else ()
     columns = []
     for scalar in inputs:
         knowns = _whole(description, [scalar])
-        seed = np.array([float(k == _key(scalar)) for k in knowns])
-        arguments: list[Any] = [ctypes.c_void_p(slave.component)]
-        for keys in (unknowns, knowns):
-            references = [reference for reference, entry in keys if entry == 0]
-            arguments.append((ctypes.c_uint * len(references))(*references))
-            arguments.append(ctypes.c_size_t(len(references)))
-        for values in (seed, column):
-            arguments.append(ctypes.c_void_p(values.ctypes.data))
-            if description.fmi == "3":
-                arguments.append(ctypes.c_size_t(len(values)))
-        if not succeeded(call(*arguments)):
+        seed = [float(k == _key(scalar)) for k in knowns]
+        variables = [[r for r, entry in keys if entry == 0] for keys in (unknowns, knowns)]
+        try:
+            column = slave.getDirectionalDerivative(*variables, seed, *sizes)
+        except FMICallException:
             return None
-        columns.append(column[rows])
+        columns.append(np.array(column)[rows])
     return np.stack(columns, axis=1)
 
 

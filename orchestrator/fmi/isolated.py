@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
@@ -43,6 +44,7 @@ class Isolated(Instance):
         self._pending: list[tuple[int, bytes]] = []
         self._saved_time: dict[int, float] = {}
         self._process = Process("hapticlink.orchestrator.fmi.worker")
+        self._process.interruptible = True
         what = (self.name, self.description, len(self.outputs), self.starts, self.policy)
         # The answer waits for `enter_initialization`: all FMUs of a run load at the same time.
         self._send("load", *what, self._folder, allowed=max(self.policy.timeout, LOADING))
@@ -119,8 +121,15 @@ class Isolated(Instance):
         return matrix
 
     def enter_initialization(self, stop_time: float) -> None:
-        self._answer()  # of `_load`
-        self._ask("enter_initialization", stop_time)
+        process = self._process
+        assert process is not None
+        try:
+            self._answer()  # of `_load`
+            self._ask("enter_initialization", stop_time)
+        except FmuFault:
+            interrupt.check()  # by a signal
+            raise
+        process.interruptible = False
 
     def exit_initialization(self) -> None:
         self._ask("exit_initialization")

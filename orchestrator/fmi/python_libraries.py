@@ -62,7 +62,7 @@ def shared(folder: Path, library: Path) -> Path | None:
 
 
 def _stored(content: bytes, digest: str) -> Path:
-    path = _libraries() / f"{digest}{sharedLibraryExtension}"
+    path = _libraries(fmu_cache.folder()) / f"{digest}{sharedLibraryExtension}"
     with suppress(OSError):
         if hashlib.sha256(path.read_bytes()).hexdigest() == digest:
             return path
@@ -73,13 +73,13 @@ def _stored(content: bytes, digest: str) -> Path:
 
 
 @cache
-def _libraries() -> Path:
-    """In the cache of built FMUs; a folder of this process where there is none."""
-    root = fmu_cache.folder()
+def _libraries(root: Path | None) -> Path:
+    """In the cache of built FMUs, `root`; a folder of this process where there is none."""
     if root is not None:
         with suppress(OSError):
             folder = root / "libraries"
-            folder.mkdir(parents=True, exist_ok=True)
+            fmu_cache.private(root)
+            fmu_cache.private(folder)
             if os.access(folder, os.W_OK | os.X_OK):
                 return folder
     folder = Path(temporary_folders.new())

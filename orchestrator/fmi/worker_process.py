@@ -51,11 +51,16 @@ class Process:
         self._ended = threading.Event()
         self._deadline: float | None = None
         self._late = self.busy = False
+        self.interruptible = False
+        """Whether the first signal already ends the process: it has nothing to lose yet."""
         interrupt.add(self.kill)
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
         while not self._ended.wait(WATCH):
+            if self.interruptible and interrupt.came():
+                self.kill()
+                return
             if self._deadline is not None and monotonic() > self._deadline:
                 self._late = True
                 self.kill()

@@ -24,6 +24,14 @@ class Hold(ABC):
        of `HoldContext.size` finite numbers, which the caller does not change.
     5. The whole state of a hold is in its attributes: the lifted map of a scene reads and writes it
        there.
+
+    With a source at a period of 30 ticks, a latency of 15 ticks, and a plant that takes steps of 3:
+
+        hold.push(0, y_0, 0)  # the initial output, which the target knows at once
+        hold.push(30, y_1, 45)  # the output of tick 30, which the target knows from tick 45 on
+        hold.value(48, 1.5)  # the input at 49.5, the middle of the plant's step from 48 to 51
+
+    where `foh` returns y_1 + (y_1 - y_0) (49.5 - 30)/30.
     """
 
     needs: ClassVar[Needs | None] = None
@@ -46,7 +54,8 @@ class Hold(ABC):
 
     @abstractmethod
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        """Take a sample of the instant `stamp` that the target knows from `arrival` on.
+        """Take a sample of the instant `stamp` (tick) that the target knows from `arrival` (tick)
+        on, which is `stamp` or later.
 
         Stamps never decrease; a second sample with the same stamp replaces the first. `sample` is
         a view that is valid only during the call: copy what is kept.
@@ -57,6 +66,7 @@ class Hold(ABC):
         """The input for the instant `tick + ahead`, read by the target at `tick` and computed from
         the samples known by then.
 
-        For a plant that holds its inputs constant over a step, `ahead` is half the step; for a
-        sampled block it is 0.
+        `ahead` is in ticks, and may be a fraction of one. For a plant that holds its inputs
+        constant over a step it is half the step, for a sampled block 0; in real time it is less by
+        what the event comes late, and may be negative.
         """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import threading
@@ -12,7 +11,7 @@ from pathlib import Path
 
 from hapticlink.fmus import lock
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.results import folders, json_file
 
 _holders: dict[tuple[int, int], int] = {}
 """The thread that holds the lock of a folder of this process, by device and inode."""
@@ -27,7 +26,7 @@ def held(folder: Path) -> Iterator[None]:
     Raises InputFault at once where another run holds the lock, or where the folder cannot be
     written to.
     """
-    missing = [p for p in (folder, *folder.parents) if not p.exists()]
+    missing = [p for p in (folder, *folder.parents) if not os.path.exists(p)]
     folders.ensure(folder)
     status = folder.stat()
     key = status.st_dev, status.st_ino
@@ -85,7 +84,7 @@ def _locked(folder: Path) -> Iterator[bool]:
 
 def _process(folder: Path) -> str:
     """Which process the run in `folder` belongs to, as far as its run.json says so."""
-    with suppress(OSError, ValueError, LookupError, TypeError, AttributeError):
-        end = json.loads((folder / "run.json").read_text(encoding="utf-8"))["end"]
+    with suppress(InputFault, ValueError, LookupError, TypeError, AttributeError):
+        end = json_file.read(folder / "run.json")["end"]
         return f", in process {int(end['process'])}"
     return ""

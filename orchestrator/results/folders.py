@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -10,6 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.files import write_json
 
 
@@ -21,8 +21,8 @@ def ensure(folder: Path | str, option: str = "--out") -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         why = "is a file"
-    except OSError as error:
-        why = f"cannot be created ({error.strerror})"
+    except (OSError, ValueError) as error:  # the latter of a name with a null character
+        why = f"cannot be created ({getattr(error, 'strerror', None) or error})"
     else:
         if os.access(folder, os.W_OK | os.X_OK):
             return folder
@@ -34,7 +34,7 @@ def add(
     folder: Path, names: Iterable[str], more: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
     """Adds files of a run to the list in its run.json, and `more` keys; returns the new content."""
-    run: dict[str, Any] = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    run: dict[str, Any] = json_file.read(folder / "run.json")
     run["files"] = list(dict.fromkeys([*run["files"], *names]))
     run |= more
     write_json(folder / "run.json", run)

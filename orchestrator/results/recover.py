@@ -3,14 +3,13 @@ run.json."""
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.results import folder_lock, rows
+from hapticlink.orchestrator.results import folder_lock, json_file, rows
 from hapticlink.orchestrator.results.files import make_csv, write_json
 from hapticlink.orchestrator.results.run_folder import RUN
 from hapticlink.orchestrator.results.tables import load
@@ -56,6 +55,6 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
         told["end"] = {"reason": "fault", "time": last}
         told["fault"] = {"kind": kind, "time": last, "message": message}
     if found or "process" in end:
-        content = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        content = json_file.read(folder / RUN)
         write_json(folder / RUN, content | told)
     return found

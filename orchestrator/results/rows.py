@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import to_json
 
+from hapticlink.orchestrator.base.faults import InputFault
+
 SUFFIX = ".rows"
 AT_A_TIME = 1 << 16
 """Bytes of rows that are made text at a time."""
@@ -80,7 +82,7 @@ def write_csv(source: Path, target: BinaryIO) -> int:
     is left out."""
     count = 0
     with source.open("rb") as file:
-        target.write(header(_columns(file.readline())))
+        target.write(header(_columns(file.readline(), source)))
     for part in _parts(source):
         for first in range(0, len(part), step := max(AT_A_TIME // (8 * part.shape[1]), 1)):
             target.write(text(part[first : first + step]))
@@ -91,7 +93,7 @@ def write_csv(source: Path, target: BinaryIO) -> int:
 def read(path: Path) -> tuple[tuple[str, ...], Rows]:
     """The columns and the rows of a table; a row that is not whole is left out."""
     with path.open("rb") as file:
-        columns = _columns(file.readline())
+        columns = _columns(file.readline(), path)
     return columns, np.concatenate([np.zeros((0, len(columns))), *_parts(path)])
 
 
@@ -100,7 +102,7 @@ def torn(path: Path) -> int:
     with path.open("rb") as file:
         line = file.readline()
         size = os.fstat(file.fileno()).st_size - len(line)
-    return int(size % (8 * len(_columns(line))) > 0)
+    return int(size % (8 * len(_columns(line, path))) > 0)
 
 
 def blocks(table: Path) -> list[Path]:
@@ -113,7 +115,7 @@ def _parts(path: Path) -> Iterator[Rows]:
     does not have."""
     last = -np.inf
     with path.open("rb") as file:
-        width = len(_columns(file.readline()))
+        width = len(_columns(file.readline(), path))
         while content := file.read(max(AT_A_TIME // (8 * width), 1) * 8 * width):
             if len(part := _rows(content, width)):
                 last = part[-1, 0]
@@ -125,8 +127,11 @@ def _parts(path: Path) -> Iterator[Rows]:
             yield part[part[:, 0] > last]
 
 
-def _columns(line: bytes) -> tuple[str, ...]:
-    return tuple(next(csv.reader([line.decode()])))
+def _columns(line: bytes, path: Path) -> tuple[str, ...]:
+    try:
+        return tuple(next(csv.reader([line.decode()])))
+    except (csv.Error, UnicodeDecodeError, StopIteration) as error:
+        raise InputFault(f"{path}: its header names no columns: {error}") from error
 
 
 def _quoted(name: str) -> str:

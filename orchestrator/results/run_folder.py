@@ -3,7 +3,6 @@ one are on the disk."""
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -12,14 +11,16 @@ from pathlib import Path
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.faults import Interrupted
-from hapticlink.orchestrator.results import rows
+from hapticlink.orchestrator.base.faults import InputFault, Interrupted
+from hapticlink.orchestrator.results import json_file, rows
 from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
 from hapticlink.orchestrator.results.record import End, RecordedFault, RunEnding, RunSetup, content
 
 ROOM = 1 << 14
 """Bytes reserved in run.json for how the run ends, in case the disk is full by then."""
 RUN = "run.json"
+MAX_HEADER_BYTES = 1 << 28
+"""Of the names of a table's columns."""
 
 
 class RunFolder:
@@ -139,20 +140,28 @@ def _has_rows(folder: Path) -> bool:
     """Whether an earlier run in `folder` has a row behind the header of a table."""
     for name in _listed(folder):
         if name.endswith((".csv", rows.SUFFIX)):
-            with suppress(OSError), (folder / name).open("rb") as file:
-                if file.readline() and file.read(1):
+            path = folder / name
+            with suppress(OSError):
+                if path.is_file() and _is_longer_than_a_line(path):
                     return True
     return False
+
+
+def _is_longer_than_a_line(path: Path) -> bool:
+    with path.open("rb") as file:
+        return bool(file.readline(MAX_HEADER_BYTES) and file.read(1))
 
 
 def _listed(folder: Path) -> set[str]:
     """The files that the run.json of an earlier run lists, without paths outside of `folder`, and
     the rows and blocks that a run leaves that was killed."""
     try:
-        names = json.loads((folder / RUN).read_text(encoding="utf-8")).get("files", ())
-        found = {n for n in names if isinstance(n, str) and n != ".." and Path(n).name == n}
-    except (OSError, ValueError, AttributeError, TypeError):
+        names = json_file.read(folder / RUN).get("files", ())
+        texts = (n for n in names if isinstance(n, str) and "\0" not in n)
+        found = {n for n in texts if n != ".." and Path(n).name == n}
+    except (InputFault, AttributeError, TypeError):
         return set()
     tables = (folder / n for n in found if n.endswith((".csv", rows.SUFFIX)))
+    found = {n for n in found if not (folder / n).is_dir() or (folder / n).is_symlink()}
     left = [f for t in tables for f in (t.with_suffix(rows.SUFFIX), *rows.blocks(t)) if f.exists()]
     return found | {f.name for f in left}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ import numpy as np
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.results import record, rows
+from hapticlink.orchestrator.results import json_file, record, rows
 from hapticlink.orchestrator.results.record import RunRecord
 
 TABLES = (".csv", rows.SUFFIX)
@@ -129,10 +128,9 @@ def load(folder: Path | str) -> Results:
     folder = Path(folder)
     tables: dict[str, Table] = {}
     try:
-        run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        why = f"{type(error).__name__}: {error}"
-        raise InputFault(f"{folder}: not the folder of a run: {why}") from error
+        run = json_file.read(folder / "run.json")
+    except InputFault as error:
+        raise InputFault(f"{folder}: not the folder of a run: {error}") from error
     results = Results(folder, run, tables)
     for name in results.record.rates:
         if any(name + suffix in results.record.files for suffix in TABLES):
@@ -146,7 +144,9 @@ def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
     """Reads one CSV of a run, or its rows where the run was killed; `others` are the run's other
     tables. Raises InputFault for a table that is not as a run writes it."""
     if (place := _place(path)) != path:
+        _require_file(place)
         return Table(*rows.read(place), {} if others is None else others)
+    _require_file(path)
     try:
         with path.open(encoding="utf-8", newline="") as file:
             columns = tuple(next(csv.reader([file.readline()])))
@@ -167,6 +167,12 @@ def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
     if why:
         raise InputFault(f"{path}: {why}: run the scene again")
     return Table(columns, values, {} if others is None else others)
+
+
+def _require_file(path: Path) -> None:
+    """Raises InputFault for a device, a pipe or a folder, which may have no end."""
+    if path.exists() and not path.is_file():
+        raise InputFault(f"{path}: it is no file: run the scene again")
 
 
 def _malformed(path: Path) -> str:

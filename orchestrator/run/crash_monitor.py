@@ -6,7 +6,6 @@ run.json and removes the temporary folders.
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.run.compiled import library
 
 
@@ -82,9 +82,9 @@ def record_crash(folder: Path, process: int) -> None:
 def _process(folder: Path) -> int | None:
     """The process ID of the run in progress in `folder`, from its run.json; None without one."""
     try:
-        end = json.loads((folder / "run.json").read_text(encoding="utf-8"))["end"]
+        end = json_file.read(folder / "run.json")["end"]
         process: int | None = end.get("process")
-    except (OSError, ValueError, KeyError):
+    except (InputFault, LookupError, TypeError, AttributeError):
         return None
     return process
 

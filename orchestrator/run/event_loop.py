@@ -51,6 +51,32 @@ class Outcome:
     table_time: float = 0.0
     details: RunEnding = field(default_factory=RunEnding)
 
+    def set_reason(self, error: BaseException, results: RunFolder) -> None:
+        """Set why the run ended by `error`. Raises `error` again where it is a mistake of this
+        package, of neither the scene nor the machine nor a plugin."""
+        match error:
+            case Stop():
+                self.reason = "stop_when"
+            case Ended():
+                self.reason = str(error)
+            case AsksToEnd(fmu=fmu, what=what):
+                self.reason, self.asked = "terminated", f"{fmu} {what}"
+            case Interrupted():
+                self.reason, self.fault = "interrupted", error
+            case Diverged():
+                self.reason, self.fault = "diverged", error
+            case Fault():
+                self.reason, self.fault = "fault", error
+            case OSError():  # a full disk, most of all
+                self.reason = "fault"
+                self.fault = Fault(f"{results.folder}: {error.strerror or error}")
+            case KeyboardInterrupt():  # a second signal does not wait for the end of the event
+                self.reason, self.fault = "interrupted", Interrupted(results.last)
+            case _:
+                if (message := plugins.blamed(error)) is None:
+                    raise error
+                self.reason, self.fault = "fault", Fault(message)
+
     def ending(self, build_time: float) -> RunEnding:
         """What run.json says of it; `build_time` (s) is that of the scene's FMUs."""
         fault = None
@@ -79,6 +105,7 @@ def run(
     """
     outcome = Outcome()
     simulation: Simulation | None = None
+    loop: PythonLoop | None = None
     try:
         # Non-finite values are detected by 0 x NaN, for which numpy would warn.
         with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
@@ -99,52 +126,49 @@ def run(
                 assert isinstance(loop, CompiledLoop)
                 loop.events.prepare(kinds(plan))
                 stack.enter_context(real_time.pace.undisturbed())
-            begin = shown = perf_counter()
-
-            def turn(tick: int) -> None:
-                nonlocal shown
-                time = plan.system.timeline.seconds(tick)
-                interrupt.check(time)
-                if real_time and isinstance(loop, CompiledLoop):
-                    real_time.turn(loop)
-                if progress and perf_counter() - shown > PAUSE:
-                    shown = perf_counter()
-                    progress(time)
-
-            try:
-                loop.run(turn)
-            finally:
-                results.flush()
-                outcome.wall_time = perf_counter() - begin
-                results.finish()
-                outcome.table_time = perf_counter() - begin - outcome.wall_time
-    except Stop:
-        outcome.reason = "stop_when"
-    except Ended as end:
-        outcome.reason = str(end)
-    except AsksToEnd as end:
-        outcome.reason, outcome.asked = "terminated", f"{end.fmu} {end.what}"
-    except Fault as fault:
-        outcome.reason, outcome.fault = _reason(fault), fault
-    except OSError as error:  # a full disk, most of all
-        full = Fault(f"{results.folder}: {error.strerror or error}")
-        outcome.reason, outcome.fault = "fault", full
-    except Exception as error:
-        if (told := plugins.blamed(error)) is None:
-            raise
-        outcome.reason, outcome.fault = "fault", Fault(told)
-    except KeyboardInterrupt:  # a second signal does not wait for the end of the event
-        outcome.reason, outcome.fault = "interrupted", Interrupted(results.last)
-    finally:
-        outcome.published = results.published
-        if simulation:
-            outcome.end_time = results.last
-            outcome.details = _details(plan, simulation, loop, real_time)
-            if outcome.fault is None and (diverged := _judged(outcome, simulation)):
-                outcome.reason, outcome.fault = "diverged", diverged
+            _run_events(plan, loop, results, outcome, progress, real_time)
+    except (Exception, KeyboardInterrupt) as error:
+        outcome.set_reason(error, results)
+    outcome.published = results.published
+    if simulation:
+        outcome.end_time = results.last
+    if simulation and loop:
+        outcome.details = _details(plan, simulation, loop, real_time)
+        if outcome.fault is None and (diverged := _judged(outcome, simulation)):
+            outcome.reason, outcome.fault = "diverged", diverged
     if progress:
         progress(outcome.end_time)
     return outcome
+
+
+def _run_events(
+    plan: Plan,
+    loop: PythonLoop,
+    results: RunFolder,
+    outcome: Outcome,
+    progress: Progress | None,
+    real_time: RealTimeRun | None,
+) -> None:
+    """Run all events, write the tables, however the events end, and measure the time of both."""
+    begin = shown = perf_counter()
+
+    def turn(tick: int) -> None:
+        nonlocal shown
+        time = plan.system.timeline.seconds(tick)
+        interrupt.check(time)
+        if real_time and isinstance(loop, CompiledLoop):
+            real_time.turn(loop)
+        if progress and perf_counter() - shown > PAUSE:
+            shown = perf_counter()
+            progress(time)
+
+    try:
+        loop.run(turn)
+    finally:
+        results.flush()
+        outcome.wall_time = perf_counter() - begin
+        results.finish()
+        outcome.table_time = perf_counter() - begin - outcome.wall_time
 
 
 def _details(
@@ -187,11 +211,6 @@ def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
         remedy = "take higher rates, weaker gains, another coupling or hold"
         return Diverged(condition.fmu, f"{what} ({remedy})", outcome.end_time, repeatable=True)
     return simulation.balance.judge(outcome.details.meters, outcome.end_time)
-
-
-def _reason(fault: Fault) -> str:
-    ends = {Interrupted: "interrupted", Diverged: "diverged"}
-    return next((reason for kind, reason in ends.items() if isinstance(fault, kind)), "fault")
 
 
 def _library(system: System) -> tuple[ctypes.CDLL | None, str]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meters import Meters
-from hapticlink.orchestrator.run.initialize import TOLD
+from hapticlink.orchestrator.run.initialize import START_POSE_OUTPUTS
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.step_check import StepCheck
@@ -67,8 +67,9 @@ def _read(system: System) -> Iterator[str]:
 def _of_itself(fmu: Fmu) -> Iterator[str]:
     """The outputs of an FMU by which its steps and its faults are judged."""
     description = fmu.description
+    judged = START_POSE_OUTPUTS.get(description.block or "", ())
     for scalar in description.outputs:
-        if scalar.bound or scalar.port in TOLD.get(description.block or "", ()):
+        if scalar.bound or scalar.port in judged:
             yield scalar.name
     if StepCheck.possible(description):
         for pair in description.derivatives.items():

@@ -136,12 +136,11 @@ def _raise_unsettled(
                 what = f"output {scalar.name} does not converge in initialisation, nor by Newton"
                 values = f"{before[i]!s} around its algebraic loop gives {signals.values[i]!s}"
                 remedy = "the loop has no consistent start values: take a connection out of it"
-                said = f"{what}: {values}; {remedy}"
-                raise FmuFault(fmu.name, said, 0.0, repeatable=True)
+                raise FmuFault(fmu.name, f"{what}: {values}; {remedy}", 0.0, repeatable=True)
 
 
-TOLD = {DEVICE: ("workspace_margin", "x_true")}
-"""Outputs by which an unreachable start pose is told, by block."""
+START_POSE_OUTPUTS = {DEVICE: ("workspace_margin", "x_true")}
+"""Outputs by which an unreachable start pose is reported, by block."""
 
 
 def require_finite(instances: Mapping[str, Instance]) -> None:

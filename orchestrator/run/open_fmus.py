@@ -6,10 +6,11 @@ from collections.abc import Container, Iterable
 from contextlib import ExitStack
 
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.fmi.capabilities import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated
 from hapticlink.orchestrator.fmi.versions import IN_PROCESS
-from hapticlink.orchestrator.run.python_modules import clashes
+from hapticlink.orchestrator.run.python_modules import bundled, clashes
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import Fmu, System
 
@@ -17,7 +18,15 @@ from hapticlink.orchestrator.system.system import Fmu, System
 def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
     """The FMUs that run in a process of their own, by name, with the reason."""
     fmus = tuple(fmus)
-    return {u.name: "asked for" for u in fmus if u.isolate} | clashes(fmus)
+    asked = {u.name: "asked for" for u in fmus if u.isolate}
+    tools = {
+        u.name: "it needs a tool, which may never answer"
+        for u in fmus
+        if u.name not in asked
+        and NEEDS_TOOL in u.description.flags
+        and not bundled(u.description.path)  # whose tool is Python, which is there
+    }
+    return asked | tools | clashes(u for u in fmus if u.name not in tools)
 
 
 def opened(

@@ -44,7 +44,7 @@ class Pace:
         self._given = clock and wait and (clock, wait)
         self.lateness, self.steps = np.zeros(BINS, np.int64), np.zeros(BINS, np.int64)
         self.c = structures.Pace(most=MOST)
-        self.c.lateness, self.c.steps = self.lateness.ctypes.data, self.steps.ctypes.data
+        self.c.fill(self, "lateness", "steps")
 
     def take(self, library: ctypes.CDLL) -> None:
         """Take the clock, and give it to the compiled loop, whose own it is by default."""
@@ -54,8 +54,8 @@ class Pace:
         self.clock, self.wait = self._given or self._calls
         if self._given:
             self._calls = _CLOCK(self.clock), _WAIT(self.wait)
-        pointers = (ctypes.cast(call, ctypes.c_void_p).value for call in self._calls)
-        self.c.clock, self.c.wait = pointers
+        clock, wait = self._calls
+        self.c.fill(clock=clock, wait=wait)
 
     def now(self) -> int:
         return self.clock()

@@ -55,15 +55,15 @@ class StepCheck:
         names = [s.name for s in instance.description.outputs]
         pairs = _first_derivatives(instance.description)
         ports = [_port(rate) for _, rate in pairs]
-        self._ports = sorted(set(ports))
+        self._names = sorted(set(ports))
         # What follows is shared with the compiled loop; `changed` tells it of new arrays.
         self.bases = np.array([names.index(base) for base, _ in pairs], dtype=np.int64)
         self.rates = np.array([names.index(rate) for _, rate in pairs], dtype=np.int64)
-        self.port = np.array([self._ports.index(p) for p in ports], dtype=np.int64)
+        self.ports = np.array([self._names.index(p) for p in ports], dtype=np.int64)
         self.last = np.full(len(pairs), np.nan)
-        self.scales, self.jumps = np.zeros((2, len(self._ports)))
+        self.scales, self.jumps = np.zeros((2, len(self._names)))
         self.steps, self.count, self.size = ctypes.c_int64(), ctypes.c_int64(), ctypes.c_double()
-        self.found = np.zeros((ROOM, len(self._ports)))
+        self.estimates = np.zeros((ROOM, len(self._names)))
         self.times, self.weights = np.zeros((2, ROOM))
         self.changed: Callable[[], object] = lambda: None
 
@@ -111,40 +111,40 @@ class StepCheck:
         """Whether this is the first step (v before it is NaN) or the last one changed v by more
         than those before; records v and the change."""
         outputs = self._instance.outputs
-        rates, changes = outputs[self.rates], np.zeros(len(self._ports))
-        np.maximum.at(changes, self.port, np.abs(rates - self.last))
+        rates, changes = outputs[self.rates], np.zeros(len(self._names))
+        np.maximum.at(changes, self.ports, np.abs(rates - self.last))
         moved = not np.all((changes <= JUMP * self.jumps) | (changes <= SHARE * self.scales))
         if moved:
             np.fmax(self.jumps, changes, out=self.jumps)
         size = np.fmax(np.abs(rates), AT_REST * np.abs(outputs[self.bases]))
-        np.fmax.at(self.scales, self.port, size)
+        np.fmax.at(self.scales, self.ports, size)
         self.last[:] = rates
         return moved
 
     def _compare(self, whole: Vector, halves: Vector, time: float, end: float, weight: int) -> None:
-        found = np.zeros(len(self._ports))
-        np.maximum.at(found, self.port, np.abs(whole[self.rates] - halves[self.rates]))
+        found = np.zeros(len(self._names))
+        np.maximum.at(found, self.ports, np.abs(whole[self.rates] - halves[self.rates]))
         if not np.all(np.isfinite(found)):
             return
         if (k := self.count.value) == len(self.times):
-            self.found = np.concatenate([self.found, np.zeros_like(self.found)])
+            self.estimates = np.concatenate([self.estimates, np.zeros_like(self.estimates)])
             self.times, self.weights = (np.append(v, 0.0 * v) for v in (self.times, self.weights))
             self.changed()
-        self.found[k], self.times[k], self.weights[k] = found, time, weight
+        self.estimates[k], self.times[k], self.weights[k] = found, time, weight
         self.count.value, self.size.value = k + 1, max(self.size.value, end - time)
 
     def errors(self) -> StepErrors | None:
         """What was found; None before the first check."""
         if not self.count.value:
             return None
-        found = self.found[: self.count.value]
+        found = self.estimates[: self.count.value]
         share = found / np.where(self.scales > 0, self.scales, 1.0)
         k, port = np.unravel_index(int(share.argmax()), share.shape)
         return StepErrors(
             checked=len(share),
             sum=float((self.weights[: len(share)] @ share).max()),
             largest=float(share[k, port]),
-            output=self._ports[port],
+            output=self._names[port],
             time=float(self.times[k]),
             size=self.size.value,
         )

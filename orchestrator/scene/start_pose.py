@@ -10,5 +10,6 @@ def outside(pose: Sequence[float], margin: float) -> str:
     numbers = ", ".join(f"{value:.4g}" for value in pose)
     return (
         f"the start pose (x m, y m, theta rad) = ({numbers}) is outside the device's workspace by "
-        f"{-margin:.3g} m (move linkage.operational_point or linkage.start, or change [device])"
+        f"{-margin:.3g} m (lengths are in m: move linkage.operational_point or linkage.start, or "
+        "change [device])"
     )

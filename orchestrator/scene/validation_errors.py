@@ -140,10 +140,19 @@ def _shown(value: Any) -> str:
     return shortened(repr(value))
 
 
+_GONE: dict[Path, str] = {
+    ("step_control",): (
+        "steps are as long as their rate says: take it out, with a higher rate or `substeps`"
+    ),
+    ("device", "sensing"): "is a key of the scene: write `sensing` outside of [device]",
+}
+"""Keys of earlier versions, with what to write instead."""
+
+
 def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     """The message for an unknown key, or for one that belongs to another `type` of the table."""
-    if path == ("step_control",):
-        return "steps are as long as their rate says: take it out, with a higher rate or `substeps`"
+    if path in _GONE:
+        return _GONE[path]
     kinds, table, key = schema.at(path[:-1], data), value(data, path[:-1]), str(path[-1])
     types = {name: k for k in kinds for name in schema.types(k)}
     branch = loc[-2] if len(loc) > 1 else None  # without a type, pydantic tried the default's

@@ -6,6 +6,12 @@ python -m tests.attack.c_interface --cases 500000
 python -m tests.attack.scenes --cases 2700
 python -m tests.attack.options --cases 4000
 python -m tests.attack.ssps --cases 400
+python -m tests.attack.hostile --cases 300
+python -m tests.attack.folders --cases 60
+python -m tests.attack.special_files --cases 300
+python -m tests.attack.plugins --cases 200
+python -m tests.attack.misuse --cases 500
+python -m tests.attack.loops --cases 300
 
 Each writes a table to results/faults; Ctrl-C ends it with the cases that it has made.
 """

@@ -15,7 +15,7 @@ OUTCOMES = ("done", "refused", "told", "lost", "crashed", "hung")
 """done: accepted and run; refused: status 2 and a message; told: status 1 and a message, results up
 to then kept; lost: results of an earlier run are gone, or something stays behind; crashed: a
 signal, a traceback, an error of ours; hung: beyond a stated bound."""
-BAD = ("lost", "crashed", "hung")
+BAD = ("lost", "crashed", "hung", "believed")
 FOLDER = Path("results/faults")
 
 

@@ -19,10 +19,11 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from hapticlink import commands
-from hapticlink.orchestrator.base import internal_error
+from hapticlink.commands import internal_error
 
 ENOUGH = 0.5
 """Seconds from a run's first row on after which it is ended."""
@@ -45,21 +46,21 @@ class Place:
     def __init__(self, folder: Path) -> None:
         self.folder, self.out = folder, folder / "out"
         self._earlier, self._temporary = folder / "earlier", folder / "temporary"
-        self._here = folder / "here"
-        for each in (self._temporary, self._here):
+        self.here = folder / "here"
+        for each in (self._temporary, self.here):
             each.mkdir()
-        status, said = self._forked(["run", "pendulum", "--out", str(self._earlier)])
+        status, said = self.forked(["run", "pendulum", "--out", str(self._earlier)])
         assert status == 0, said
 
     def made(self, arguments: Sequence[str]) -> tuple[str, str]:
         """One of OUTCOMES, and what was wrong; the command may write to `out`."""
         shutil.rmtree(self.out, ignore_errors=True)
         shutil.copytree(self._earlier, self.out)
-        status, said = self._forked(arguments)
+        status, said = self.forked(arguments)
         if status is None or -status in (signal.SIGXCPU, signal.SIGKILL):
             return "hung", said[-500:]
         if status not in (0, 1, 2) or any(mark in said for mark in CRASHED):
-            return "crashed", f"status {status}: {said[-300:]}{self._reports()}"
+            return "crashed", f"status {status}: {said[-300:]}{self.reports()}"
         if status and "hapticlink: " not in said and "╭" not in said:
             return "crashed", f"status {status} without a word: {said[-500:]}"
         if len(said) > MESSAGE:
@@ -69,7 +70,7 @@ class Place:
         ended = status == 0 or "interrupted" in said
         return ("done" if ended else "told" if status == 1 else "refused"), ""
 
-    def _reports(self) -> str:
+    def reports(self) -> str:
         """The ends of the reports of errors of ours."""
         found = ""
         for path in self._temporary.glob("hapticlink-error-*"):
@@ -87,18 +88,23 @@ class Place:
             yield "run.json has no end"
         if hidden := [p.name for p in self.out.glob(".*")]:
             yield f"files {', '.join(hidden)}"
-        if left := [p.name for p in self._temporary.iterdir()]:
+        if left := self.left():
             yield f"temporary {', '.join(left)}"
+
+    def left(self) -> list[str]:
+        """What a command has left in the temporary folder, which is removed."""
+        if names := [p.name for p in self._temporary.iterdir()]:
             shutil.rmtree(self._temporary)
             self._temporary.mkdir()
+        return names
 
-    def _forked(self, arguments: Sequence[str]) -> tuple[int | None, str]:
+    def forked(self, arguments: Sequence[str]) -> tuple[int | None, str]:
         """Status (negative: the signal; None: no end within PATIENCE) and what it said."""
         told, rows = self.folder / "told.txt", self.out / "run.json"
         earlier = rows.stat().st_ino if rows.exists() else None
         process = os.fork()
         if process == 0:
-            os.chdir(self._here)
+            os.chdir(self.here)
             _child(lambda: commands.main(arguments), told, self._temporary)
         status = None
         try:
@@ -155,6 +161,7 @@ def _child(call: Callable[[], object], told: Path, temporary: Path) -> None:
     except BaseException:
         traceback.print_exc()
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(Exception):  # closed by a plugin
+                stream.flush()
         os._exit(status)

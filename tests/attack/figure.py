@@ -11,7 +11,10 @@ from matplotlib.figure import Figure
 
 from tests.attack.cases import FOLDER
 
-NAMES = ("scenes", "options", "ssps", "archives", "c_interface", "signals")
+NAMES = (
+    *("scenes", "options", "ssps", "archives", "c_interface", "signals"),
+    *("hostile", "folders", "special_files", "plugins", "misuse", "loops"),
+)
 ENDS = {
     "done": "#0077bb",
     "returned": "#44aa99",
@@ -19,7 +22,7 @@ ENDS = {
     "told": "#ddaa33",
     "before": "0.7",
 }
-BAD = {"lost": "#cc3311", "crashed": "#ee3377", "hung": "#aa3377"}
+BAD = {"lost": "#cc3311", "crashed": "#ee3377", "hung": "#aa3377", "believed": "#661100"}
 
 
 def counts(name: str) -> dict[str, int]:
@@ -41,7 +44,9 @@ def figure() -> Figure:
         left = {name: left[name] + share for name, share in zip(NAMES, shares, strict=True)}
     bad = sum(cases[end] for cases in found.values() for end in BAD)
     total = sum(sum(cases.values()) for cases in found.values())
-    axes.set_title(f"{bad} of {total:,} cases lost results, crashed or hung", fontsize="medium")
+    axes.set_title(
+        f"{bad} of {total:,} cases lost results, crashed, hung or were believed", fontsize="medium"
+    )
     axes.set(xlabel="cases (%)", xlim=(0, 100))
     axes.invert_yaxis()
     drawn.legend(loc="outside right upper", fontsize="small")

@@ -105,7 +105,8 @@ def test_bash_completes_the_name_of_a_scene(tmp_path: Path) -> None:
     path = f"{tmp_path}{os.pathsep}{os.environ['PATH']}"
     environment = {**os.environ, "HOME": str(tmp_path), "PATH": path}
     subprocess.run([*called, "--shell", "bash"], env=environment, check=True, capture_output=True)
-    pressed = """. ~/.bashrc
+    assert not (tmp_path / ".bashrc").exists()  # nobody has asked for a change of it
+    pressed = """. ~/.local/share/bash-completion/completions/hapticlink
     COMP_WORDS=(hapticlink run clo) COMP_CWORD=2 COMP_LINE="hapticlink run clo" COMP_POINT=18
     _hapticlink; echo "${COMPREPLY[@]}" """
     told = subprocess.run(

@@ -21,8 +21,8 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.sweep.grid import grid, parse
 from hapticlink.commands import COMMANDS, _commands, app
+from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.plan import schemes  # noqa: F401 (registers the schemes)
-from hapticlink.orchestrator.scene.json_schema import json_schema
 from tests.docs.pages import PAGES, ROOT, Block, blocks, name, prose
 from tests.plugins import hapticlink
 

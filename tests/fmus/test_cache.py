@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import sys
 import threading
 import time
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import pytest
 
-from hapticlink.fmus import cache
+import hapticlink as hl
+from hapticlink.fmus import cache, lock
 from hapticlink.fmus.build import build
 from hapticlink.fmus.cache import cached
 from hapticlink.fmus.check import check_fmu
@@ -111,7 +112,7 @@ def test_a_killed_build_leaves_nothing_in_the_cache(place, room):
 
     def builder(folder: Path) -> Path:
         seen.append(folder.parent)
-        assert not place.exists()
+        assert [path.name for path in place.iterdir()] == ["locks"]
         return build(sample_components.stateless(), folder)
 
     assert cached(MATERIAL, builder, room).parent == place / cache.key(MATERIAL)
@@ -181,15 +182,13 @@ def test_whoever_waits_can_be_interrupted(place, room):
     assert cached(MATERIAL, Builder(), room).exists()
 
 
-def test_a_process_that_ends_at_once_removes_its_locks(place, room, tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    (tmp_path / "temporary").mkdir()
+def test_a_process_that_ends_at_once_removes_its_locks(place, room):
     found = []
 
     def ended(folder: Path) -> Path:
-        found.append(len([*(tmp_path / "temporary").iterdir()]))
+        found.append(len([*(place / "locks").iterdir()]))
         cache.remove_locks()
-        found.append(len([*(tmp_path / "temporary").iterdir()]))
+        found.append(len([*(place / "locks").iterdir()]))
         return Builder()(folder)
 
     cached(MATERIAL, ended, room)
@@ -209,3 +208,26 @@ def test_the_users_own_folder_by_default(monkeypatch, tmp_path):
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache.folder() == tmp_path / "hapticlink"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no modes")
+def test_locks_and_libraries_lie_where_no_other_user_gets(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not at predictable names in a temporary folder, which another user may hold or link."""
+    root = tmp_path / "home" / "cache"
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(root))
+    seen: list[Path] = []
+    attempted = lock.attempted
+
+    def noted(path: Path) -> AbstractContextManager[bool]:
+        seen.append(path)
+        return attempted(path)
+
+    monkeypatch.setattr(lock, "attempted", noted)
+    hl.run("pendulum", {"duration": 0.02})
+    assert seen
+    assert all(path.parent == root / "locks" for path in seen)
+    for folder in (root, root / "locks", root / "libraries"):
+        assert folder.stat().st_mode & 0o777 == 0o700
+    assert not [*(root / "locks").iterdir()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.event_loop import Outcome, run
-from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
+from hapticlink.orchestrator.scene.records import Iteration, PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Coupling, EnergyPorts, Fmu, System
 from tests.orchestrator import oscillator
@@ -125,6 +125,31 @@ def masses(
         power=POWER,
         springs=oscillator.SPRINGS,
     )
+
+
+NEWTON = Iteration(method="newton", tolerance=1e-10)
+
+
+def iterated(
+    fmus: Mapping[str, Description],
+    until: Fraction,
+    between: str,
+    *,
+    rate: int = 100,
+    rows: Iterable[tuple[str, str]] = ROWS,
+    iteration: Iteration = NEWTON,
+    **others: object,
+) -> System:
+    """Both masses, whose steps are repeated until the values between them agree."""
+    return system(
+        fmus, rows, "iterated", Fraction(1, rate), until, between=between, iteration=iteration,
+        get_after_set=("one", "two"), **others,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def order(rates: Sequence[int], errors: Sequence[float]) -> float:
+    """The observed order of accuracy."""
+    return -float(np.polyfit(np.log(rates), np.log(errors), 1)[0])
 
 
 def simulate(made: System, folder: Path) -> tuple[Outcome, Table]:

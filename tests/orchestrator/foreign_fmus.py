@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import uuid
 import zipfile
 from collections.abc import Callable
@@ -184,17 +185,26 @@ def c_fmu3(folder: Path) -> Path:
     return _packed(folder, "types_fmu3.c", "types", platform_tuple, description)
 
 
-PAIR = """
-[[fmu]]
-name = "gives"
-path = "Gives.fmu"
-[[fmu]]
-name = "takes"
-path = "Takes.fmu"
-[[connection]]
-from = "gives.y"
-to = "takes.u"
-"""
+ISOLATED = "isolate = true\n"
+COMMAND = [sys.executable, "-m", "hapticlink"]
+
+
+def fmu_table(name: str, path: str, more: str = "") -> str:
+    """An [[fmu]] table of a scene, with further lines."""
+    return f'[[fmu]]\nname = "{name}"\npath = "{path}.fmu"\n{more}'
+
+
+def wire_table(source: str, target: str, more: str = "") -> str:
+    """A [[connection]] table of a scene, with further lines."""
+    return f'[[connection]]\nfrom = "{source}"\nto = "{target}"\n{more}'
+
+
+PAIR = (
+    "\n"
+    + fmu_table("gives", "Gives")
+    + fmu_table("takes", "Takes")
+    + wire_table("gives.y", "takes.u")
+)
 
 
 def scene(folder: Path, text: str, rate: int = 64, duration: float = 0.5) -> Path:

@@ -24,13 +24,16 @@ class Link:
     """The server's process, seen from the haptic loop. A context manager that ends it."""
 
     def __init__(self, module: str, *arguments: str) -> None:
-        command = [sys.executable, "-P", "-m", module, *arguments]
+        command = [sys.executable, "-P", "-m", module]  # arguments would be for all to read
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **OWN_GROUP
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._requests, self._answers = self._process.stdin, self._process.stdout
+        with suppress(OSError):  # it has ended, which `first` tells
+            pickle.dump(arguments, self._requests)
+            self._requests.flush()
         self._sent: queue.Queue[bytes | None] = queue.Queue(MAX_WAITING)
         self._received: deque[Any] = deque(maxlen=MAX_WAITING)
         self.first: Any = read(self._answers)

@@ -1,7 +1,8 @@
 """Serves the page on localhost, in a process of its own: files, and a websocket to each window.
 
-Arguments: host, port (0: a free one), token, as text. Pickled messages come from the haptic loop by
-the standard input, whose end ends the process; those of the pages leave by the standard output.
+Pickled messages come from the haptic loop by the standard input, whose end ends the process: first
+host, port (0: a free one) and token, as text, which no other process can read there. Those of the
+pages leave by the standard output.
 """
 
 from __future__ import annotations
@@ -185,8 +186,13 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints must not get between the messages
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # connections that fail are no news
-    host, port, token = sys.argv[1:]
-    asyncio.run(_served(host, int(port), token, out))
+    if (arguments := read(sys.stdin.buffer)) is None:
+        return
+    host, port, token = arguments
+    try:
+        asyncio.run(_served(host, int(port), token, out))
+    except BrokenPipeError:  # nobody is left to be told
+        os._exit(1)
 
 
 if __name__ == "__main__":

@@ -39,18 +39,17 @@ class Events:
         self._given = [0] * n
         self._windows: list[object] = [None] * n
         self._key = np.zeros(1 + n, np.int64)
-        self._kinds: list[Event] = []
         self._keys, self._blocks = np.zeros((0, 1 + n), np.int64), (structures.Block * 0)()
         self._c = c = structures.Events()
-        c.clocks, c.n_clocks, c.end = ctypes.addressof(self._clocks), n, timeline.end
-        c.key, c.patience, c.at.op = self._key.ctypes.data, PATIENCE, -1
+        c.fill(timeline, "end", clocks=self._clocks, n_clocks=n, key=self._key, patience=PATIENCE)
+        c.at.op = -1
         if pace:
             pace.take(machine.library)
-            c.pace, c.since = ctypes.addressof(pace.c), pace.clock()
+            c.fill(pace=pace.c, since=pace.clock())
         for i, clock in enumerate(timeline.clocks):
             self._next_window(i)
             if clock.name in sides:
-                self._clocks[i].side = ctypes.addressof(sides[clock.name].c)
+                self._clocks[i].fill(side=sides[clock.name].c)
 
     @property
     def complete(self) -> int:
@@ -107,7 +106,7 @@ class Events:
             window = np.array([NEVER, NEVER])
         window = np.ascontiguousarray(window, np.int64)
         self._windows[i], self._given[i] = window, first
-        clock.starts, clock.n, clock.at = window.ctypes.data, len(window), 0
+        clock.fill(starts=window, n=len(window), at=0)
 
     def _new_kind(self) -> None:
         key, clocks = self._key.tolist(), self._timeline.clocks
@@ -126,12 +125,7 @@ class Events:
     def _add(self, event: Event) -> None:
         fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
         key = [event.first, *(fired.get(clock.name, 0) for clock in self._timeline.clocks)]
-        first, last = self._block(event)
-        self._kinds.append(event)
         self._keys = np.concatenate([self._keys, np.array([key], np.int64)])
-        blocks = (structures.Block * len(self._kinds))(*self._blocks)
-        blocks[-1].first, blocks[-1].last = first, last
-        self._blocks = blocks
-        c = self._c
-        c.keys, c.kinds = self._keys.ctypes.data, ctypes.addressof(blocks)
-        c.n_kinds = len(self._kinds)
+        n = len(self._blocks) + 1
+        self._blocks = (structures.Block * n)(*self._blocks, structures.Block(*self._block(event)))
+        self._c.fill(keys=self._keys, kinds=self._blocks, n_kinds=n)

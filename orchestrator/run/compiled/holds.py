@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -99,17 +99,17 @@ class State:
 
     def place(self, words: int) -> int:
         """The address of the next `words`."""
-        at, self._end = self._end, self._end + words
-        address: int = self.words.ctypes.data + 8 * at
+        address: int = self.words.ctypes.data + 8 * self._end
+        self._end += words
         return address
 
-    def structure(self, kind: type[ctypes.Structure]) -> ctypes.Structure:
-        at = self._end
-        self.place(ctypes.sizeof(kind) // 8)
-        return kind.from_buffer(self.words.data, 8 * at)
+    def structure(self, kind: type[structures.Structure]) -> Any:
+        first = self._end
+        self.place(_words(kind))
+        return kind.from_buffer(self.words.data, 8 * first)
 
 
-def _words(kind: type[ctypes.Structure]) -> int:
+def _words(kind: type[structures.Structure]) -> int:
     return ctypes.sizeof(kind) // 8
 
 
@@ -123,12 +123,12 @@ class CompiledTank(State):
         self._kept = tuple(map(np.ascontiguousarray, (tank.stiffness, tank.damping, near.turns)))
         self._readers = near.position, near.velocity
         c = self.structure(structures.Tank)
-        c.n, c.tick, c.period, c.sampled = n, -1, near.period, near.sampled
-        c.stiffness, c.damping, c.turns = (a.ctypes.data for a in self._kept)
-        c.where = near.position.where.ctypes.data
+        stiffness, damping, turns = self._kept
+        c.fill(near, "period", "sampled", n=n, tick=-1)
+        c.fill(near.position, "where", stiffness=stiffness, damping=damping, turns=turns)
         if near.velocity:
             assert isinstance(near.velocity, Reader)
-            c.velocity = near.velocity.where.ctypes.data
+            c.fill(velocity=near.velocity.where)
         c.newest, c.modulated = self.place(2 * n), self.place(2 * n)
         c.x, c.moved, c.force, c.withheld = (self.place(n) for _ in range(4))
 
@@ -136,7 +136,7 @@ class CompiledTank(State):
 class Grown:
     """Arrays of a structure that grow with a run: fields of vectors, with a row's length."""
 
-    def __init__(self, c: ctypes.Structure, fields: Mapping[str, int]) -> None:
+    def __init__(self, c: structures.Structure, fields: Mapping[str, int]) -> None:
         self._c, self._fields = c, fields
         self._arrays = {name: np.zeros((0, width)) for name, width in fields.items()}
 
@@ -146,7 +146,7 @@ class Grown:
             array = np.zeros((room, width))
             array[: len(self._arrays[name])] = self._arrays[name]
             self._arrays[name] = array
-            setattr(self._c, name, array.ctypes.data)
+            self._c.fill(**{name: array})
 
 
 class CompiledAccount:
@@ -157,7 +157,7 @@ class CompiledAccount:
         self.c = c = structures.Account(n=n, tick=-1, since=-1, passive=isinstance(hold, Passive))
         self._vectors = np.zeros((18, n))
         self._vectors[16] = 1.0 if c.passive else 0.0  # beta, or no correction
-        c.vectors = self._vectors.ctypes.data
+        c.fill(vectors=self._vectors)
         self._readers = hold.displacement, hold.velocity
         for reader, of in zip(self._readers, (c.displacement, c.velocity), strict=True):
             if reader:
@@ -174,9 +174,7 @@ class CompiledAccount:
 
 def fill_reader(c: structures.Reader, reader: Reader) -> None:
     """Fills the structure of a reader."""
-    c.where, c.n = reader.where.ctypes.data, len(reader.where)
-    if reader.factor is not None and reader.offset is not None:
-        c.factor, c.offset = reader.factor.ctypes.data, reader.offset.ctypes.data
+    c.fill(reader, "where", "factor", "offset", n=len(reader.where))
 
 
 class CompiledHold(Hold, State):
@@ -204,13 +202,12 @@ class CompiledHold(Hold, State):
         self._sources, self._further = np.array(places, np.intp), further
         self._held, self._tank = held, tank
         self._c = c = self.structure(structures.Hold)
-        c.kind, c.n, c.width, c.depth = KINDS[type(own)], n, width, depth
-        c.samples, c.vectors = self.place(depth * width), self.place(8 * n)
-        c.sources, c.held = self._sources.ctypes.data, held.ctypes.data
+        c.fill(kind=KINDS[type(own)], n=n, width=width, depth=depth, sources=self._sources)
+        c.fill(samples=self.place(depth * width), vectors=self.place(8 * n), held=held)
         if angles:
             self._angles = np.array(angles.angles, np.int64), np.array(angles.turn, np.float64)
-            c.n_angles, c.last = turned, self.place(turned)
-            c.angles, c.turns = (a.ctypes.data for a in self._angles)
+            c.fill(angles=self._angles[0], turns=self._angles[1])
+            c.fill(n_angles=turned, last=self.place(turned))
         if matrix:
             c.manifold = 1 if isinstance(matrix, Projector) else 2
             c.rows, c.rank, c.scale = rows, -1, self.place(2 * rows)
@@ -218,17 +215,18 @@ class CompiledHold(Hold, State):
         if link:
             self._link, self._late = link, np.zeros(DRAWN, np.int64)
             self.link = k = structures.Link(n_late=DRAWN, at_late=DRAWN)
-            k.late, c.link = self._late.ctypes.data, ctypes.addressof(k)
+            k.fill(late=self._late)
+            c.fill(link=k)
             self._transit = Grown(k, {"arrivals": 1, "stamps": 1, "samples": width})
         self._account = None
         if isinstance(own, Account):
             self._account = CompiledAccount(own)
-            c.account = ctypes.addressof(self._account.c)
-            self._account.c.tank = tank.words.ctypes.data if tank else None
+            c.fill(account=self._account.c)
+            self._account.c.fill(tank=tank and tank.words)
         self._room = 0
         self.grow()
         if tank and isinstance(own, PassiveSetPosition):
-            c.tank, c.row = tank.words.ctypes.data, own.row
+            c.fill(own, "row", tank=tank.words)
         self.address: int = ctypes.addressof(c)
 
     def join(self, holds: Iterable[CompiledHold]) -> None:
@@ -238,7 +236,7 @@ class CompiledHold(Hold, State):
             accounts = {id(h.own): h._account for h in holds}
             account = accounts[id(observer)]
             assert account
-            self._c.far, self._c.credit = ctypes.addressof(account.c), credit.ctypes.data
+            self._c.fill(far=account.c, credit=credit)
 
     def draw(self) -> None:
         """Draw the next latencies."""

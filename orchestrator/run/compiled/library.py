@@ -66,7 +66,7 @@ def _compiled() -> Path:
     why = f"it is not built, and there is no C compiler: {install_command('native')}"
     for compiler in build.compilers():
         try:
-            root.mkdir(parents=True, exist_ok=True)
+            fmu_cache.private(root)
             build.compile_loop(library, compiler)
         except subprocess.CalledProcessError as error:
             why = f"{compiler[0]} could not compile it: {error.stderr.decode(errors='replace')}"

@@ -63,10 +63,10 @@ class Machine:
     def __init__(self, library: ctypes.CDLL, simulation: Simulation) -> None:
         self.library, self._simulation = library, simulation
         self.in_python: dict[str, str] = {}
-        base, system = simulation.system.timeline.base, simulation.system
+        system = simulation.system
         self.loop = structures.Loop()
-        self.loop.numerator, self.loop.denominator = base.numerator, base.denominator
-        self.loop.values = simulation.signals.values.ctypes.data
+        self.loop.fill(system.timeline.base, "numerator", "denominator")
+        self.loop.fill(simulation.signals, "values")
         self._memory = Memory()
         self._kept: list[object] = []
         self._bound: Bound = []
@@ -81,10 +81,10 @@ class Machine:
         self._make_holds()
 
     def _array(self, name: str, kind: Any, n: int) -> Any:
-        made = (kind * max(n, 1))()
-        setattr(self.loop, name, ctypes.addressof(made))
-        self._kept.append(made)
-        return made
+        array = (kind * max(n, 1))()
+        self.loop.fill(**{name: array})
+        self._kept.append(array)
+        return array
 
     def _make_holds(self) -> None:
         simulation, system = self._simulation, self._simulation.system
@@ -127,7 +127,7 @@ class Machine:
         self._bound += bound
         rows = [self._record(instruction) for instruction, _ in bound]
         self._ops = np.concatenate([self._ops, np.array(rows, np.dtype(Op))])
-        self.loop.ops = self._ops.ctypes.data
+        self.loop.fill(ops=self._ops)
         return first, len(self._bound)
 
     def joined(self, bound: Bound) -> Call:
@@ -174,7 +174,7 @@ class Machine:
                 first = len(self._points)
                 self._points += [(weight, float(ahead)) for weight, ahead in points]
                 self._kept.append(of := np.array(self._points))
-                self.loop.points = of.ctypes.data
+                self.loop.fill(points=of)
                 return structures.BLEND, at, first, len(self._points)
             case Sample(connection, ahead):
                 return structures.SAMPLE, self._meter(connection), ahead
@@ -240,7 +240,7 @@ class Machine:
             self._meters[at] = ctypes.addressof(c)
             for kind in ("source", "held", "x"):
                 fill_reader(getattr(c, kind), getattr(meter, kind))
-            c.counts = meter.counts.ctypes.data
+            c.fill(meter, "counts")
             meter.changed = partial(_fill_meter, c, meter)
             meter.changed()
             return c
@@ -253,19 +253,10 @@ class Machine:
         def make(at: int) -> object:
             c = self._tables[at]
             if recorder.files:
-                c.block, c.rows = (
-                    recorder.block.rows.ctypes.data,
-                    ctypes.addressof(recorder.block.filled),
-                )
-            for name in ("room", "due", "count", "reached"):
-                setattr(c, name, ctypes.addressof(getattr(recorder, name)))
-            c.n, c.every, c.where = (
-                len(recorder.places),
-                recorder.every,
-                recorder.places.ctypes.data,
-            )
-            if recorder.view is not None:
-                c.view, c.where = recorder.view.ctypes.data, None
+                c.fill(block=recorder.block.rows, rows=recorder.block.filled)
+            c.fill(recorder, "room", "due", "count", "reached", "every", "view")
+            where = recorder.places if recorder.view is None else None
+            c.fill(n=len(recorder.places), where=where)
             return recorder
 
         return self._index("table", clock, make)
@@ -332,7 +323,5 @@ class Machine:
 
 
 def _fill_meter(c: structures.Meter, meter: Meter) -> None:
-    c.stamps, c.samples = meter.stamps.ctypes.data, meter.samples.ctypes.data
-    c.ticks, c.moves = meter.ticks.ctypes.data, meter.moves.ctypes.data
-    c.efforts, c.totals = meter.efforts.ctypes.data, meter.totals.ctypes.data
-    c.room, c.full, c.least = len(meter.stamps), meter.full, ROWS
+    c.fill(meter, "stamps", "samples", "ticks", "moves", "efforts", "totals", "full")
+    c.fill(room=len(meter.stamps), least=ROWS)

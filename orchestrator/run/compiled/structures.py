@@ -1,5 +1,5 @@
 """The structures and the numbers of loop.h, by their names there. Pointers are addresses; whoever
-writes one keeps what it points to."""
+fills one keeps what it points to."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import ctypes
 import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from hapticlink.orchestrator.fmi.instance_location import Place
 from hapticlink.orchestrator.run.compiled.build import HERE
@@ -16,6 +18,31 @@ _DECLARED = re.compile(
     r"typedef struct \{(?P<fields>.*?)\} (?P<name>\w+);|enum \{(?P<numbers>[^=]*?)\}", re.S
 )
 _FIELD = re.compile(r"\(?(?P<stars>\**)(?P<name>\w+)\)?(\[(?P<n>\d+)\]|\(.*\))?")
+
+
+class Structure(ctypes.Structure):
+    """A structure of loop.h."""
+
+    __slots__ = ()
+
+    def fill(self, source: object = None, *names: str, **fields: object) -> None:
+        """Set `fields`, and those of these names to the attributes of `source` that have them. A
+        pointer is given by what it points to: an array, an object of ctypes, a function of a
+        library; or by its address, None for NULL. Raises AttributeError for a name that either
+        lacks."""
+        for name, value in ({n: getattr(source, n) for n in names} | fields).items():
+            setattr(self, name, _address(value))
+
+
+def _address(value: Any) -> Any:
+    """The address of what a pointer points to; any other value itself."""
+    if isinstance(value, np.ndarray):
+        return value.ctypes.data
+    if callable(value):
+        return ctypes.cast(value, ctypes.c_void_p).value
+    if isinstance(value, ctypes._SimpleCData | ctypes.Structure | ctypes.Array):
+        return ctypes.addressof(value)
+    return value
 
 
 def _declared(text: str) -> dict[str, Any]:
@@ -36,7 +63,7 @@ def _declared(text: str) -> dict[str, Any]:
     for declared in _DECLARED.finditer(_COMMENT.sub("", text)):
         if name := declared["name"]:
             rows = [*fields(declared["fields"])]
-            found[name] = type(name, (ctypes.Structure,), {"_fields_": rows})
+            found[name] = type(name, (Structure,), {"__slots__": (), "_fields_": rows})
         else:
             names = re.findall(r"\w+", declared["numbers"])
             found |= {name: number for number, name in enumerate(names)}

@@ -1,10 +1,13 @@
 """Modules of a user's own: how they are found, what goes wrong, what depends on their sources."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
+from hapticlink.orchestrator.base import plugins
+from hapticlink.orchestrator.base.faults import InputFault
 from tests.plugins import hapticlink
 
 HOLD = """
@@ -265,7 +268,9 @@ def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path: Path) -> None:
 
     assert reached(run) == pytest.approx(0.5, rel=1e-12)
     assert reached(f"{run} --plugin mine") == pytest.approx(0.5, rel=1e-12)
-    assert len([entry for entry in cache.iterdir() if entry.name != "libraries"]) == 1
+    assert (
+        len([entry for entry in cache.iterdir() if entry.name not in ("libraries", "locks")]) == 1
+    )
     assert (rows(), rows()) == (2, 2)
     write(tmp_path, push=PUSH.replace("[1.0, 0.0]", "[-2.0, 0.0]"))
     assert reached(run) == pytest.approx(-1.0, rel=1e-12)
@@ -291,3 +296,29 @@ def test_keys_of_a_force(tmp_path: Path) -> None:
     for ended, message in zip(hapticlink(tmp_path, *lines), messages.values(), strict=True):
         assert ended.status == 2
         assert message in ended.said
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("raise BaseException('broken')", "BaseException: broken"),
+        ("raise KeyboardInterrupt", "KeyboardInterrupt"),
+        ("import os; os._exit(0)", "SystemExit: os._exit(0)"),
+        ("class E(Exception):\n    def __str__(self): raise ValueError\nraise E", "cannot be read"),
+    ],
+)
+def test_a_plugin_cannot_end_a_command_without_a_word(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    name = f"ends_{abs(hash(text))}"
+    (tmp_path / f"{name}.py").write_text(text)
+    with pytest.raises(InputFault, match=re.escape(said)):
+        plugins.load([name])
+
+
+@pytest.mark.parametrize("name", ["../x", ".", "..", "x y", "a..b", "/x"])
+def test_what_is_no_name_of_a_module_is_said(name: str) -> None:
+    with pytest.raises(InputFault, match="no name of a module"):
+        plugins.load([name])

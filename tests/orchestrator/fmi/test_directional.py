@@ -6,10 +6,10 @@ import ctypes
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from fmpy import fmi3
 
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
@@ -159,7 +159,11 @@ def test_fmi3_arrays_are_derived_whole(tmp_path: Path) -> None:
         for i in range(size)
     }
     described = Description(Path("x.fmu"), "", "", "continuous", tuple(scalars.values()), "3")
-    slave = SimpleNamespace(dll=ctypes.CDLL(str(library)), component=0)
+    slave = fmi3.FMU3Slave.__new__(fmi3.FMU3Slave)
+    slave.component = slave.fmiCallLogger = None
+    call = ctypes.CDLL(str(library)).fmi3GetDirectionalDerivative
+    call.argtypes = [ctypes.c_void_p, *(ctypes.c_void_p, ctypes.c_size_t) * 4]
+    slave._functions = {"fmi3GetDirectionalDerivative": call}
     outputs = [scalars["z", 0], scalars["y", 1]]
     inputs = [scalars["u", 2], scalars["w", 0], scalars["u", 0]]
     found = derivatives(slave, described, outputs, inputs)

@@ -7,10 +7,18 @@ import pytest
 
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.fmi.description import describe
-from tests.orchestrator.foreign_fmus import NUMBERS, c_fmu3, edited, python_fmu, run
+from tests.orchestrator.foreign_fmus import (
+    ISOLATED,
+    NUMBERS,
+    c_fmu3,
+    edited,
+    fmu_table,
+    python_fmu,
+    run,
+    wire_table,
+)
 
-ONE = '[[fmu]]\nname = "one"\npath = "types.fmu"\n'
-ISOLATED = "isolate = true\n"
+ONE = fmu_table("one", "types")
 EXTREMES = {
     "Float64": -1e300, "Float32": 0.1, "Int64": -(2**53), "Int32": -(2**31), "Int16": -(2**15),
     "Int8": -(2**7), "UInt64": 2**53, "UInt32": 2**32 - 1, "UInt16": 2**16 - 1, "UInt8": 2**8 - 1,
@@ -57,9 +65,8 @@ def test_which_output_is_the_derivative_of_which(tmp_path: Path) -> None:
 def test_connections_to_every_type_round_to_whole_numbers(tmp_path: Path) -> None:
     c_fmu3(tmp_path)
     python_fmu(tmp_path, "Gives", "self.y = 2.6 - self.steps * 0.25")
-    gives = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
-    wires = "".join(f'[[connection]]\nfrom = "gives.y"\nto = "one.in_{k}"\n' for k in NUMBERS)
-    experiment, found = run(tmp_path, gives + ONE + wires, "duration=0.125")
+    wires = "".join(wire_table("gives.y", f"one.in_{k}") for k in NUMBERS)
+    experiment, found = run(tmp_path, fmu_table("gives", "Gives") + ONE + wires, "duration=0.125")
     assert experiment.outcome.fault is None
     y = found.haptics["gives.y"][:-1]
     for kind in NUMBERS:
@@ -68,15 +75,14 @@ def test_connections_to_every_type_round_to_whole_numbers(tmp_path: Path) -> Non
         np.testing.assert_array_equal(found.haptics[f"one.out_{kind}"][1:], expected)
 
 
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
 @pytest.mark.parametrize(
-    ("kind", "value", "limits"),
+    ("kind", "value", "limits", "isolate"),
     [
-        ("Int8", 128.0, "-128 to 127"),
-        ("UInt8", -1.0, "0 to 255"),
-        ("UInt64", 2.0**64, "0 to 18446744073709551615"),
-        ("Int64", 2.0**63, "-9223372036854775808 to 9223372036854775807"),
-        ("Int32", -(2.0**31) - 1, "-2147483648 to 2147483647"),
+        ("Int8", 128.0, "-128 to 127", ISOLATED),
+        ("UInt8", -1.0, "0 to 255", ""),
+        ("UInt64", 2.0**64, "0 to 18446744073709551615", ""),
+        ("Int64", 2.0**63, "-9223372036854775808 to 9223372036854775807", ""),
+        ("Int32", -(2.0**31) - 1, "-2147483648 to 2147483647", ""),
     ],
 )
 def test_a_number_that_its_type_cannot_hold_is_a_fault(
@@ -84,23 +90,22 @@ def test_a_number_that_its_type_cannot_hold_is_a_fault(
 ) -> None:
     c_fmu3(tmp_path)
     python_fmu(tmp_path, "Gives", f"self.y = {value!r} if self.steps == 3 else 1.0")
-    gives = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
-    wire = f'[[connection]]\nfrom = "gives.y"\nto = "one.in_{kind}"\n'
-    experiment, found = run(tmp_path, gives + ONE + isolate + wire)
+    wire = wire_table("gives.y", f"one.in_{kind}")
+    experiment, found = run(tmp_path, fmu_table("gives", "Gives") + ONE + isolate + wire)
     said = f"one: in_{kind} cannot be {value!r}: {kind} holds {limits} at t = 0.046875 s"
     assert str(experiment.outcome.fault) == said
     assert found.haptics[f"one.out_{kind}"].tolist() == [0, 0, 1, 1]
 
 
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
 @pytest.mark.parametrize(
-    ("mode", "named", "calls"),
+    ("mode", "isolate", "named", "calls"),
     [
-        (1, None, ["terminate", "free"]),
-        (2, "fmi3DoStep returned discard at t = 0.046875 s", ["terminate", "free"]),
-        (3, "fmi3DoStep returned error at t = 0.046875 s", ["free"]),
-        (4, "fmi3DoStep returned fatal at t = 0.046875 s", []),
-        (7, None, ["terminate", "free"]),  # asks to end the simulation, at t = 0.0625 s
+        (1, "", None, ["terminate", "free"]),
+        (2, "", "fmi3DoStep returned discard at t = 0.046875 s", ["terminate", "free"]),
+        (3, "", "fmi3DoStep returned error at t = 0.046875 s", ["free"]),
+        (4, "", "fmi3DoStep returned fatal at t = 0.046875 s", []),
+        (7, "", None, ["terminate", "free"]),  # asks to end the simulation
+        (7, ISOLATED, None, ["terminate", "free"]),
     ],
 )
 def test_what_is_called_after_a_fault(
@@ -119,16 +124,11 @@ def test_what_is_called_after_a_fault(
     experiment, found = run(tmp_path, ONE + isolate + f"start.mode = {mode}\n")
     fault = experiment.outcome.fault
     assert (fault and str(fault)) == (named and f"one: {named}")
-    assert len(found.haptics["time"]) == {1: 33, 7: 5}.get(mode, 4)
+    ended = {1: ("duration", 0.5, 33), 7: ("terminated", 4 / 64, 5)}
+    reason, time, rows = ended.get(mode, ("fault", 3 / 64, 4))
+    assert (experiment.outcome.reason, experiment.outcome.end_time) == (reason, time)
+    assert len(found.haptics["time"]) == rows
     assert (log.read_text().splitlines() if log.exists() else []) == calls
-
-
-def test_an_isolated_one_that_crashes(tmp_path: Path) -> None:
-    c_fmu3(tmp_path)
-    experiment, found = run(tmp_path, ONE + ISOLATED + "start.mode = 5\n")
-    said = "one: its process ended by SIGABRT at t = 0.046875 s"
-    assert str(experiment.outcome.fault) == said
-    assert len(found.haptics["time"]) == 4
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])

@@ -19,10 +19,12 @@ from tests.orchestrator.foreign_fmus import (
     PAIR,
     SLAVE,
     edited,
+    fmu_table,
     python_fmu,
     python_fmu_of,
     run,
     scene,
+    wire_table,
     with_units,
 )
 
@@ -40,24 +42,24 @@ def shipped(folder: Path, name: str, *files: str) -> Path:
     return Path(made)
 
 
+STARTED = 'start = { intParam = 7, booleanParameter = true, stringParameter = "cat", realIn = 2 }\n'
+
+
 def test_pythonfmus_examples_run_and_connect(tmp_path: Path) -> None:
     shipped(tmp_path, "pythonslave.py")
     shipped(tmp_path, "slavewithdep.py", "localmodule.py")
     experiment, found = run(
         tmp_path,
-        """
-[[fmu]]
-name = "clock"
-path = "PythonSlave.fmu"
-start = { intParam = 7, booleanParameter = true, stringParameter = "cat", realIn = 2 }
-[[fmu]]
-name = "decay"
-path = "PythonSlaveWithDep.fmu"
-rate = 16
-[[connection]]
-from = "clock.realOut"
-to = "decay.realIn"
-""",
+        (
+            "\n"
+            + fmu_table(
+                "clock",
+                "PythonSlave",
+                STARTED,
+            )
+            + fmu_table("decay", "PythonSlaveWithDep", "rate = 16\n")
+            + wire_table("clock.realOut", "decay.realIn")
+        ),
     )
     assert experiment.outcome.fault is None
     time = np.arange(33) / 64

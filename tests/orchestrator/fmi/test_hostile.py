@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -13,27 +13,38 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
+from tests.orchestrator.foreign_fmus import COMMAND, ISOLATED
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
 
 pytest.importorskip("resource")  # the FMU needs POSIX
 
 
+ACTS = [
+    ("step", "minus"), ("step", "least"), ("step", "pending"), ("step", "most"), ("get", "minus"),
+    ("set", "minus"), ("enter", "minus"), ("leave", "least"), ("end", "minus"),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize("fmi", ["2", "3"])
-@pytest.mark.parametrize("isolate", ["", "isolate = true"])
-@pytest.mark.parametrize(
-    ("place", "act"),
-    [
-        ("step", "minus"), ("step", "least"), ("step", "pending"), ("step", "most"),
-        ("get", "minus"), ("set", "minus"), ("enter", "minus"), ("leave", "least"),
-        ("end", "minus"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("place", "act"), ACTS)
 def test_only_ok_and_warning_are_success(
-    tmp_path: Path, loop: str, fmi: str, isolate: str, place: str, act: str
+    tmp_path: Path, loop: str, fmi: str, place: str, act: str
 ) -> None:
-    hostile_fmu(tmp_path, fmi)
-    scene = hostile_scene(tmp_path, f"{place}_{act}_20", isolate)
-    outcome = simulate(scene, tmp_path / "out").outcome
+    is_a_fault(tmp_path, fmi, place, act)
+
+
+@pytest.mark.parametrize(
+    ("fmi", "place", "act"), [("23"[k % 2], *row) for k, row in enumerate(ACTS)]
+)
+def test_so_it_is_in_a_process_of_its_own(tmp_path: Path, fmi: str, place: str, act: str) -> None:
+    """Python steps it in either loop, and its worker is the same for every version of FMI."""
+    is_a_fault(tmp_path, fmi, place, act, ISOLATED)
+
+
+def is_a_fault(folder: Path, fmi: str, place: str, act: str, isolate: str = "") -> None:
+    hostile_fmu(folder, fmi)
+    scene = hostile_scene(folder, f"{place}_{act}_20", isolate)
+    outcome = simulate(scene, folder / "out").outcome
     assert outcome.reason == "fault"
     name = {"minus": "status -1", "least": "status -2147483648", "most": "status 2147483647"}
     assert f"returned {name.get(act, act)}" in str(outcome.fault)
@@ -126,7 +137,7 @@ def test_another_rounding_mode_is_restored_and_told(
 def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
     hostile_fmu(tmp_path, fmi)
     scene, out = hostile_scene(tmp_path, "step_exit_20"), tmp_path / "out"
-    command = [sys.executable, "-m", "hapticlink", "run", str(scene), "--out", str(out)]
+    command = [*COMMAND, "run", str(scene), "--out", str(out)]
     environment = os.environ | {"HAPTICLINK_LOOP": loop}
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert ended.returncode == 1
@@ -134,3 +145,33 @@ def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
     found = tables.load(out)
     assert found.run["fault"]["kind"] == "Crash"
     assert found.haptics["time"].tolist() == [k / 64 for k in range(20)]
+
+
+def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path: Path) -> None:
+    """A tool that never answers would hang the run; one signal ends it while it loads."""
+    hostile_fmu(tmp_path, "2", needsExecutionTool="true")
+    run = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").run
+    assert set(run["isolated"]) == {"good_none_0", "source"}
+    scene = hostile_scene(tmp_path, "make_sleep_0")
+    command = [*COMMAND, "run", str(scene), "--out", str(tmp_path / "o")]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(4.0)
+        assert process.poll() is None
+        process.terminate()
+        _, said = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert "interrupted" in said
+
+
+def test_what_a_run_does_not_use_of_fmi_3_is_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    scene = hostile_scene(tmp_path, "good_none_0")
+    hostile_fmu(tmp_path, "3")
+    simulate(scene, tmp_path / "out")
+    assert "not used" not in caplog.text
+    flags = ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate")
+    hostile_fmu(tmp_path, "3", **dict.fromkeys(flags, "true"))
+    simulate(scene, tmp_path / "out")
+    offered = "event mode, early return, intermediate update, which is not used"
+    assert f"good_none_0 offers {offered}" in caplog.text

@@ -7,9 +7,7 @@ import pytest
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.description import describe
 from tests.orchestrator.fmi.test_archives import fmu
-from tests.orchestrator.foreign_fmus import DESCRIPTION, edited, python_fmu, run
-
-FMU = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
+from tests.orchestrator.foreign_fmus import DESCRIPTION, edited, fmu_table, python_fmu, run
 
 
 @pytest.mark.parametrize("name", ["a,b", '"a", b', '"', '""', "'", ',",', "a b", "λ[1,2]"])
@@ -17,7 +15,7 @@ def test_any_name_comes_back_from_the_csv(tmp_path: Path, name: str) -> None:
     xml = name.replace('"', "&quot;")
     path = python_fmu(tmp_path, "Gives", "self.y = 7.0")
     edited(path, lambda text: text.replace('name="y"', f'name="{xml}"'))
-    _, results = run(tmp_path, FMU)
+    _, results = run(tmp_path, fmu_table("gives", "Gives"))
     assert results.haptics.columns == ("time", f"gives.{name}", "gives.steps")
     assert results.haptics[f"gives.{name}"][-1] == 7.0
     assert results.haptics["gives.steps"][-1] == 32.0

@@ -5,12 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.orchestrator.foreign_fmus import c_fmu3, python_fmu, run, scene, stair_fmu
+from tests.orchestrator.foreign_fmus import ISOLATED, fmu_table, python_fmu, run, scene, stair_fmu
 from tests.shared_fixtures import status
 
-STAIR = '[[fmu]]\nname = "stair"\npath = "stair.fmu"\nrate = {}\n'
-BESIDE = '[[fmu]]\nname = "beside"\npath = "Beside.fmu"\n'
-ISOLATED = "isolate = true\n"
+STAIR = fmu_table("stair", "stair", "rate = {}\n")
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
@@ -19,7 +17,7 @@ def test_the_stair_ends_at_its_top(tmp_path: Path, coupling: str, isolate: str) 
     """As Reference-FMUs' Stair at 5 Hz: its last row is (9.0, 10); the others' is of that time."""
     stair_fmu(tmp_path)
     python_fmu(tmp_path, "Beside")
-    text = isolate + STAIR.format(5) + BESIDE
+    text = isolate + STAIR.format(5) + fmu_table("beside", "Beside")
     options = (f"coupling={coupling}", "duration=20", "haptics.rate=10")
     experiment, found = run(tmp_path, text, *options)
     outcome = experiment.outcome
@@ -50,16 +48,6 @@ def test_a_retried_step_that_ends_is_no_discard(tmp_path: Path) -> None:
     experiment, found = run(tmp_path, STAIR.format(5), *options)
     assert (experiment.outcome.fault, experiment.outcome.reason) == (None, "terminated")
     assert found.tables["5hz"]["stair.counter"][-1] == 10
-
-
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_terminate_simulation_of_fmi_3(tmp_path: Path, isolate: str) -> None:
-    c_fmu3(tmp_path)
-    one = '[[fmu]]\nname = "one"\npath = "types.fmu"\nstart.mode = 7\n'
-    experiment, found = run(tmp_path, one + isolate)
-    outcome = experiment.outcome
-    assert (outcome.fault, outcome.reason, outcome.end_time) == (None, "terminated", 4 / 64)
-    assert len(found.haptics["time"]) == 5
 
 
 def test_the_command_says_who_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -38,7 +38,7 @@ def test_a_run_keeps_what_explain_prints(
 ) -> None:
     options = ["--set", "duration=0.2", "--set", "graphics.rate={min=20, max=60, seed=2}"]
     told = []
-    for how in (["--explain"], ["--out", str(tmp_path)]):
+    for how in (["--explain"], ["--no-figures", "--out", str(tmp_path)]):
         assert status("run", "closed-loop", *how, *options) == 0
         told.append(capsys.readouterr().out)
     assert (tmp_path / "plan.txt").read_text() == told[0]
@@ -56,7 +56,7 @@ def test_what_does_not_come_round_is_told_to_its_end(
     assert status("run", scene, "--explain", *options) == 0
     told = capsys.readouterr().out.splitlines()
     assert told[-1] == "cut after 600 events; a run writes them all to plan.txt"
-    assert status("run", scene, "--out", str(tmp_path), *options) == 0
+    assert status("run", scene, "--no-figures", "--out", str(tmp_path), *options) == 0
     kept = (tmp_path / "plan.txt").read_text().splitlines()
     table = next(i for i, line in enumerate(told) if line.startswith("tick, "))
     assert kept[kept.index(told[table]) :][: len(told) - table - 1] == told[table:-1]

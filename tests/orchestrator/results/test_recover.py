@@ -16,9 +16,8 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.recover import Recovered, recover
-from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
+from tests.orchestrator.foreign_fmus import COMMAND, c_fmu, fmu_table, python_fmu, scene
 from tests.orchestrator.results.records import run_json
-from tests.orchestrator.run.test_interrupt import COMMAND, ONE
 
 LAST = 3.5
 KILLS = f"if time >= {LAST}: __import__('os').kill(__import__('os').getpid(), 9)"
@@ -30,7 +29,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path: Path, extra: str) -> Non
     of their own, from outside, where no watchdog is."""
     body = KILLS if not extra else f"if time >= {LAST}: __import__('time').sleep(1000)"
     python_fmu(tmp_path, "Dies", f"self.y = time + size\n        {body}")
-    path, out = scene(tmp_path, ONE.format("Dies.fmu") + extra, duration=5), tmp_path / "out"
+    path, out = scene(tmp_path, fmu_table("one", "Dies", extra), duration=5), tmp_path / "out"
     command = [*COMMAND, "run", str(path), "--out", str(out)]
     if extra:
         with subprocess.Popen(command, stderr=subprocess.DEVNULL) as running:
@@ -79,7 +78,7 @@ def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
     """Two more minutes at 4096 Hz are 12 MB of rows; the largest memory of the process grows by a
     fraction of that."""
     c_fmu(tmp_path)
-    path, peaks = scene(tmp_path, ONE.format("faults.fmu"), rate=4096), []
+    path, peaks = scene(tmp_path, fmu_table("one", "faults"), rate=4096), []
     for seconds in (60, 180):
         ended = simulate(str(path), tmp_path / "out", [f"duration={seconds}"])
         peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.results.record import Timings
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.records import Iteration
 from tests.orchestrator import coupled
-from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
+from tests.orchestrator.foreign_fmus import c_fmu, fmu_table, python_fmu, scene
 from tests.orchestrator.native_mass import held
 
 try:
@@ -60,7 +60,7 @@ def test_every_shipped_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, na
 @pytest.mark.parametrize("hold", [*HOLDS.names()])
 def test_every_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str) -> None:
     kind = "downsampling" if HOLDS[hold].downsamples else "hold"
-    options = [f"{kind}={hold}", *NO_MATRICES, "graphics.rate=60", "duration=0.3"]
+    options = [f"{kind}={hold}", *NO_MATRICES, "graphics.rate=60", "duration=0.15"]
     run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options)
     assert hold in run["holds"].values()
     late = "delays.virtual_mechanism.x={ min = 0.001, max = 0.03, loss = 0.1, seed = 3 }"
@@ -132,8 +132,10 @@ hold = "smooth"
 """
 
 
-@pytest.mark.parametrize("isolate", ["", "isolate = true"])
-@pytest.mark.parametrize("coupling", ["gauss-seidel", "jacobi"])
+@pytest.mark.parametrize(
+    ("coupling", "isolate"),
+    [("gauss-seidel", ""), ("jacobi", ""), ("jacobi", "isolate = true")],
+)
 def test_substeps_and_isolated_fmus(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coupling: str, isolate: str
 ) -> None:
@@ -143,7 +145,6 @@ def test_substeps_and_isolated_fmus(
     assert ("step two" in left) == bool(isolate)
 
 
-ONE = '[[fmu]]\nname = "one"\npath = "{}.fmu"\n'
 FAULTS = {
     "raises": "if time > 0.2: raise RuntimeError('broken gear')",
     "NaN": "self.y = float('nan') if self.steps == 5 else float(self.steps)",
@@ -159,7 +160,7 @@ def test_faults_of_python_fmus(
 ) -> None:
     python_fmu(tmp_path, "Fails", body, canGetAndSetFMUstate=True)
     options = [policy] if policy else []
-    both(str(scene(tmp_path, ONE.format("Fails"))), tmp_path, monkeypatch, *options)
+    both(str(scene(tmp_path, fmu_table("one", "Fails"))), tmp_path, monkeypatch, *options)
 
 
 LEFT = {
@@ -175,14 +176,14 @@ def test_exceptions_that_a_python_fmu_leaves_behind(
     """The library of pythonfmu checks neither an integer's size nor a status that has no truth
     value: it goes on with -1, or with a step that is taken."""
     python_fmu(tmp_path, "Leaves", LEFT[error])
-    run, _ = both(str(scene(tmp_path, ONE.format("Leaves"))), tmp_path, monkeypatch)
+    run, _ = both(str(scene(tmp_path, fmu_table("one", "Leaves"))), tmp_path, monkeypatch)
     assert error in run["fault"]["message"]
 
 
 @pytest.mark.parametrize("mode", range(1, 5))
 def test_every_status_of_a_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int) -> None:
     c_fmu(tmp_path)
-    text = ONE.format("faults") + f"start.mode = {mode}\n"
+    text = fmu_table("one", "faults", f"start.mode = {mode}\n")
     run, _ = both(str(scene(tmp_path, text)), tmp_path, monkeypatch)
     assert (run["fault"] is None) == (mode == 1)
 

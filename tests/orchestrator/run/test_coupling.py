@@ -32,15 +32,16 @@ from tests.orchestrator.coupled import (
     described,
     error,
     gain,
+    iterated,
     simulate,
     stiff_exact,
     system,
 )
+from tests.orchestrator.coupled import order as observed_order
 from tests.orchestrator.foreign_fmus import edited
 from tests.orchestrator.native_mass import held, stiff
 
 Fmus = Mapping[str, Description]
-NEWTON = Iteration(method="newton", tolerance=1e-10)
 UNTIL = Fraction("1.06")
 
 
@@ -51,17 +52,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
 
 def largest(fmus: Fmus, folder: Path, rate: int, between: str, substeps: int) -> float:
     """The largest error of a position within 1 s."""
-    made = system(
-        fmus,
-        HERMITE,
-        "iterated",
-        Fraction(1, rate),
-        UNTIL,
-        between=between,
-        substeps=substeps,
-        get_after_set=("one", "two"),
-        iteration=NEWTON,
-    )
+    made = iterated(fmus, UNTIL, between, rate=rate, rows=HERMITE, substeps=substeps)
     outcome, table = simulate(made, folder)
     assert outcome.fault is None
     return error(table)
@@ -86,23 +77,14 @@ def test_order_is_that_of_the_interpolation(
 ) -> None:
     rates = [50, 100, 200]
     errors = [largest(fmus, tmp_path, rate, between, substeps) for rate in rates]
-    observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
-    assert observed == pytest.approx(order, abs=0.1)
+    assert observed_order(rates, errors) == pytest.approx(order, abs=0.1)
 
 
 def test_both_methods_find_the_same(fmus: Fmus, tmp_path: Path) -> None:
     tables = []
     for method in ("aitken", "newton"):
-        made = system(
-            fmus,
-            ROWS,
-            "iterated",
-            Fraction(1, 100),
-            Fraction(1, 2),
-            between="foh",
-            get_after_set=("one", "two"),
-            iteration=Iteration(method=method, tolerance=1e-11),  # type: ignore[arg-type]
-        )
+        how = Iteration(method=method, tolerance=1e-11)  # type: ignore[arg-type]
+        made = iterated(fmus, Fraction(1, 2), "foh", iteration=how)
         outcome, table = simulate(made, tmp_path)
         assert outcome.fault is None
         tables.append(table.rows)
@@ -130,11 +112,7 @@ def test_it_reads_the_future_and_says_so(fmus: Fmus) -> None:
 def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus: Fmus, tmp_path: Path) -> None:
     """Linear interpolation holds the mean of the source's samples, so it generates no energy: the
     work of both books is the same."""
-    made = system(
-        fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh", power=POWER,
-        get_after_set=("one", "two"), iteration=NEWTON,
-    )  # fmt: skip
-    outcome, _ = simulate(made, tmp_path)
+    outcome, _ = simulate(iterated(fmus, UNTIL, "foh", power=POWER), tmp_path)
     booked = outcome.details.meters["two.F -> one.F"]
     assert abs(booked.held) > 1.0
     assert abs(booked.generated) < 1e-8
@@ -179,10 +157,7 @@ def test_an_fmu_that_cannot_roll_back_is_named(fmus: Fmus) -> None:
 
 
 def test_fmus_in_processes_of_their_own_roll_back_too(fmus: Fmus, tmp_path: Path) -> None:
-    made = system(
-        fmus, ROWS, "iterated", Fraction(1, 100), Fraction(1, 10), between="foh", substeps=2,
-        get_after_set=("one", "two"), iteration=NEWTON,
-    )  # fmt: skip
+    made = iterated(fmus, Fraction(1, 10), "foh", substeps=2)
     _, here = simulate(made, tmp_path)
     units = tuple(replace(u, isolate=True) for u in made.fmus)
     outcome, apart = simulate(replace(made, fmus=units), tmp_path)

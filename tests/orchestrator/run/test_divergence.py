@@ -6,10 +6,15 @@ import pytest
 
 from hapticlink.orchestrator.base.faults import Diverged
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.foreign_fmus import SLAVE, python_fmu, python_fmu_of, run, with_units
+from tests.orchestrator.foreign_fmus import (
+    SLAVE,
+    fmu_table,
+    python_fmu,
+    python_fmu_of,
+    run,
+    with_units,
+)
 from tests.shared_fixtures import status
-
-ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
 
 
 @pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
@@ -20,7 +25,7 @@ def test_an_output_beyond_1e12_of_its_start(
     slave = SLAVE.format(name="Grows", body="self.y = self.y + 1e4 ** self.steps")
     text = slave.replace("0.0, 0.0, 1.0", f"0.0, {start}, 1.0")
     with_units(python_fmu_of(tmp_path, text, "grows"), y="m")
-    experiment, found = run(tmp_path, ONE.format("Grows.fmu") + isolate)
+    experiment, found = run(tmp_path, fmu_table("one", "Grows", isolate))
     assert isinstance(experiment.outcome.fault, Diverged)
     assert experiment.outcome.reason == found.run["end"]["reason"] == "diverged"
     assert f", beyond {bound}: the run has diverged" in str(experiment.outcome.fault)
@@ -30,14 +35,14 @@ def test_an_output_beyond_1e12_of_its_start(
 def test_a_held_output_is_bounded_too(tmp_path: Path) -> None:
     body = "self.y = float('nan') if self.steps < 3 else 1e13"
     with_units(python_fmu(tmp_path, "Grows", body), y="m")
-    experiment, found = run(tmp_path, ONE.format("Grows.fmu"), "faults.nan=hold")
+    experiment, found = run(tmp_path, fmu_table("one", "Grows"), "faults.nan=hold")
     assert isinstance(experiment.outcome.fault, Diverged)
     assert found.run["held_outputs"] == {"one": 2}
 
 
 def test_a_whole_number_is_bounded_by_its_type(tmp_path: Path) -> None:
     python_fmu(tmp_path, "Counts", "self.steps = 2_000_000_000")
-    experiment, found = run(tmp_path, ONE.format("Counts.fmu"))
+    experiment, found = run(tmp_path, fmu_table("one", "Counts"))
     assert experiment.outcome.fault is None
     assert found.haptics["one.steps"][-1] == 2e9
 
@@ -57,7 +62,7 @@ def test_energy_that_nobody_put_in(tmp_path: Path, capsys: pytest.CaptureFixture
     heun = "mechanism.integrator=heun"
     assert simulate("pendulum", tmp_path / "fine", [fine, heun]).outcome.fault is None
     options = ("--set", coarse, "--set", heun)
-    assert status("run", "pendulum", "--out", tmp_path / "coarse", *options) == 1
+    assert status("run", "pendulum", "--no-figures", "--out", tmp_path / "coarse", *options) == 1
     told = capsys.readouterr()
     assert "J more than it had at the start and was given: the run has diverged" in told.err
     assert "pendulum: diverged at 10 s" in told.out
@@ -90,6 +95,6 @@ def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path: Pa
 def test_holds_that_make_more_than_was_put_in_are_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert status("run", "sampled-spring", "--out", tmp_path) == 0
+    assert status("run", "sampled-spring", "--no-figures", "--out", tmp_path) == 0
     said = "neither hands nor mechanism put in any on the whole: the loop is not passive"
     assert said in capsys.readouterr().out

@@ -19,13 +19,27 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.foreign_fmus import SLAVE, c_fmu, python_fmu, python_fmu_of, run, scene
+from tests.orchestrator.foreign_fmus import (
+    COMMAND,
+    ISOLATED,
+    SLAVE,
+    c_fmu,
+    fmu_table,
+    python_fmu,
+    python_fmu_of,
+    run,
+    scene,
+    wire_table,
+)
 
 resource = pytest.importorskip("resource")  # these are the signals and limits of POSIX
 
-ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
-OTHER = '[[fmu]]\nname = "other"\npath = "Other.fmu"\n'
-ISOLATED = "isolate = true\n"
+OTHER = fmu_table("other", "Other")
+
+
+@pytest.fixture(autouse=True)
+def crash_monitor_of_runs() -> None:
+    """Runs start their watchdog."""
 
 
 def folders() -> set[str]:
@@ -55,7 +69,7 @@ def test_a_value_that_is_not_finite_stops_or_is_held(
 ) -> None:
     body = f"self.y = {value} if self.steps == 5 else float(self.steps)"
     python_fmu(tmp_path, "Lost", body)
-    one = ONE.format("Lost.fmu") + isolate
+    one = fmu_table("one", "Lost", isolate)
     experiment, found = run(tmp_path, one)
     assert f"output y is {value[7:10]} at t = 0.078125 s" in str(experiment.outcome.fault)
     assert found.haptics["one.y"].tolist() == [0, 1, 2, 3, 4]
@@ -68,7 +82,7 @@ def test_a_value_that_is_not_finite_stops_or_is_held(
 def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path: Path) -> None:
     never = SLAVE.format(name="Never", body="pass").replace("0.0, 0.0, 1.0", "0.0, float('nan'), 1")
     python_fmu_of(tmp_path, never, "never")
-    experiment, _ = run(tmp_path, ONE.format("Never.fmu"), "faults.nan=hold")
+    experiment, _ = run(tmp_path, fmu_table("one", "Never"), "faults.nan=hold")
     assert "one: output y is nan at t = 0 s" in str(experiment.outcome.fault)
 
 
@@ -80,7 +94,7 @@ HALF = "\n        ".join(
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path: Path, isolate: str) -> None:
     python_fmu(tmp_path, "Stiff", HALF, canGetAndSetFMUstate=True)
-    one = ONE.format("Stiff.fmu") + isolate
+    one = fmu_table("one", "Stiff", isolate)
     experiment, found = run(tmp_path, one)
     assert "one: fmi2DoStep returned discard at t = 0 s" in str(experiment.outcome.fault)
     assert found.haptics["time"].tolist() == [0.0]
@@ -93,10 +107,10 @@ def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path: Path, isol
 
 def test_a_retry_that_cannot_be_says_why(tmp_path: Path) -> None:
     python_fmu(tmp_path, "Stiff", "return False")
-    experiment, _ = run(tmp_path, ONE.format("Stiff.fmu"), "faults.discard=retry")
+    experiment, _ = run(tmp_path, fmu_table("one", "Stiff"), "faults.discard=retry")
     assert "not retried: the FMU lacks canGetAndSetFMUstate" in str(experiment.outcome.fault)
     python_fmu(tmp_path, "Stiffer", "return False", canGetAndSetFMUstate=True)
-    experiment, _ = run(tmp_path, ONE.format("Stiffer.fmu"), "faults.discard=retry")
+    experiment, _ = run(tmp_path, fmu_table("one", "Stiffer"), "faults.discard=retry")
     assert "in steps of 1/1024 too" in str(experiment.outcome.fault)
 
 
@@ -104,7 +118,7 @@ def test_a_retry_that_cannot_be_says_why(tmp_path: Path) -> None:
 def test_an_exception_in_a_python_fmu(tmp_path: Path, isolate: str) -> None:
     python_fmu(tmp_path, "Raises", "if time > 0.2: raise RuntimeError('broken gear')")
     python_fmu(tmp_path, "Other")
-    experiment, found = run(tmp_path, ONE.format("Raises.fmu") + isolate + OTHER)
+    experiment, found = run(tmp_path, fmu_table("one", "Raises", isolate) + OTHER)
     message = str(experiment.outcome.fault)
     assert message.startswith("one: fmi2DoStep returned fatal at t = 0.203125 s")
     assert "broken gear" in message
@@ -134,7 +148,7 @@ def test_every_status(
     monkeypatch.setenv("FAULT_FMU_LOG", str(log))
     c_fmu(tmp_path)
     python_fmu(tmp_path, "Other")
-    text = ONE.format("faults.fmu") + isolate + f"start.mode = {mode}\n" + OTHER
+    text = fmu_table("one", "faults", isolate) + f"start.mode = {mode}\n" + OTHER
     experiment, found = run(tmp_path, text)
     fault = experiment.outcome.fault
     said = log.read_text().splitlines() if log.exists() else []
@@ -162,7 +176,7 @@ def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(
     ended = tmp_path / "ended"
     said = f"\n    def terminate(self):\n        open({str(ended)!r}, 'w').close()\n"
     python_fmu_of(tmp_path, SLAVE.format(name="Other", body="pass") + said, tmp_path.name)
-    text = ONE.format("Dies.fmu") + ISOLATED + OTHER
+    text = fmu_table("one", "Dies", ISOLATED) + OTHER
     experiment, found = run(tmp_path, text, "faults.timeout=2")
     message = str(experiment.outcome.fault)
     assert message.startswith("one: ")
@@ -173,47 +187,18 @@ def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(
     assert ended.exists()  # the other FMU was terminated
 
 
-def test_a_native_crash_and_an_endless_loop(tmp_path: Path) -> None:
+def test_a_native_endless_loop_is_ended(tmp_path: Path) -> None:
     c_fmu(tmp_path)
-    for mode, how in ((5, "ended by SIGABRT"), (6, "did not answer within 2 s and was ended")):
-        text = ONE.format("faults.fmu") + ISOLATED + f"start.mode = {mode}\n"
-        experiment, found = run(tmp_path, text, "faults.timeout=2")
-        assert how in str(experiment.outcome.fault)
-        assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
-
-
-@pytest.mark.parametrize("end", ["pass", "if time > 0.2: __import__('os')._exit(3)"])
-def test_what_an_isolated_fmu_has_started_ends_with_it(tmp_path: Path, end: str) -> None:
-    told = tmp_path / "child"
-    body = f"""if self.steps == 1:
-            child = __import__('subprocess').Popen(['sleep', '600'])
-            with open({str(told)!r}, 'w') as file:
-                print(child.pid, file=file)
-        {end}"""
-    python_fmu(tmp_path, "Starts", body)
-    experiment, _ = run(tmp_path, ONE.format("Starts.fmu") + ISOLATED)
-    assert (experiment.outcome.fault is None) == (end == "pass")
-    deadline = time.monotonic() + 60
-    while _runs(int(told.read_text())) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert not _runs(int(told.read_text()))
-
-
-def _runs(process: int) -> bool:
-    """Not where it has ended and nobody has asked how."""
-    stat = Path(f"/proc/{process}/stat")
-    try:
-        return stat.read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    text = fmu_table("one", "faults", ISOLATED + "start.mode = 6\n")
+    experiment, found = run(tmp_path, text, "faults.timeout=2")
+    assert "did not answer within 2 s and was ended" in str(experiment.outcome.fault)
+    assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
 
 
 def test_isolated_runs_give_the_same_bytes(tmp_path: Path) -> None:
     python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
-    wire = '[[connection]]\nfrom = "one.y"\nto = "two.u"\nfactor = 0.3\n'
-    back = '[[connection]]\nfrom = "two.y"\nto = "one.u"\n'
-    two = ONE.format("Gives.fmu").replace("one", "two") + "rate = 24\n"
-    text = ONE.format("Gives.fmu") + two + wire + back
+    text = fmu_table("one", "Gives") + fmu_table("two", "Gives", "rate = 24\n")
+    text += wire_table("one.y", "two.u", "factor = 0.3\n") + wire_table("two.y", "one.u")
     for out, options in (("a", []), ("b", ["isolate=true"]), ("c", ["fmu.two.isolate=true"])):
         ended = simulate(str(scene(tmp_path, text)), tmp_path / out, options)
         assert ended.outcome.fault is None
@@ -227,8 +212,8 @@ def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path: Path) ->
         (tmp_path / name).mkdir()
         slave = SLAVE.format(name="Same", body=f"self.y = {value}")
         python_fmu_of(tmp_path / name, slave, "same")
-    two = ONE.format("second/Same.fmu").replace("one", "two")
-    experiment, found = run(tmp_path, ONE.format("first/Same.fmu") + two)
+    text = fmu_table("one", "first/Same") + fmu_table("two", "second/Same")
+    experiment, found = run(tmp_path, text)
     assert experiment.outcome.fault is None
     assert found.haptics["one.y"][-1] == 1.0
     assert found.haptics["two.y"][-1] == 2.0
@@ -237,15 +222,13 @@ def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path: Path) ->
 
 # --- the commands from outside ------------------------------------------------------------
 
-COMMAND = [sys.executable, "-c", "from hapticlink.commands import main; main()"]
-
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
     tmp_path: Path, isolate: str
 ) -> None:
     c_fmu(tmp_path, python=True)
-    path = scene(tmp_path, ONE.format("faults.fmu") + isolate)
+    path = scene(tmp_path, fmu_table("one", "faults", isolate))
     log = tmp_path / "log"
     command = [*COMMAND, "run", str(path), "--out", str(tmp_path / "out")]
     subprocess.run(command, check=True, env=os.environ | {"FAULT_FMU_LOG": str(log)})
@@ -257,7 +240,7 @@ def test_threads_that_an_fmu_leaves_running_keep_no_process(tmp_path: Path, comm
     """Python waits for them before it ends."""
     wait = "__import__('threading').Thread(target=__import__('time').sleep, args=[600]).start()"
     python_fmu(tmp_path, "Bad", f"self.steps > 1 or {wait}")
-    path = scene(tmp_path, ONE.format("Bad.fmu") + ISOLATED * ("isolated" in command))
+    path = scene(tmp_path, fmu_table("one", "Bad", ISOLATED * ("isolated" in command)))
     arguments = [command.split()[0], str(path), "--out", str(tmp_path / "out")]
     arguments += ["--vary", "duration=0.1,0.2", "--jobs", "2"] if command == "sweep" else []
     ended = subprocess.run(
@@ -274,8 +257,10 @@ TERMINATE = """
 """
 
 
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
-@pytest.mark.parametrize("body", ["raise RuntimeError('stuck brake')", "raise SystemExit(3)"])
+@pytest.mark.parametrize(
+    ("body", "isolate"),
+    [("raise RuntimeError('stuck brake')", ISOLATED), ("raise SystemExit(3)", "")],
+)
 def test_an_exception_in_terminate_is_told_after_the_last_row(
     tmp_path: Path, body: str, isolate: str
 ) -> None:
@@ -283,7 +268,7 @@ def test_an_exception_in_terminate_is_told_after_the_last_row(
     outside, as the process once ended by SIGSEGV, with nothing on stderr."""
     slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format(body)
     python_fmu_of(tmp_path, slave, tmp_path.name)
-    one = ONE.format("Bad.fmu") + isolate
+    one = fmu_table("one", "Bad", isolate)
     path, out = scene(tmp_path, one + one.replace("one", "two")), tmp_path / "out"
     command = [*COMMAND, "run", str(path), "--out", str(out)]
     ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
@@ -297,7 +282,7 @@ def test_an_exception_in_terminate_is_told_after_the_last_row(
 def test_a_process_that_dies_in_terminate_is_told(tmp_path: Path) -> None:
     slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format("__import__('os')._exit(3)")
     python_fmu_of(tmp_path, slave, tmp_path.name)
-    experiment, found = run(tmp_path, ONE.format("Bad.fmu") + ISOLATED)
+    experiment, found = run(tmp_path, fmu_table("one", "Bad", ISOLATED))
     said = "one: its process ended with exit status 3 at t = 0.5 s"
     assert str(experiment.outcome.fault) == said
     assert found.haptics["time"][-1] == 0.5
@@ -315,7 +300,7 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
     tmp_path: Path, crash: str, status: int
 ) -> None:
     python_fmu(tmp_path, "Dies", f"self.y = time + size\n        if time >= 2.0: {crash}")
-    path, out = scene(tmp_path, ONE.format("Dies.fmu"), duration=5), tmp_path / "out"
+    path, out = scene(tmp_path, fmu_table("one", "Dies"), duration=5), tmp_path / "out"
     command = [*COMMAND, "run", str(path), "--out", str(out)]
     # Its end is that of the process beside it, which holds the same stream.
     ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
@@ -347,8 +332,7 @@ def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path:
         other.rmdir()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize(("number", "isolate"), [(signal.SIGINT, ""), (signal.SIGTERM, ISOLATED)])
 def test_a_signal_keeps_results_and_exits_with_1(
     tmp_path: Path, number: signal.Signals, isolate: str
 ) -> None:
@@ -359,7 +343,7 @@ def test_a_signal_keeps_results_and_exits_with_1(
                 print(__import__('os').getpid(), file=file)
             __import__('os').replace({str(started)!r} + 'ing', {str(started)!r})"""
     python_fmu(tmp_path, "Slow", body)
-    path = scene(tmp_path, ONE.format("Slow.fmu") + isolate, duration=100)
+    path = scene(tmp_path, fmu_table("one", "Slow", isolate), duration=100)
     out = tmp_path / "out"
     with subprocess.Popen([*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE) as running:
         deadline = time.monotonic() + 60
@@ -380,7 +364,7 @@ def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path: Path) -> None:
     most = 40_000
     limit = f"__import__('resource').setrlimit({resource.RLIMIT_FSIZE}, ({most}, {most}))"
     python_fmu(tmp_path, "Fine", f"self.y = 1 / 3 + time; self.steps == 1 and {limit}")
-    path = scene(tmp_path, ONE.format("Fine.fmu"), duration=60)
+    path = scene(tmp_path, fmu_table("one", "Fine"), duration=60)
     out = tmp_path / "out"
     command = [*COMMAND, "run", str(path), "--out", str(out)]
     ended = subprocess.run(command, capture_output=True, check=False)
@@ -411,16 +395,15 @@ def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path: Path, step:
     disk.mkdir()
     body = "self.y = 1 / 3 + time" + FILLS.format(step=step, filler=str(disk / "filler"))
     python_fmu(tmp_path, "Fine", body)
-    path = scene(tmp_path, ONE.format("Fine.fmu"), duration=5)
+    path = scene(tmp_path, fmu_table("one", "Fine"), duration=5)
     mount, told = f"mount -t tmpfs -o size=768k tmpfs {disk}", "No space left on device"
     if subprocess.run(["unshare", "-rm", "sh", "-c", mount], check=False).returncode:
         pytest.skip("no disk of one's own")
     out = disk / "out"
-    command = f'{mount}; "$0" -c "$1" run {path} --out {out}; echo $?; cp -r {out} {tmp_path}'
+    command = f"{mount}; {' '.join(COMMAND)} run {path} --out {out}; echo $?"
+    command += f"; cp -r {out} {tmp_path}"
     ended = subprocess.run(
-        ["unshare", "-rm", "sh", "-c", command, *(COMMAND[0], COMMAND[2])],
-        capture_output=True,
-        check=False,
+        ["unshare", "-rm", "sh", "-c", command], capture_output=True, check=False
     )
     assert ended.stdout.splitlines()[-1] == b"1", ended.stderr
     assert told.encode() in ended.stderr
@@ -441,15 +424,14 @@ def test_a_python_fmu_without_its_module_is_told(tmp_path: Path, gone: str) -> N
         for name, content in entries.items():
             if not name.startswith("resources/") or not name.endswith(gone):
                 archive.writestr(name, content)
-    experiment, _ = run(tmp_path, ONE.format("Bare.fmu"))
+    experiment, _ = run(tmp_path, fmu_table("one", "Bare"))
     said = "could not be loaded: resources/slavemodule.txt names no module beside it; build"
     assert said in str(experiment.outcome.fault)
 
 
 def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path: Path) -> None:
     python_fmu(tmp_path, "Gives")
-    text = 'extends = "closed-loop"\n' + ONE.format("Gives.fmu")
-    wire = '[[connection]]\nfrom = "one.y"\nto = "controller.x_D[1]"\n'
-    (tmp_path / "scene.toml").write_text(text + wire)
+    text = 'extends = "closed-loop"\n' + fmu_table("one", "Gives")
+    (tmp_path / "scene.toml").write_text(text + wire_table("one.y", "controller.x_D[1]"))
     with pytest.raises(InputFault, match=r"line 7: .*x_D lose their source, haptic_device.x"):
         simulate(str(tmp_path / "scene.toml"), tmp_path / "out")

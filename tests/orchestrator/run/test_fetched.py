@@ -12,7 +12,7 @@ import pytest
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from tests.orchestrator.foreign_fmus import python_fmu, scene
+from tests.orchestrator.foreign_fmus import fmu_table, python_fmu, scene, wire_table
 
 SCENE, SHORT = "closed-loop", ("duration=0.5",)
 TOLD = ("end", "fault", "energies", "energies_within_a_rate", "step_errors", "delays", "unstable")
@@ -42,8 +42,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Experiment, dict[st
 LIST = '["hand", "virtual_mechanism.x", "virtual_environment.P_c[1,2]"]'
 
 
-@pytest.mark.parametrize("every", [1, 7])
-@pytest.mark.parametrize("signals", ["all", "connected", "none", LIST])
+@pytest.mark.parametrize(
+    ("signals", "every"), [("all", 7), ("connected", 1), ("none", 7), (LIST, 7)]
+)
 def test_recorded_columns_are_those_of_the_whole_table(
     whole: tuple[Experiment, dict[str, Any]],
     tmp_path: Path,
@@ -95,17 +96,12 @@ def test_calls_of_an_event(tmp_path: Path, loop: str) -> None:
         }
 
 
-FOREIGN = """
-[[fmu]]
-name = "source"
-path = "Steady.fmu"
-[[fmu]]
-name = "eats"
-path = "Eats.fmu"
-[[connection]]
-from = "source.y"
-to = "eats.u"
-"""
+FOREIGN = (
+    "\n"
+    + fmu_table("source", "Steady")
+    + fmu_table("eats", "Eats")
+    + wire_table("source.y", "eats.u")
+)
 
 
 def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(tmp_path: Path, loop: str) -> None:

@@ -9,6 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 import hapticlink as hl
+from tests.orchestrator import coupled
 
 HELD = {
     "duration": 0.5,
@@ -49,7 +50,7 @@ def order(bar: Path, kind: str, rates: list[int], options: dict) -> float:
         results = hl.run(bar, HELD | options | {"hand.type": kind, "haptics.rate": rate})
         assert results.run["fault"] is None
         errors.append(abs(results["virtual_mechanism.x"][-1][0] - exact(kind, 0.5)))
-    return -float(np.polyfit(np.log(rates), np.log(errors), 1)[0])
+    return coupled.order(rates, errors)
 
 
 @pytest.mark.parametrize("kind", ["spring", "arm"])

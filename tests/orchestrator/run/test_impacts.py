@@ -11,14 +11,14 @@ import math
 import numpy as np
 import pytest
 
-import hapticlink as hl
+from tests.shared_fixtures import run_once
 
 MASS, T = 0.3, 1 / 512
 
 
 def thrown(K, v, distance, options=None):
     """Times, velocities, and the forces of the wall, of a handle thrown at it without friction."""
-    run = hl.run(
+    run = run_once(
         "virtual-wall",
         {
             "hand": {"type": "constant", "wrench": [0.0, 0.0, 0.0]},
@@ -29,7 +29,6 @@ def thrown(K, v, distance, options=None):
             "duration": 0.35,
         }
         | (options or {}),
-        figures=False,
     )
     assert run.fault is None
     return run["virtual_mechanism.v"][:, 0], np.ravel(run["wall.F"])

@@ -20,7 +20,6 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from tests.orchestrator import coupled
 from tests.orchestrator.holds.test_order_of_accuracy import error, growth
@@ -94,8 +93,7 @@ def test_largest_error_at_a_hundredth(
 def test_order_of_a_hold(fmus: Fmus, tmp_path: Path, hold: str, order: int) -> None:
     rates = [200, 400, 800]
     errors = [error(fmus, tmp_path, rate, hold, 1) for rate in rates]
-    observed = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
-    assert observed == pytest.approx(order, abs=0.1)
+    assert coupled.order(rates, errors) == pytest.approx(order, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -132,10 +130,7 @@ def test_substeps_change_nothing(fmus: Fmus, tmp_path: Path, hold: str) -> None:
 def test_iterated_coupling_needs_no_substeps(
     fmus: Fmus, tmp_path: Path, between: str, published: float
 ) -> None:
-    made = coupled.system(
-        fmus, coupled.HERMITE, "iterated", Fraction(1, 100), Fraction("1.06"), between=between,
-        get_after_set=("one", "two"), iteration=Iteration(method="newton", tolerance=1e-10),
-    )  # fmt: skip
+    made = coupled.iterated(fmus, Fraction("1.06"), between, rows=coupled.HERMITE)
     outcome, table = coupled.simulate(made, tmp_path)
     assert outcome.fault is None
     assert coupled.error(table) == pytest.approx(published, rel=0.02)
@@ -156,11 +151,7 @@ def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus: Fmus, tmp_path: P
 
 def test_energy_is_booked_with_the_mean(fmus: Fmus, tmp_path: Path) -> None:
     """Iterated and linear, what is held has the mean of the source's two samples: none is made."""
-    made = coupled.system(
-        fmus, coupled.ROWS, "iterated", Fraction(1, 100), Fraction("1.06"), between="foh",
-        power=coupled.POWER, get_after_set=("one", "two"),
-        iteration=Iteration(method="newton", tolerance=1e-10),
-    )  # fmt: skip
+    made = coupled.iterated(fmus, Fraction("1.06"), "foh", power=coupled.POWER)
     outcome, _ = coupled.simulate(made, tmp_path)
     booked = outcome.details.meters["two.F -> one.F"]
     assert abs(booked.held) > 1.0

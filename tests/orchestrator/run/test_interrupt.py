@@ -16,13 +16,14 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
-from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, scene
+from tests.orchestrator.foreign_fmus import COMMAND, ISOLATED, c_fmu, fmu_table, python_fmu, scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
-COMMAND = [sys.executable, "-m", "hapticlink"]
-ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
-ISOLATED = "isolate = true\n"
+
+@pytest.fixture(autouse=True)
+def crash_monitor_of_runs() -> None:
+    """Runs start their watchdog."""
 
 
 def waited_for(come: Callable[[], object]) -> None:
@@ -73,7 +74,7 @@ def workers(pid: int) -> list[bytes]:
 def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path: Path) -> None:
     """As in a terminal, the signal goes to the whole group, and the worker is at its imports."""
     python_fmu(tmp_path, "Slow", "__import__('time').sleep(0.01)")
-    path = scene(tmp_path, ISOLATED + ONE.format("Slow.fmu"), duration=100)
+    path = scene(tmp_path, fmu_table("one", "Slow", ISOLATED), duration=100)
     with subprocess.Popen(
         [*COMMAND, "run", path, "--out", tmp_path / "out"],
         stderr=subprocess.PIPE, start_new_session=True,
@@ -100,18 +101,20 @@ def rows_of(folder: Path) -> int:
     return len(rows.read(table)[1]) if table.exists() else 0
 
 
-@pytest.mark.parametrize("number", interrupt.SIGNALS)
-@pytest.mark.parametrize("kind", HANGS)
+@pytest.mark.parametrize(
+    ("kind", "number"),
+    [("isolated", signal.SIGTERM), ("Python", signal.SIGINT), ("native", signal.SIGTERM)],
+)
 def test_a_second_signal_ends_an_fmu_that_hangs(
     tmp_path: Path, kind: str, number: signal.Signals
 ) -> None:
     body, isolate = HANGS[kind]
     if kind == "native":
         c_fmu(tmp_path)
-        text = ONE.format("faults.fmu") + "start.mode = 6\n"
+        text = fmu_table("one", "faults", "start.mode = 6\n")
     else:
         python_fmu(tmp_path, "Hangs", f"if self.steps == 4:\n            {body}")
-        text = ONE.format("Hangs.fmu") + isolate
+        text = fmu_table("one", "Hangs", isolate)
     out = tmp_path / "out"
     path = scene(tmp_path, text + "[faults]\ntimeout = 1000.0\n", duration=100)
     with subprocess.Popen([*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE) as running:
@@ -132,7 +135,7 @@ def test_a_second_signal_ends_an_fmu_that_hangs(
 def test_python_gets_the_second_signal_when_processes_have_ended(tmp_path: Path) -> None:
     """What a run in Python makes of Ctrl-C is its own; the FMU that hangs does not keep it."""
     python_fmu(tmp_path, "Hangs", "if self.steps == 4: __import__('time').sleep(1000)")
-    path = scene(tmp_path, ONE.format("Hangs.fmu") + ISOLATED + "[faults]\ntimeout = 1000.0\n")
+    path = scene(tmp_path, fmu_table("one", "Hangs", ISOLATED) + "[faults]\ntimeout = 1000.0\n")
 
     def signals() -> None:
         waited_for(lambda: rows_of(tmp_path / "out") == 4)
@@ -180,7 +183,7 @@ CHILD = """
 def test_processes_that_an_isolated_fmu_has_started_end_with_it(tmp_path: Path, then: str) -> None:
     file = tmp_path / "pid"
     python_fmu(tmp_path, "Starts", CHILD.format(pid=str(file), then=then))
-    path = scene(tmp_path, ONE.format("Starts.fmu") + ISOLATED + "[faults]\ntimeout = 2.0\n")
+    path = scene(tmp_path, fmu_table("one", "Starts", ISOLATED) + "[faults]\ntimeout = 2.0\n")
     outcome = simulate(str(path), tmp_path / "out").outcome
     assert (outcome.fault is None) == (then == "pass")
     pid = int(file.read_text())

@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +9,9 @@ import pytest
 
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.foreign_fmus import python_fmu, run, scene
-from tests.shared_fixtures import status
+from tests.orchestrator.foreign_fmus import COMMAND, fmu_table, python_fmu, run, scene
+from tests.shared_fixtures import run_once, status
 
-COMMAND = [sys.executable, "-m", "hapticlink"]
-ONE = '[[fmu]]\nname = "one"\npath = "{}"\n'
 SHORT = ("--set", "duration=0.2")
 ROCKER = "linkage.start.rocker=2.9"
 
@@ -54,7 +51,7 @@ def test_a_start_that_assembly_moves_far_is_told(
 ) -> None:
     for options, count in (((), 0), (("--set", ROCKER), 1)):
         assert status("info", "four-bar", *options) == 0
-        assert status("run", "four-bar", "--out", tmp_path, *SHORT, *options) == 0
+        assert status("run", "four-bar", "--no-figures", "--out", tmp_path, *SHORT, *options) == 0
         told = capsys.readouterr().out
         assert told.count("the loops do not close at the given start") == 2 * count
     assert told.count("rocker from 2.9 to ") == 2
@@ -62,7 +59,7 @@ def test_a_start_that_assembly_moves_far_is_told(
 
 def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:
     python_fmu(tmp_path, "Lost", "self.y = float('nan') if self.steps > 3 else 1.0")
-    _, found = run(tmp_path, 'faults.nan = "hold"\n' + ONE.format("Lost.fmu"))
+    _, found = run(tmp_path, 'faults.nan = "hold"\n' + fmu_table("one", "Lost"))
     held = found.run["held_outputs"]["one"]
     assert held > 0
     assert list(summary.lines(found)) == [
@@ -88,16 +85,14 @@ def test_a_scene_of_given_fmus_has_nothing_to_build(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     python_fmu(tmp_path, "Given")
-    path = scene(tmp_path, ONE.format("Given.fmu"), duration=1)
+    path = scene(tmp_path, fmu_table("one", "Given"), duration=1)
     assert status("build", path, "--out", tmp_path / "fmus") == 2
     assert "nothing to build" in capsys.readouterr().err
     assert not (tmp_path / "fmus").exists()
 
 
-def test_a_signal_of_another_rate_is_told_where_it_is(tmp_path: Path) -> None:
-    phase = ("--set", "phases.virtual_mechanism=0.0005")
-    assert status("run", "closed-loop", "--out", tmp_path, *SHORT, *phase) == 0
-    found = tables.load(tmp_path)
+def test_a_signal_of_another_rate_is_told_where_it_is() -> None:
+    found = run_once("closed-loop", {"duration": 0.2, "phases.virtual_mechanism": 0.0005})
     (table,) = (n for n, t in found.tables.items() if "virtual_mechanism.x" in t)
     assert table != "haptics"
     with pytest.raises(KeyError, match=rf"it is in tables\['{table}'\]"):

@@ -11,6 +11,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.run import step_check
 from hapticlink.orchestrator.run.compiled.library import CHOICE
+from tests.shared_fixtures import run_once
 
 DEAD_CENTRE = """
 title = "A slider turns a light crank over its dead centre"
@@ -116,9 +117,9 @@ def test_light_coupler_under_its_drive_is_told(tmp_path: Path) -> None:
 def test_results_do_not_depend_on_the_check(
     scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    checked = hl.run(scene, {"duration": 0.5}, out=tmp_path / "checked")
+    checked = hl.run(scene, {"duration": 0.5}, out=tmp_path / "checked", figures=False)
     monkeypatch.setattr(step_check.StepCheck, "possible", lambda description: False)
-    plain = hl.run(scene, {"duration": 0.5}, out=tmp_path / "plain")
+    plain = hl.run(scene, {"duration": 0.5}, out=tmp_path / "plain", figures=False)
     assert checked.run["step_errors"]
     assert not plain.run["step_errors"]
     for rate in plain.run["rates"]:
@@ -132,7 +133,7 @@ def test_results_do_not_depend_on_the_check(
 def test_what_is_found_does_not_depend_on_loop_and_room(
     loop: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected = hl.run("obstacles", {"duration": 1.0}).run["step_errors"]
+    expected = run_once("obstacles", {"duration": 1.0}).run["step_errors"]
     monkeypatch.setenv(CHOICE, loop)
     monkeypatch.setattr(step_check, "ROOM", 1)  # as many checks as grow the arrays three times
     found = hl.run("obstacles", {"duration": 1.0})

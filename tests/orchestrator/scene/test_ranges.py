@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.scene import load_scene, overrides
-from hapticlink.orchestrator.scene.json_schema import json_schema
 from hapticlink.orchestrator.scene.scene_source import Source
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.orchestrator.scene_numbers import SCENES, beyond, key, of_scene, put, tables, toml
@@ -75,6 +75,7 @@ def test_what_once_ran_is_refused(
         (["directions.hysteresis=10"], "10.0 times rank_tolerance = 0.1 is 1"),
         (["device.base_y_a=0.3"], "0.3 m is not below base_y_b = 0.2 m"),
         (["device.distal_length=0.005"], "leaves an arm nothing between its two stops"),
+        (["device.sensing=encoders"], "write `sensing` outside of [device]"),
         (["stop_when=hand.F[1] < nan"], "write a signal against a number"),
         (["linkage.family=n-four-bar", "linkage.n=1001"], ">= 1 and <= 1000"),
     ],

@@ -14,14 +14,14 @@ from typing import Any
 import jsonschema
 import pytest
 
+from hapticlink.commands import scene_reference
+from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.scene import (
     find_scene,
     key_descriptions,
     load_scene,
-    reference,
     schema,
 )
-from hapticlink.orchestrator.scene.json_schema import json_schema
 from hapticlink.orchestrator.scene.scene import Scene
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.shared_fixtures import status
@@ -87,7 +87,9 @@ def test_what_does_not(old: str, new: str) -> None:
 
 def test_the_reference_page_is_up_to_date() -> None:
     """Made by `hapticlink schema --markdown > docs/scene-reference.md`."""
-    assert (ROOT / "docs" / "scene-reference.md").read_text(encoding="utf-8") == reference.page()
+    assert (ROOT / "docs" / "scene-reference.md").read_text(
+        encoding="utf-8"
+    ) == scene_reference.page()
 
 
 def records(hint: Any) -> Iterator[Any]:

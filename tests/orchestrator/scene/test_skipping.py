@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hapticlink.analysis.findings import requirements
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Table
-from hapticlink.orchestrator.scene import requirements
 from hapticlink.orchestrator.scene.blocks import FromGraphics, blocks
 
 SHORT = "duration=0.2"

@@ -14,7 +14,15 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.foreign_fmus import python_fmu, python_fmu_of, run, scene, with_units
+from tests.orchestrator.foreign_fmus import (
+    fmu_table,
+    python_fmu,
+    python_fmu_of,
+    run,
+    scene,
+    wire_table,
+    with_units,
+)
 from tests.orchestrator.systems import system_of
 from tests.shared_fixtures import sets, status
 
@@ -149,20 +157,12 @@ def test_what_an_fmu_puts_in_counts_whatever_its_name(tmp_path: Path, name: str)
     assert found.run["unstable"] == ""
 
 
-DERIVATIVES = """
-[[fmu]]
-name = "slow"
-path = "Slow.fmu"
-rate = 16
-derivatives = {{ {} }}
-[[fmu]]
-name = "fast"
-path = "Fast.fmu"
-[[connection]]
-from = "slow.x"
-to = "fast.F_hand"
-hold = "foh-derivative"
-"""
+DERIVATIVES = (
+    "\n"
+    + fmu_table("slow", "Slow", "rate = 16\nderivatives = {{ {} }}\n")
+    + fmu_table("fast", "Fast")
+    + wire_table("slow.x", "fast.F_hand", 'hold = "foh-derivative"\n')
+)
 
 
 def test_a_scene_says_which_output_is_a_derivative_and_its_ssp_too(tmp_path: Path) -> None:

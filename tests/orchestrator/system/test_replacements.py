@@ -58,7 +58,7 @@ def own_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.fixture(scope="module")
 def own_run(tmp_path_factory: pytest.TempPathFactory) -> hl.Run:
-    return hl.run("closed-loop", SHORT, out=tmp_path_factory.mktemp("run"))
+    return hl.run("closed-loop", SHORT, out=tmp_path_factory.mktemp("run"), figures=False)
 
 
 @pytest.mark.parametrize("block", ["hand", "controller", "haptic_device", "virtual_environment"])
@@ -67,7 +67,7 @@ def test_a_block_s_own_fmu_in_its_place_changes_no_byte(
 ) -> None:
     """Connections, order, rate and timing are those of the block."""
     swap = {**SHORT, "fmu.+": {"replaces": block, "path": str(own_files[block])}}
-    swapped = hl.run("closed-loop", swap, out=tmp_path)
+    swapped = hl.run("closed-loop", swap, out=tmp_path, figures=False)
     assert swapped.run["replaced"] == {block: {"lost": [], "unfed": []}}
     assert swapped.run["connections"] == own_run.run["connections"]
     for table in ("haptics.csv", "graphics.csv"):
@@ -80,7 +80,7 @@ def test_by_one_option_and_what_does_not_meet_is_listed(
     out, file = tmp_path / "run", spring(tmp_path)
     command = ["run", "closed-loop", "--set", "duration=0.2", "--swap", f"controller={file}"]
     command += ["--set", "fmu.controller.start.own=[1.0, 2.0, 3.0]"]  # acts after the swap
-    assert status(*command, "--out", out) == 0
+    assert status(*command, "--no-figures", "--out", out) == 0
     told = capsys.readouterr().out
     run = json.loads((out / "run.json").read_text())
     assert run["replaced"]["controller"]["unfed"] == ["own"]

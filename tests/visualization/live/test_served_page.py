@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import socket
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,16 @@ def test_nothing_is_served_without_the_token_or_beside_the_page(served: Served, 
     found, text = got(served, path.replace("{token}", served.path))
     assert found == 404
     assert "hapticlink" not in text
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_the_token_is_in_no_list_of_processes(served: Served) -> None:
+    """Any user of a machine reads the arguments of all processes."""
+    children = Path(f"/proc/{served.process.pid}/task/{served.process.pid}/children").read_text()
+    assert children.split()
+    for process in (served.process.pid, *children.split()):
+        arguments = Path(f"/proc/{process}/cmdline").read_text()
+        assert served.path.strip("/") not in arguments
 
 
 def test_every_file_of_the_page_is_served(served: Served) -> None:

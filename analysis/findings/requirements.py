@@ -74,7 +74,8 @@ def _contacts(scene: Scene) -> Iterator[Need]:
         return
     found = near(scene.linkage, scene.contacts)
     places = sum(pair.places for pair in found)
-    text = f"{len(found)} pairs, {places} places, detected by {scene.contacts.detection}"
+    pairs = f"{len(found)} pair{'s' * (len(found) != 1)}"
+    text = f"{pairs}, {places} place{'s' * (places != 1)}, detected by {scene.contacts.detection}"
     yield Need("contacts", bool(found), text)
     for pair in out_of_reach(scene.linkage, scene.contacts):
         yield Need(f"{pair.body} on {pair.obstacle}", False, "out of reach: no narrow phase")

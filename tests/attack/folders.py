@@ -1,0 +1,96 @@
+"""Several runs at once into one folder, and some of them killed: whatever the instants, each ends
+with status 0 and its results, is refused at once, or was killed; and what stands in the folder in
+the end is one whole run."""
+
+from __future__ import annotations
+
+import json
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from hapticlink.orchestrator.results import tables
+from tests.attack.cases import Made, command
+
+SCENES = ("pendulum", "closed-loop", "four-bar")
+PATIENCE = 120.0
+"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
+REFUSED = "another run writes there"
+
+
+def _case(out: Path, draw: random.Random, kills: bool) -> tuple[str, str]:
+    begin = time.monotonic()
+    count = draw.choice((2, 3, 4))
+    starts = sorted(draw.uniform(0.0, 2.0) for _ in range(count))
+    processes: list[tuple[str, subprocess.Popen[str]]] = []
+    for start in starts:
+        time.sleep(max(0.0, begin + start - time.monotonic()))
+        scene = draw.choice(SCENES)
+        arguments = ["run", scene, "--set", "duration=0.5", "--out", str(out)]
+        processes.append(
+            (
+                scene,
+                subprocess.Popen(
+                    [sys.executable, "-m", "hapticlink", *arguments],
+                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                ),
+            )
+        )  # fmt: skip
+    if kills:
+        time.sleep(draw.uniform(0.0, 2.0))
+        processes[draw.randrange(count)][1].kill()
+    regular = []
+    for scene, process in processes:
+        try:
+            said = process.communicate(timeout=PATIENCE)[1]
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            return "hung", scene
+        if process.returncode == 0:
+            regular.append(scene)
+        elif process.returncode == 2 and REFUSED in said and "Traceback" not in said:
+            pass
+        elif not (kills and process.returncode == -signal.SIGKILL):
+            return "crashed", f"status {process.returncode}: {said[-400:]}"
+    return _whole(out, regular, kills)
+
+
+def _whole(out: Path, regular: list[str], kills: bool) -> tuple[str, str]:
+    """What stands in the folder; `regular`: the scenes of the runs that ended with status 0."""
+    if not regular and not kills:
+        return "lost", "no run ended with status 0"
+    if not (out / "run.json").exists():
+        return ("told", "") if kills and not regular else ("lost", "no run.json")
+    story = json.loads((out / "run.json").read_text("utf-8"))
+    if story["end"]["reason"] == "running":  # killed: what is there is recovered
+        command = [sys.executable, "-m", "hapticlink", "recover", str(out)]
+        ended = subprocess.run(command, capture_output=True, text=True, check=False)
+        if ended.returncode:
+            return "lost", f"not recovered: {ended.stderr[-300:]}"
+        return "told", ""
+    there, listed = {p.name for p in out.iterdir()}, set(story["files"])
+    if there != listed and not kills:
+        return "lost", f"run.json lists other files: {', '.join(sorted(there ^ listed))}"
+    if tables.load(out).haptics["time"][-1] != story["end"]["time"]:
+        return "lost", "run.json says another end than the rows"
+    return "done", ""
+
+
+def attack(number: int, seed: int) -> Iterator[Made]:
+    """`number` folders, every third with a run that is killed."""
+    for i in range(number):
+        draw, kills = random.Random(f"{seed} {i}"), i % 3 == 2
+        with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+            outcome, wrong = _case(Path(folder) / "out", draw, kills)
+        kind = "at once, one killed" if kills else "at once"
+        yield Made(kind, f"number {i} of seed {seed}", outcome, wrong)
+
+
+if __name__ == "__main__":
+    command("folders", "Several runs at once into one folder.", attack, 60)

@@ -1,0 +1,202 @@
+"""FMUs that behave badly on purpose: of FMI 2.0 and FMI 3.0, in C, in the process of the run or in
+one of their own, in both loops. `hapticlink run` of a scene with such an FMU and one that behaves
+well, which gives to it.
+
+Whatever the FMU does: the command ends with status 1 and a message, or with 0 and a regular end; in
+both cases run.json and the tables say the same, and no file and no process stays behind. An FMU in
+the process of the run may crash it; then the rows are there nevertheless, and run.json names a
+crash. Where it hangs the process of the run, two signals end that. And nothing is believed that is
+wrong: a status that FMI does not define never counts as success, and the other FMU's numbers are
+those of a run without a hostile FMU. _exit(0) of C code in the process of the run, which nobody is
+asked about, and a process that it forks there are left out.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from hapticlink.orchestrator.results import tables
+from tests.attack.cases import Made, command
+from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
+
+PLACES = ("make", "enter", "leave", "set", "get", "step", "save", "restore", "end", "free")
+STATUSES = (
+    *("warning", "discard", "error", "fatal", "pending"),
+    *("minus", "least", "most", "thirtytwo"),
+)
+ACTS = (
+    *STATUSES,
+    *("nan", "inf", "huge", "root", "gone", "upward", "zero", "flush"),
+    *("exit", "exit3", "leave", "abort", "null", "stack", "loop", "sleep", "slow"),
+    *("stdout", "deaf", "locale", "prints", "nothing", "format", "long", "bytes"),
+    *("thread", "child", "term", "int", "umask", "environ"),
+)
+ENDS_THE_PROCESS = ("exit", "exit3", "leave", "abort", "null", "stack", "thread")
+"""The last one where its thread outlives the library that it runs."""
+NEVER_RETURNS = ("loop", "sleep")
+PATIENCE = 90.0
+"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
+BEFORE_SIGNALS = 6.0
+"""Seconds after which a run that an FMU may hang is interrupted, and twice that a second time."""
+ROWS = 33
+MARK = "HAPTICLINK_HOSTILE"
+
+
+class Attack:
+    """Cases in a folder of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.out = folder, folder / "out"
+        self._temporary = folder / "temporary"
+        self._temporary.mkdir()
+        for fmi in ("2", "3"):
+            (folder / fmi).mkdir()
+            hostile_fmu(folder / fmi, fmi)
+        good = hostile_scene(folder / "2", "good_none_0")
+        status, said = self._ended(good, "compiled", patience=PATIENCE)
+        assert status == 0, said
+        table = tables.load(self.out).haptics
+        self._source = [table[f"source.{port}"].tolist() for port in ("y", "slope")]
+
+    def made(self, fmi: str, place: str, act: str, step: int, keys: str, loop: str) -> list[str]:
+        """What was wrong, after an outcome."""
+        isolated = "isolate" in keys
+        name = f"{place}_{act}_{step}"
+        scene = hostile_scene(self.folder / fmi, name, keys)
+        hangs = act in NEVER_RETURNS and not isolated
+        status, said = self._ended(scene, loop, BEFORE_SIGNALS if hangs else PATIENCE)
+        if status is None:
+            return ["hung", said[-300:]]
+        crash = not isolated and act in ENDS_THE_PROCESS
+        if not crash and (status not in (0, 1) or "Traceback" in said or "Fatal Python" in said):
+            return ["crashed", f"status {status}: {said[-400:]}"]
+        if act == "exit" and crash and status == 0:
+            return ["believed", "exit(0) of an FMU was a success"]
+        if wrong := [*self._untrue(status, said, crash), *self._left()]:
+            return ["lost", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"]
+        if wrong := [*self._believed(place, act, status)]:
+            return ["believed", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"]
+        return ["done" if status == 0 else "told", ""]
+
+    def _ended(self, scene: Path, loop: str, patience: float) -> tuple[int | None, str]:
+        """Status and what was said; after `patience` (s) a signal, later another, then None."""
+        subprocess.run(["rm", "-rf", str(self.out)], check=True)
+        environment = os.environ | {
+            "TMPDIR": str(self._temporary),
+            "HAPTICLINK_LOOP": "python" if loop == "python" else "",
+            MARK: str(self.folder),
+        }
+        arguments = ["run", str(scene), "--out", str(self.out), "--no-figures"]
+        with (self.folder / "said.txt").open("w+b") as said:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "hapticlink", *arguments, "--set", "faults.timeout=3"],
+                stdout=said, stderr=said, env=environment, cwd=self.folder,
+                start_new_session=True,
+            )  # fmt: skip
+            status: int | None = None
+            for _ in range(3):
+                try:
+                    status = process.wait(patience)
+                    break
+                except subprocess.TimeoutExpired:
+                    os.killpg(process.pid, signal.SIGINT)
+            if status is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+            said.seek(0)
+            return status, said.read().decode(errors="replace")
+
+    def _untrue(self, status: int, said: str, crash: bool) -> Iterator[str]:
+        story = self.out / "run.json"
+        if not story.exists():
+            if status == 0:
+                yield "status 0 without run.json"
+            return
+        until = time.monotonic() + 20.0
+        while True:  # the watchdog may still be at work
+            run = json.loads(story.read_text("utf-8"))
+            if not crash or run["end"]["reason"] != "running" or time.monotonic() > until:
+                break
+            time.sleep(0.05)
+        if run["end"]["reason"] == "running":
+            yield "run.json has no end"
+            return
+        printed = "Bad file descriptor" not in said  # of an FMU that has closed the output
+        if (status == 0) != (run["end"]["reason"] == "duration") and not crash and printed:
+            yield f"run.json says {run['end']['reason']}"
+        times = tables.load(self.out).haptics["time"]
+        if len(times) and abs(times[-1] - run["end"]["time"]) > 1e-12:
+            yield f"rows until {times[-1]} s, run.json until {run['end']['time']} s"
+        if status == 0 and len(times) != ROWS:
+            yield f"{len(times)} rows"
+
+    def _left(self) -> Iterator[str]:
+        until = time.monotonic() + 15.0
+        while (processes := self._processes()) and time.monotonic() < until:
+            time.sleep(0.05)
+        if processes:
+            yield f"processes {', '.join(processes)}"
+            for process in processes:
+                os.kill(int(process), signal.SIGKILL)
+        if names := [p.name for p in self._temporary.iterdir()]:
+            yield f"temporary {', '.join(names)}"
+            subprocess.run(["rm", "-rf", *map(str, self._temporary.iterdir())], check=True)
+        if self.out.exists() and (hidden := [p.name for p in self.out.glob(".*")]):
+            yield f"files {', '.join(hidden)}"
+
+    def _processes(self) -> list[str]:
+        found = []
+        for path in Path("/proc").glob("[0-9]*/environ"):
+            try:
+                if f"{MARK}={self.folder}".encode() in path.read_bytes().split(b"\0"):
+                    found.append(path.parent.name)
+            except OSError:  # gone, or somebody else's
+                continue
+        return found
+
+    def _believed(self, place: str, act: str, status: int) -> Iterator[str]:
+        called = place in ("make", "enter", "leave", "set", "get", "step", "end")
+        if called and act in STATUSES and act != "warning" and status == 0:
+            yield f"{act} from {place} was a success"
+        if not (self.out / "run.json").exists():
+            return
+        table = tables.load(self.out).haptics
+        for port, good in zip(("y", "slope"), self._source, strict=True):
+            numbers = table[f"source.{port}"].tolist()
+            if numbers != good[: len(numbers)]:
+                yield f"source.{port} has other numbers"
+
+
+def attack(number: int, seed: int) -> Iterator[Made]:
+    """`number` FMUs, by seed."""
+    with tempfile.TemporaryDirectory(prefix="attack-") as name:
+        made = Attack(Path(name))
+        for i in range(number):
+            draw = random.Random(f"{seed} {i}")
+            fmi, act = draw.choice("23"), ACTS[i % len(ACTS)]
+            place = draw.choice((*PLACES, "step", "step", "step"))
+            keys = draw.choice(("", "isolate = true"))
+            loop = draw.choice(("compiled", "python"))
+            step = draw.randrange(1, 30)
+            if act in ("leave", "child"):
+                keys = "isolate = true"
+            case = (fmi, place, act, step, keys, loop)
+            outcome, wrong = made.made(*case)
+            yield Made(
+                f"FMI {fmi}.0, {'isolated' if keys else 'in process'}", str(case), outcome, wrong
+            )
+
+
+OUTCOMES = ("done", "told", "lost", "crashed", "hung", "believed")
+
+if __name__ == "__main__":
+    command("hostile", "FMUs that behave badly.", attack, 300, OUTCOMES)

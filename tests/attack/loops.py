@@ -1,0 +1,140 @@
+"""Random scenes on both event loops: the tables of the compiled loop have the bytes of Python's,
+and a run that faults ends in both with the same words. A part of them runs with the C of the loop
+compiled by gcc with its address and undefined-behaviour sanitizers, which report nothing.
+
+python -m tests.attack.loops --cases 300
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from hapticlink.orchestrator.run.compiled import build
+from hapticlink.orchestrator.scene import find_scene
+from tests.attack import mutations
+from tests.attack.c_interface import UNDEFINED, _address_library, can_sanitize
+from tests.attack.cases import Made, command
+from tests.attack.scenes import written
+
+PATIENCE = 300.0
+"""Seconds for the scenes of one process, on a machine that is busy with other things."""
+AT_A_TIME = 10
+"""Scenes that a process runs."""
+HOLDS = ("zoh", "foh", "lead", "second-order", "delayed", "smooth", "mean", "passive", "slope")
+RUNS = """
+import json, os, sys
+if sys.argv[2]:
+    from hapticlink.orchestrator.run.compiled import build
+    build.name = lambda: sys.argv[2] + "/loop.so"
+import hapticlink as hl
+from hapticlink.orchestrator.base.faults import Fault
+for scene in json.loads(sys.argv[1]):
+    for loop in sys.argv[3:]:
+        os.environ["HAPTICLINK_LOOP"] = loop
+        try:
+            made = hl.run(scene)
+            tables = {name: table.rows.tobytes().hex() for name, table in made.tables.items()}
+            end = made.run["end"], made.run["fault"] and made.run["fault"]["message"]
+            print(json.dumps([hash(json.dumps([tables, end])), end]), flush=True)
+        except Fault as refused:
+            print(json.dumps([0, f"refused: {refused}"[:300]]), flush=True)
+"""
+
+
+def scenes(number: int, seed: int, folder: Path) -> Iterator[Path]:
+    """Shipped scenes with numbers near theirs, other rates and other holds."""
+    names = [*find_scene.shipped()]
+    for i in range(number):
+        draw = random.Random(f"{seed} {i}")
+        tables: Any = tomllib.loads(find_scene.find(draw.choice(names))[1])
+        tables["duration"] = draw.choice((0.05, 0.1, 0.2))
+        for path in draw.sample([*mutations.places(tables)], 2):
+            old = mutations.at(tables, path)
+            if isinstance(old, float):
+                mutations.at(tables, path[:-1])[path[-1]] = old * draw.uniform(0.9, 1.1)
+        for key, values in {
+            "hold": HOLDS,
+            "coupling": ("jacobi", "gauss-seidel", "gauss-seidel-plants"),
+            "isolate": (True, False),
+        }.items():
+            if draw.random() < 0.25:
+                tables[key] = draw.choice(values)
+        if draw.random() < 0.5 and "graphics" in tables:
+            tables["graphics"]["rate"] = draw.choice((10, 24, 30, 60, "100/3"))
+        path = folder / f"scene{i}.toml"
+        path.write_text(written(tables))
+        yield path
+
+
+def _answers(paths: list[Path], library: str, loops: tuple[str, ...]) -> tuple[list[Any], str]:
+    environment = os.environ | {"PYTHONHASHSEED": "0"}
+    if library:
+        environment |= {
+            "LD_PRELOAD": _address_library(),
+            "ASAN_OPTIONS": "detect_leaks=0",
+            "PYTHONMALLOC": "malloc",
+            "HAPTICLINK_PURE_PYTHON": "1",  # CasADi's interpolants do not load beside sanitizers
+        }
+    arguments = [json.dumps([str(path) for path in paths]), library, *loops]
+    try:
+        ended = subprocess.run(
+            [sys.executable, "-c", RUNS, *arguments],
+            env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return [], "hung"
+    lines = [json.loads(line) for line in ended.stdout.splitlines() if line.startswith("[")]
+    return lines, "" if ended.returncode == 0 else f"{ended.returncode}: {ended.stderr[-600:]}"
+
+
+def sanitized(folder: Path) -> str:
+    """The folder of the loop compiled with sanitizers."""
+    place = folder / "sanitized"
+    place.mkdir()
+    flags = (*UNDEFINED, "-fsanitize=address", "-fno-sanitize-recover=all", "-O1")
+    build.compile_loop(place / "loop.so", ["gcc", *flags])
+    return str(place)
+
+
+def attack(number: int, seed: int) -> Iterator[Made]:
+    """`number` scenes on both loops; where gcc has sanitizers, a third of them with these, too."""
+    with tempfile.TemporaryDirectory(prefix="attack-") as name:
+        folder = Path(name)
+        library = sanitized(folder) if can_sanitize() else ""
+        every = [*scenes(number, seed, folder)]
+        for i in range(0, number, AT_A_TIME):
+            paths = every[i : i + AT_A_TIME]
+            lines, wrong = _answers(paths, "", ("", "python"))
+            for k, path in enumerate(paths):
+                pair = lines[2 * k : 2 * k + 2]
+                outcome = "crashed" if len(pair) < 2 else _judged(*pair)
+                said = wrong or str(pair)
+                yield Made("both loops", f"{path.name} of seed {seed}", outcome, said)
+            if library and i // AT_A_TIME % 3 == 0:
+                lines, wrong = _answers(paths, library, ("",))
+                for k, path in enumerate(paths):
+                    outcome = "crashed" if k >= len(lines) else _judged(lines[k], lines[k])
+                    yield Made("sanitizers", f"{path.name} of seed {seed}", outcome, wrong)
+
+
+def _judged(compiled: Any, python: Any) -> str:
+    if compiled != python:
+        return "believed"  # one of them is wrong
+    if str(compiled[1]).startswith("refused"):
+        return "refused"
+    return "told" if compiled[1][1] else "done"
+
+
+OUTCOMES = ("done", "refused", "told", "lost", "crashed", "hung", "believed")
+
+if __name__ == "__main__":
+    command("loops", "Random scenes on both loops.", attack, 300, OUTCOMES)

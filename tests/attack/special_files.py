@@ -1,0 +1,102 @@
+"""Folders of runs in which something is no regular file, has no end, or nests without end; every
+command that reads such a folder, or writes a run to it."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import socket
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from tests.attack.cases import Made, command
+from tests.attack.commands import CRASHED, Place
+
+NAMES = ("run.json", "haptics.csv", "plan.txt", "haptics.rows", "new")
+COMMANDS = ("run", "report", "compare", "recover", "export", "sweep")
+
+
+def _socket(path: Path) -> None:
+    here = os.getcwd()
+    os.chdir(path.parent)  # its address has 108 characters at most
+    try:
+        with socket.socket(socket.AF_UNIX) as made:
+            made.bind(path.name)
+    finally:
+        os.chdir(here)
+
+
+def _listing(path: Path) -> None:
+    story = path.parent / "run.json"
+    if story.is_file():
+        content = json.loads(story.read_text())
+        content["files"] += [path.name, "..", "/etc/passwd", "a\0b", 7, None, "x" * 300]
+        story.write_text(json.dumps(content))
+    path.mkdir(exist_ok=True)
+
+
+KINDS: dict[str, Callable[[Path], object]] = {
+    "a pipe": os.mkfifo,
+    "a folder": Path.mkdir,
+    "a folder that is listed": _listing,
+    "a link to /dev/zero": lambda path: path.symlink_to("/dev/zero"),
+    "a link to /dev/full": lambda path: path.symlink_to("/dev/full"),
+    "a link to /dev/null": lambda path: path.symlink_to("/dev/null"),
+    "a link to itself": lambda path: path.symlink_to(path.name),
+    "a socket": _socket,
+    "brackets": lambda path: path.write_text("[" * 100_000),
+    "one line": lambda path: path.write_text("x" * 2_000_000),
+    "no text": lambda path: path.write_bytes(bytes(range(256)) * 40),
+}
+
+
+def _arguments(name: str, out: Path, elsewhere: Path) -> list[str]:
+    if name == "run":
+        return ["run", "pendulum", "--set", "duration=0.1", "--no-figures", "--out", str(out)]
+    if name == "sweep":
+        values = ["--vary", "duration=0.01,0.02", "--jobs", "1"]
+        return ["sweep", "pendulum", *values, "--out", str(out)]
+    if name == "export":
+        return ["view", str(out), "--export", str(elsewhere / "replay.html")]
+    if name == "report":
+        return ["report", str(out), "--out", str(elsewhere / "report.html")]
+    return [name, str(out), *([str(out)] if name == "compare" else [])]
+
+
+def attack(number: int, seed: int) -> Iterator[Made]:
+    """`number` folders, the kinds in turn."""
+    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+        place = Place(Path(folder))
+        elsewhere = Path(folder) / "elsewhere"
+        elsewhere.mkdir()
+        for i in range(number):
+            draw, kind = random.Random(f"{seed} {i}"), [*KINDS][i % len(KINDS)]
+            shutil.rmtree(place.out, ignore_errors=True)
+            shutil.copytree(place.folder / "earlier", place.out)
+            spoiled = place.out / draw.choice(NAMES)
+            if kind != "a folder that is listed" or spoiled.name != "run.json":
+                spoiled.unlink(missing_ok=True)
+                KINDS[kind](spoiled)
+            name = draw.choice(COMMANDS)
+            status, said = place.forked(_arguments(name, place.out, elsewhere))
+            yield Made(kind, f"{name}, {spoiled.name}", *_judged(place, status, said))
+
+
+def _judged(place: Place, status: int | None, said: str) -> tuple[str, str]:
+    if status is None or -status in (signal.SIGXCPU, signal.SIGKILL):
+        return "hung", said[-300:]
+    if status not in (0, 1, 2) or any(mark in said for mark in CRASHED):
+        return "crashed", f"status {status}: {said[-400:]}{place.reports()}"
+    if status and "hapticlink: " not in said:
+        return "crashed", f"status {status} without a word: {said[-300:]}"
+    if left := place.left():
+        return "lost", f"temporary {', '.join(left)}: {said[-300:]}"
+    return ("done", "told", "refused")[status], ""
+
+
+if __name__ == "__main__":
+    command("special_files", "Results that are no regular files.", attack, 300)

@@ -1,0 +1,15 @@
+"""Settings of the tests of co-simulation."""
+
+from contextlib import nullcontext
+
+import pytest
+
+from hapticlink.orchestrator.run import crash_monitor
+
+
+@pytest.fixture(autouse=True)
+def crash_monitor_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs in the process of the tests start no watchdog, which acts only where that process
+    crashes. The tests of run/test_faults.py and run/test_interrupt.py, which have it, replace
+    this fixture."""
+    monkeypatch.setattr(crash_monitor, "watched", lambda folder: nullcontext())

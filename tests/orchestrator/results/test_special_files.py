@@ -1,0 +1,97 @@
+"""Results of an earlier run that are no files, or have no end: a run replaces them, and what reads
+them refuses them at once."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results.recover import recover
+from tests.shared_fixtures import status
+
+resource = pytest.importorskip("resource")
+
+
+def fifo(out: Path) -> None:
+    (out / "run.json").unlink()
+    os.mkfifo(out / "run.json")
+
+
+def endless(out: Path) -> None:
+    (out / "haptics.csv").unlink()
+    (out / "haptics.csv").symlink_to("/dev/zero")
+
+
+def endless_rows(out: Path) -> None:
+    (out / "haptics.csv").unlink()
+    (out / "haptics.rows").symlink_to("/dev/zero")
+
+
+def brackets(out: Path) -> None:
+    (out / "run.json").write_text("[" * 100_000)
+
+
+def folder_in_the_list(out: Path) -> None:
+    (out / "kept").mkdir()
+    story = json.loads((out / "run.json").read_text())
+    story["files"] += ["kept", "..", "/etc/passwd", 7, "no\0name"]
+    (out / "run.json").write_text(json.dumps(story))
+
+
+def one_line(out: Path) -> None:
+    (out / "haptics.csv").unlink()
+    (out / "haptics.rows").write_text("x" * 2_000_000)
+
+
+def folder_as_story(out: Path) -> None:
+    (out / "run.json").unlink()
+    (out / "run.json").mkdir()
+
+
+def endless_story(out: Path) -> None:
+    (out / "run.json").unlink()
+    (out / "run.json").symlink_to("/dev/zero")
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    hl.run("pendulum", {"duration": 0.05}, out=tmp_path / "out", figures=False)
+    return tmp_path / "out"
+
+
+@pytest.mark.parametrize("spoil", [fifo, endless, brackets, folder_in_the_list, endless_story])
+def test_a_run_replaces_them(out: Path, spoil: Callable[[Path], None]) -> None:
+    spoil(out)
+    assert status("run", "pendulum", "--set", "duration=0.1", "--out", out, "--no-figures") == 0
+    assert tables.load(out).haptics["time"][-1] == pytest.approx(0.1, abs=2e-3)
+
+
+def test_a_folder_in_the_place_of_run_json_is_told(
+    out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder_as_story(out)
+    assert status("run", "pendulum", "--out", out, "--no-figures") != 0
+    assert "it is no file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "spoil", [fifo, endless, endless_rows, one_line, brackets, folder_as_story, endless_story]
+)
+def test_what_reads_them_refuses_them(out: Path, spoil: Callable[[Path], None]) -> None:
+    spoil(out)
+    for read in (tables.load, hl.load):
+        with pytest.raises(InputFault, match=str(out)):
+            read(out)
+    for command in ("report", "compare", "view", "recover"):
+        arguments = [command, out, *([out] if command == "compare" else [])]
+        assert status(*arguments) == 2 or (spoil is endless and command == "recover")
+    if spoil is not endless:
+        with pytest.raises(InputFault):
+            recover(out)
