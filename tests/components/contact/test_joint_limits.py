@@ -62,6 +62,14 @@ def test_a_joint_turns_back_with_the_energy_of_its_restitution(restitution):
     assert later[1] == pytest.approx(2.0 * restitution**2, rel=2e-4)
 
 
+def test_a_damping_that_is_given_acts_as_that_of_its_restitution():
+    """b = 2 z sqrt(k I), I = 1/3 kg.m2 of the rod about its pivot."""
+    ends = {"lower": -0.2, "upper": 0.3, "stiffness": 2000.0}
+    laws = {"restitution": 0.5}, {"damping": 2 * damping_ratio(0.5) * math.sqrt(2000.0 / 3)}
+    turned, damped = (state_after(running(arm(Limits(**ends, **law))), 1000, 0.3) for law in laws)
+    assert damped == pytest.approx(turned, rel=1e-9)
+
+
 @pytest.mark.parametrize("integrator", ["heun", "rk4"])
 def test_a_turn_at_a_limit_has_the_order_of_the_method(integrator):
     limits = Limits(upper=0.3, stiffness=2000.0, restitution=0.6)
