@@ -45,7 +45,7 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
     found = {}
     for name in run["rates"]:
         table = folder / f"{name}.csv"
-        if (source := table.with_suffix(rows.SUFFIX)).exists():
+        if (source := table.with_suffix(rows.SUFFIX)).is_file():
             lost = rows.torn(source)
             _, kept = rows.read(source)
             found[name] = Recovered(make_csv(table), float(kept[-1, 0]), lost)

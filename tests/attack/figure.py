@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from tests.attack.cases import FOLDER
 
 NAMES = (
+    "signals_of_commands",
     *("scenes", "options", "ssps", "archives", "c_interface", "signals"),
-    *("hostile", "folders", "special_files", "plugins", "misuse", "loops"),
+    *("hostile", "folders", "special_files", "plugins", "misuse"),
 )
 ENDS = {
     "done": "#0077bb",
@@ -34,7 +35,7 @@ def counts(name: str) -> dict[str, int]:
 
 
 def figure() -> Figure:
-    drawn = Figure(figsize=(7.5, 3.2), layout="constrained")
+    drawn = Figure(figsize=(7.5, 5.0), layout="constrained")
     axes = drawn.add_subplot()
     found = {name: counts(name) for name in NAMES}
     left = dict.fromkeys(NAMES, 0.0)
@@ -44,9 +45,8 @@ def figure() -> Figure:
         left = {name: left[name] + share for name, share in zip(NAMES, shares, strict=True)}
     bad = sum(cases[end] for cases in found.values() for end in BAD)
     total = sum(sum(cases.values()) for cases in found.values())
-    axes.set_title(
-        f"{bad} of {total:,} cases lost results, crashed, hung or were believed", fontsize="medium"
-    )
+    title = f"{bad} of {total:,} cases lost results, crashed, hung or were believed"
+    axes.set_title(title, fontsize="medium")
     axes.set(xlabel="cases (%)", xlim=(0, 100))
     axes.invert_yaxis()
     drawn.legend(loc="outside right upper", fontsize="small")

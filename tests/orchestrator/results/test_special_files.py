@@ -95,3 +95,9 @@ def test_what_reads_them_refuses_them(out: Path, spoil: Callable[[Path], None]) 
     if spoil is not endless:
         with pytest.raises(InputFault):
             recover(out)
+
+
+def test_rows_that_are_a_pipe_beside_a_table_hang_nothing(out: Path) -> None:
+    os.mkfifo(out / "haptics.rows")
+    assert recover(out) == {}
+    assert status("recover", out) == 0
