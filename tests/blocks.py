@@ -103,6 +103,19 @@ class Running:
             self.t += part
 
 
+def advance(block, t_end, rate=500):
+    """`block` after steps at a rate (Hz) over t_end."""
+    for _ in range(round(t_end * rate)):
+        block.step(1 / rate)
+    return block
+
+
+def state_after(block, rate, t_end):
+    """The coordinates and velocities after these steps."""
+    state = advance(block, t_end, rate).state
+    return np.concatenate([state["q"], state["qd"]])
+
+
 def _on_own_memory(function):
     """`function` of flat arrays, as a call that costs no conversion."""
     arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]

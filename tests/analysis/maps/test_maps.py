@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def wall(folder: Path) -> hl.Map:
-    return hl.stability_map("virtual-wall", VARY, WALL, out=folder, check=4, seed=2, jobs=2)
+    return hl.stability_map("virtual-wall", VARY, WALL, out=folder, check=4, seed=2, jobs=1)
 
 
 def test_the_boundary_is_that_of_the_closed_form(wall: hl.Map) -> None:

@@ -86,16 +86,16 @@ def test_the_exponent_of_scalars_is_their_mean_logarithm() -> None:
 
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 def test_a_rate_that_varies_is_judged_by_the_frames_that_it_draws(hold: str) -> None:
-    """A frame of 16 ticks, after one of 16, is what 32 Hz repeats."""
-    varying = HELD | {"hold": hold, "graphics.rate": {"min": 30, "max": 32, "seed": 0}}
-    varying["duration"] = 1 / 512  # in which frames of 17 ticks alone are drawn
+    """A frame of 4 ticks, after one of 4, is what 128 Hz repeats."""
+    varying = HELD | {"hold": hold, "graphics.rate": {"min": 102, "max": 128, "seed": 0}}
+    varying["duration"] = 1 / 512  # in which frames of 5 ticks alone are drawn
     found = hl.stability("closed-loop-direct", varying)
-    fixed = hl.stability("closed-loop-direct", HELD | {"hold": hold, "graphics.rate": 32})
+    fixed = hl.stability("closed-loop-direct", HELD | {"hold": hold, "graphics.rate": 128})
     assert isinstance(found, hl.VaryingStability)
-    assert found.frames == (16, 17)
+    assert found.frames == (4, 5)
     assert found.bounds.lower >= fixed.radius - 1e-6
     assert found.bounds.upper >= found.bounds.lower
-    assert math.log(found.second_moment) / 2 >= found.exponent * 16 / 512 - 0.01
+    assert math.log(found.second_moment) / 2 >= found.exponent * 4 / 512 - 0.01
 
 
 def test_frames_of_a_hold_that_keeps_lengths_are_those_of_its_equations() -> None:

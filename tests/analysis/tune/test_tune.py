@@ -208,22 +208,22 @@ def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
     """From 0.1 mm off rest: with all gains at 0.9 of the margin the handle comes to rest in every
     pose, in a firm grip, at 1.1 of it in one it does not."""
     found = recorded(name)
-    late: dict[float, list[float]] = {0.9: [], 1.1: []}
-    for pose in poses(found):
+
+    def late(pose: Pose, share: float) -> float:
         off = (pose.point[0] + 1e-4, *pose.point[1:])
-        for share, left in late.items():
-            options = [
-                *gains(found, found["margins"]["tuned"] * share),
-                *pose.options(()),
-                *written({"hand": spring(off, pose.press, FIRM)}),
-                "duration=2.0",
-                *NO_ENCODER,
-            ]
-            run = hl.run(RECORDED / name / "tuned.toml", options, figures=False)
-            speed = np.abs(run["haptic_device.v_true"])
-            left.append(np.inf if run.fault else speed[-256:].max() / speed.max())
-    assert max(late[0.9]) < 0.2
-    assert max(late[1.1]) > 0.5
+        options = [
+            *gains(found, found["margins"]["tuned"] * share),
+            *pose.options(()),
+            *written({"hand": spring(off, pose.press, FIRM)}),
+            "duration=2.0",
+            *NO_ENCODER,
+        ]
+        run = hl.run(RECORDED / name / "tuned.toml", options, figures=False)
+        speed = np.abs(run["haptic_device.v_true"])
+        return np.inf if run.fault else float(speed[-256:].max() / speed.max())
+
+    assert max(late(pose, 0.9) for pose in poses(found)) < 0.2
+    assert any(late(pose, 1.1) > 0.5 for pose in poses(found))
 
 
 def test_rest_is_found_with_gains_that_are_unstable_there() -> None:

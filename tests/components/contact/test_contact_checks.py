@@ -10,6 +10,7 @@ from hapticlink.components.contact.depth import depths, middle, overlaps
 from hapticlink.components.contact.stiffness import STABLE, poles, sticking_poles
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
 from hapticlink.components.specs.linkage import Body
+from tests.blocks import advance
 from tests.components.contact import test_moving_bodies as moving
 from tests.components.contact.test_contact import FLOOR, R, block, loose
 from tests.components.contact.test_moving_bodies import disc, free
@@ -84,7 +85,7 @@ def test_a_light_disc_rolls_without_slip_only_where_sticking_is_slow_enough(mass
     assert next(poles(linkage, Contacts(**law)))[1] * h < 1
     found, slip = moving.block(linkage, law), 0.0
     found.set(F_hand=(0.2 * mass * 9.81, 0.0, 0.0))
-    moving.steps(found, 1000, 0.8)
+    advance(found, 0.8, 1000)
     for _ in range(100):
         found.step(h)
         slip = max(slip, abs(found.state["qd"] @ (1.0, 0.0, radius)))

@@ -15,7 +15,7 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running, virtual_environment, virtual_mechanism
+from tests.blocks import Running, advance, virtual_environment, virtual_mechanism
 from tests.components.contact import piecewise
 
 MASS, INERTIA, G, R, LENGTH, K = 2.0, 0.03, 9.81, 0.05, 0.4, 15000.0
@@ -48,43 +48,37 @@ def running(linkage, friction, events=1, **contacts):
     )
 
 
-def steps(block, t_end, rate=500):
-    for _ in range(round(t_end * rate)):
-        block.step(1 / rate)
-    return block
-
-
 def test_a_bar_below_the_friction_angle_stays_for_a_minute():
     """tan(slope) = .42 against .5; once it has settled on its springs it does not creep."""
-    bar = steps(running(body(BAR, 0.4), 0.5), 5.0)
+    bar = advance(running(body(BAR, 0.4), 0.5), 5.0)
     before = bar.state["q"]
     assert bar.y["x"][1] == pytest.approx(R - MASS * G * math.cos(0.4) / (2 * K), abs=1e-9)
     for _ in range(60):
-        assert np.abs(steps(bar, 1.0).state["q"] - before).max() < 1e-9
+        assert np.abs(advance(bar, 1.0).state["q"] - before).max() < 1e-9
 
 
 def test_the_hand_feels_friction():
     """Contacts at rest bear the whole weight, along the floor too."""
-    bar = steps(running(body(BAR, 0.4), 0.5), 5.0)
+    bar = advance(running(body(BAR, 0.4), 0.5), 5.0)
     weight = MASS * G * np.array([math.sin(0.4), -math.cos(0.4), 0.0])
     np.testing.assert_allclose(bar.y["F_env"], -weight, atol=1e-6)
 
 
 def test_a_bar_above_the_friction_angle_slides():
     """a = g (sin - mu cos)."""
-    bar = steps(running(body(BAR, 0.6), 0.4), 2.0)
+    bar = advance(running(body(BAR, 0.6), 0.4), 2.0)
     before = bar.state["qd"][0]
     a = G * (math.sin(0.6) - 0.4 * math.cos(0.6))
-    assert steps(bar, 1.0).state["qd"][0] - before == pytest.approx(a, rel=1e-6)
+    assert advance(bar, 1.0).state["qd"][0] - before == pytest.approx(a, rel=1e-6)
 
 
 @pytest.mark.parametrize(("friction", "slips"), [(0.5, False), (0.1, True)])
 def test_a_disc_rolls_or_slips_down_a_slope(friction, slips):
     """a = g sin/(1 + I/(m r^2)) where friction can hold the rim, g (sin - mu cos) where not."""
     inertia = 0.5 * MASS * R**2
-    disc = steps(running(body(DISC, 0.5, inertia), friction), 2.0)
+    disc = advance(running(body(DISC, 0.5, inertia), friction), 2.0)
     before = disc.state["qd"]
-    change = steps(disc, 1.0).state["qd"] - before
+    change = advance(disc, 1.0).state["qd"] - before
     a = G * math.sin(0.5) / 1.5
     turned = -a / R
     if slips:
@@ -96,7 +90,7 @@ def test_a_disc_rolls_or_slips_down_a_slope(friction, slips):
 
 def test_a_thrown_bar_stops_where_its_energy_is_spent():
     """x = v^2/(2 mu g)."""
-    bar = steps(running(body(BAR, 0.0, speed=1.0), 0.3), 2.0)
+    bar = advance(running(body(BAR, 0.0, speed=1.0), 0.3), 2.0)
     assert bar.state["q"][0] == pytest.approx(1 / (2 * 0.3 * G), abs=1e-3)
     assert np.abs(bar.state["qd"]).max() < 1e-6
 
@@ -114,8 +108,8 @@ def test_geometry_of_the_graphics_block_gives_the_same_friction():
     held.set(contacts=copy.y["contacts"])
     assert abs(here.y["F_env"][0]) > 1.0
     np.testing.assert_allclose(held.y["F_env"], here.y["F_env"], rtol=1e-12)
-    steps(here, 0.01)
-    steps(held, 0.01)
+    advance(here, 0.01)
+    advance(held, 0.01)
     np.testing.assert_allclose(held.x, here.x, atol=1e-12)
 
 
@@ -149,7 +143,7 @@ def test_an_impact_with_friction_has_the_order_of_the_method():
     for rate in rates:
         bar = running(body(BAR, 0.0), mu, events=2, damping=b)
         bar.put(q=(0.0, R + 0.0123, 0.0), qd=start[3:])
-        y = steps(bar, t_end, rate).y
+        y = advance(bar, t_end, rate).y
         errors.append(np.abs(np.r_[y["x"], y["v"]] - exact).max())
     assert -np.polyfit(np.log(rates), np.log(errors), 1)[0] > 3.5
     assert errors[1] < 1e-4
@@ -173,6 +167,8 @@ def test_a_change_from_sliding_to_sticking_is_of_second_order():
     damped = omega * math.sqrt(1 - zeta**2)
     exact = -d * omega**2 / damped * math.exp(-zeta * omega * t) * math.sin(damped * t)
     rates = (500, 1000, 2000, 4000, 8000)
-    errors = [abs(steps(running(block, mu), t_end, rate).state["qd"][0] - exact) for rate in rates]
+    errors = [
+        abs(advance(running(block, mu), t_end, rate).state["qd"][0] - exact) for rate in rates
+    ]
     assert 1.7 < -np.polyfit(np.log(rates), np.log(errors), 1)[0] < 2.5
     assert errors[1] < 5e-6

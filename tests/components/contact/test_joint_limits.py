@@ -16,7 +16,7 @@ from hapticlink.components.specs.linkage import (
     OperationalPoint,
 )
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, virtual_mechanism
+from tests.blocks import Running, state_after, virtual_mechanism
 from tests.components import appendix_a
 from tests.components.contact import piecewise
 from tests.mechanisms import TABLE_6_1, five_bar
@@ -24,12 +24,6 @@ from tests.mechanisms import TABLE_6_1, five_bar
 
 def running(linkage, **settings):
     return Running(virtual_mechanism(linkage, Mechanism(**settings), step_s=1e-3))
-
-
-def steps(block, rate, t_end):
-    for _ in range(round(t_end * rate)):
-        block.step(1 / rate)
-    return np.concatenate([block.state["q"], block.state["qd"]])
 
 
 def arm(limits, **linkage):
@@ -62,10 +56,18 @@ def test_a_joint_turns_back_with_the_energy_of_its_restitution(restitution):
     limits = Limits(lower=-0.2, upper=0.3, stiffness=2000.0, restitution=restitution)
     block = running(arm(limits))
     before = block.y["energy"]
-    assert steps(block, 1000, 0.3)[1] == pytest.approx(-2.0 * restitution, rel=1e-4)
+    assert state_after(block, 1000, 0.3)[1] == pytest.approx(-2.0 * restitution, rel=1e-4)
     assert block.y["energy"] == pytest.approx(restitution**2 * before, rel=2e-4)
-    later = steps(block, 1000, 0.6 / (2.0 * restitution))  # at the other end
+    later = state_after(block, 1000, 0.6 / (2.0 * restitution))  # at the other end
     assert later[1] == pytest.approx(2.0 * restitution**2, rel=2e-4)
+
+
+def test_a_damping_that_is_given_acts_as_that_of_its_restitution():
+    """b = 2 z sqrt(k I), I = 1/3 kg.m2 of the rod about its pivot."""
+    ends = {"lower": -0.2, "upper": 0.3, "stiffness": 2000.0}
+    laws = {"restitution": 0.5}, {"damping": 2 * damping_ratio(0.5) * math.sqrt(2000.0 / 3)}
+    turned, damped = (state_after(running(arm(Limits(**ends, **law))), 1000, 0.3) for law in laws)
+    assert damped == pytest.approx(turned, rel=1e-9)
 
 
 @pytest.mark.parametrize("integrator", ["heun", "rk4"])
@@ -77,7 +79,7 @@ def test_a_turn_at_a_limit_has_the_order_of_the_method(integrator):
         found = []
         for share in np.linspace(0, 1, 5)[:-1]:
             block.put(q=0.1 + 2.0 * share / rate, qd=2.0)
-            found.append(steps(block, rate, 0.25)[1] + 1.2)
+            found.append(state_after(block, rate, 0.25)[1] + 1.2)
         errors.append(np.abs(found).max())
     order = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
     assert order > {"heun": 1.7, "rk4": 3.7}[integrator]
@@ -87,7 +89,7 @@ def test_a_joint_comes_to_rest_on_its_limit():
     """m g l/2 = k (c_lower - c) for a rod that leans on its lower limit, horizontal."""
     limits = Limits(lower=0.0, stiffness=500.0, restitution=0.3)
     block = running(replace(arm(limits, gravity=(0.0, -9.81)), start_velocity={}))
-    q, qd = steps(block, 500, 3.0)
+    q, qd = state_after(block, 500, 3.0)
     assert q == pytest.approx(-9.81 * 0.5 * math.cos(q) / 500.0, abs=1e-9)
     assert abs(qd) < 1e-9
     turned = 1.5 * 9.81 * math.cos(q)  # what the hand feels of it holds the rod
@@ -128,7 +130,7 @@ def test_limits_in_a_loop_against_appendix_a(joint):
     start = Running(virtual_mechanism(linkage, Mechanism(), step_s=1e-3)).state["q"]
     free = running(linkage)
     free.set(F_hand=WRENCH)
-    steps(free, 1000, 0.08)
+    state_after(free, 1000, 0.08)
     limit, up = way @ free.state["q"], way @ free.state["qd"] > 0
     stiffness, restitution = 60.0, 0.5
     limits = Limits(
@@ -154,7 +156,7 @@ def test_limits_in_a_loop_against_appendix_a(joint):
     for rate in (1000, 2000):
         block = running(linkage)
         block.set(F_hand=WRENCH)
-        errors.append(np.abs(steps(block, rate, 0.16) - exact).max())
+        errors.append(np.abs(state_after(block, rate, 0.16) - exact).max())
     assert errors[0] < 1e-4
     assert errors[0] / errors[1] > 12  # order 4
 
@@ -170,7 +172,7 @@ def test_an_impact_takes_from_a_loop_the_energy_that_its_restitution_says():
     linkage = replace(linkage, joint=tuple(joints), start_velocity={"elbow1": 3.0})
     block = running(linkage)
     before = np.concatenate([block.state["q"], block.state["qd"]])
-    after = steps(block, 200_000, 4e-4)
+    after = state_after(block, 200_000, 4e-4)
     lost = 0.5 * (1 - e**2) * closed_inertia(q, way) * before[5] ** 2
     assert kinetic(before) - kinetic(after) == pytest.approx(lost, rel=2e-3)
     assert after[5] == pytest.approx(-e * before[5], rel=2e-3)
@@ -184,7 +186,7 @@ def test_a_slot_ends_at_its_limit():
     linkage = replace(linkage, loop=(replace(linkage.loop[0], limits=limits),))
     block = running(linkage)
     before = block.y["energy"]
-    steps(block, 20_000, 0.02)
+    state_after(block, 20_000, 0.02)
     assert block.state["qd"][0] < 0
     assert block.y["q"][0] < 1.05
     assert block.y["energy"] == pytest.approx(e**2 * before, rel=2e-3)

@@ -11,7 +11,7 @@ from hapticlink.components.specs.contacts import Contacts, Disc
 from hapticlink.components.specs.linkage import (
     Mechanism,
 )
-from tests.blocks import Running, virtual_mechanism
+from tests.blocks import Running, state_after, virtual_mechanism
 from tests.components import appendix_a
 from tests.components.contact import piecewise
 from tests.components.contact.test_contact import BAR, FLOOR, LENGTH, R, link4, loose, shaped
@@ -25,12 +25,6 @@ RATES = (500, 1000, 2000, 4000)
 def block(linkage, contacts, **settings):
     contacts = Contacts(**{"detection": "haptics", "stiffness": K, "damping": B, **contacts})
     return Running(virtual_mechanism(linkage, Mechanism(**settings), None, contacts, step_s=1e-3))
-
-
-def steps(block, rate, t_end):
-    for _ in range(round(t_end * rate)):
-        block.step(1 / rate)
-    return np.concatenate([block.state["q"], block.state["qd"]])
 
 
 def order(errors):
@@ -57,7 +51,7 @@ def test_speed_after_a_damped_impact_has_the_order_of_the_method(method, worst):
         found = []
         for share in np.linspace(0, 1, 8)[:-1]:
             ball.put(q=(0.0, R + 0.02 + share / rate, 0.3), qd=(0.0, -1.0, 0.0))
-            found.append(steps(ball, rate, 0.1)[4] - exact)
+            found.append(state_after(ball, rate, 0.1)[4] - exact)
         errors.append(np.abs(found).max())
     assert order(errors) > METHODS[method].order - 0.3
     assert errors[1] < worst
@@ -110,7 +104,7 @@ def test_a_bar_that_lands_on_both_ends(tilt):
     """At once, and one after the other."""
     exact, events = landed(tilt)
     assert events == 4
-    errors = [np.abs(steps(landing(tilt), rate, LANDED) - exact)[3:].max() for rate in RATES]
+    errors = [np.abs(state_after(landing(tilt), rate, LANDED) - exact)[3:].max() for rate in RATES]
     assert order(errors) > 3.5
     assert errors[1] < 1e-4
 
@@ -121,7 +115,7 @@ def test_more_events_in_a_step_than_are_located():
     exact, _ = landed(tilt)
     for events, least, most in ((0, 1e-3, 0.1), (1, 2e-4, 0.1), (2, 0.0, 1e-4)):
         bar = landing(tilt, events=events)
-        error = np.abs(steps(bar, 1000, LANDED) - exact)[3:].max()
+        error = np.abs(state_after(bar, 1000, LANDED) - exact)[3:].max()
         assert least < error < most, events
 
 
@@ -172,7 +166,7 @@ def test_a_linkage_with_a_loop_that_is_thrown_on_a_disc():
     for rate in RATES:
         five = block(linkage, contacts)
         five.set(F_hand=wrench)
-        errors.append(np.abs(steps(five, rate, t_end) - exact).max())
+        errors.append(np.abs(state_after(five, rate, t_end) - exact).max())
     assert order(errors) > 3.5
 
 

@@ -18,7 +18,7 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running, virtual_environment, virtual_mechanism
+from tests.blocks import Running, state_after, virtual_environment, virtual_mechanism
 from tests.components.contact import piecewise
 
 K, B, G = 15000.0, 60.0, 9.81
@@ -43,12 +43,6 @@ def block(linkage, contacts=None, **settings):
     return Running(virtual_mechanism(linkage, Mechanism(**settings), None, contacts, step_s=1e-3))
 
 
-def steps(running, rate, t_end):
-    for _ in range(round(t_end * rate)):
-        running.step(1 / rate)
-    return np.r_[running.state["q"], running.state["qd"]]
-
-
 def order(errors):
     return -np.polyfit(np.log(RATES), np.log(errors), 1)[0]
 
@@ -70,7 +64,7 @@ def test_two_discs_collide_with_the_restitution_of_their_reduced_mass():
         both = block(free(disc("a", m1), disc("b", m2)))
         both.put(q=(0, 0, 0, 0.1 + 0.0123, 0, 0), qd=(1, 0, 0, 0, 0, 0))
         before = both.y["energy"]
-        v = steps(both, rate, 0.1)[6:]
+        v = state_after(both, rate, 0.1)[6:]
         errors.append(np.abs(v[[0, 3]] - exact).max())
         assert m1 * v[0] + m2 * v[3] == pytest.approx(m1, abs=1e-14)
         assert before - both.y["energy"] == pytest.approx((1 - e**2) * mu / 2, rel=1e-2)
@@ -165,7 +159,7 @@ def test_a_link_that_pushes_a_disc():
         both = block(linkage, {"broad_phase": False})
         both.put(q=(0, 0.3, reach + 0.005, 0.7))
         both.set(F_hand=(0, 0, torque))
-        found = steps(both, rate, t_end)[[0, 1, 2, 4, 5, 6]]
+        found = state_after(both, rate, t_end)[[0, 1, 2, 4, 5, 6]]
         errors.append(np.abs(found - exact).max())
     assert order(errors) > 3.4
     assert errors[2] < 1e-5
@@ -220,7 +214,7 @@ def test_two_links_of_a_mechanism_that_touch_each_other():
     errors = []
     for rate in RATES:
         both = block(linkage, {"bodies": "all"}, events=2)
-        errors.append(np.abs(steps(both, rate, t_end) - exact).max())
+        errors.append(np.abs(state_after(both, rate, t_end) - exact).max())
     assert order(errors) > 3
     assert errors[1] < 1e-4
 
@@ -236,7 +230,7 @@ def test_a_block_rests_on_two_springs(floor):
         found = block(linkage, {"polygon": (Polygon(corners=table),)})
     else:
         found = block(linkage, FLOOR)
-    steps(found, 500, 2.0)
+    state_after(found, 500, 2.0)
     assert found.y["contact_gap"] == pytest.approx(-2.0 * G / (2 * K), abs=1e-9)
     np.testing.assert_allclose(found.state["q"], (0, 0.05 - G / K, 0), atol=1e-9)
 
@@ -248,8 +242,8 @@ def test_a_pushed_block_slides_on_another_with_friction():
     linkage = free(box, gravity=(0.0, -G), start={"box": (0.0, 0.05 - G / K, 0.0)})
     pushed = block(linkage, {"polygon": (table,), "friction": mu})
     pushed.set(F_hand=(F, 0, 0.05 * F - 0.05 * F))
-    before = steps(pushed, 1000, 0.5)
-    change = steps(pushed, 1000, 0.5) - before
+    before = state_after(pushed, 1000, 0.5)
+    change = state_after(pushed, 1000, 0.5) - before
     assert change[3] == pytest.approx(0.5 * (F / 2.0 - mu * G), rel=1e-6)
 
 

@@ -19,7 +19,7 @@ from hapticlink.components.specs.linkage import (
     OperationalPoint,
 )
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, virtual_mechanism
+from tests.blocks import Running, advance, virtual_mechanism
 from tests.mechanisms import five_bar
 
 MASS, G, SLOPE = 2.0, 9.81, 0.4
@@ -42,18 +42,12 @@ def running(linkage, step_s=2e-3, **mechanism):
     return Running(virtual_mechanism(linkage, Mechanism(**mechanism), step_s=step_s))
 
 
-def steps(block, t_end, rate=500):
-    for _ in range(round(t_end * rate)):
-        block.step(1 / rate)
-    return block
-
-
 @pytest.mark.parametrize("integrator", ["semi-implicit-euler", "rk4", "linearly-implicit"])
 def test_a_block_below_the_friction_angle_stays_for_a_minute(integrator):
     resting = running(block(friction=1.05 * WEIGHT), integrator=integrator)
     far = 0.0
     for _ in range(60):
-        steps(resting, 1.0)
+        advance(resting, 1.0)
         far = max(far, abs(resting.state["q"][0]))
     assert far < 1e-9
     assert abs(resting.y["qdd"][0]) < 1e-9
@@ -65,18 +59,18 @@ def test_a_push_below_the_friction_leaves_no_trace():
     rng, along = np.random.default_rng(0), np.array([math.cos(SLOPE), -math.sin(SLOPE), 0.0])
     for _ in range(600):
         pushed.set(F_hand=rng.uniform(-0.3, 0.2) * WEIGHT * along)
-        steps(pushed, 0.1)
+        advance(pushed, 0.1)
     pushed.set(F_hand=np.zeros(3))
-    steps(pushed, 2.0)
+    advance(pushed, 2.0)
     assert abs(pushed.state["q"][0]) < 1e-9
 
 
 def test_a_block_above_the_friction_angle_slides_by_what_is_left():
-    sliding = steps(running(block(friction=0.6 * WEIGHT)), 1.0)
+    sliding = advance(running(block(friction=0.6 * WEIGHT)), 1.0)
     a = 0.4 * WEIGHT / MASS
     assert sliding.state["qd"][0] == pytest.approx(a, abs=2e-3)  # from the deflection to sliding
     before = sliding.state["qd"][0]
-    assert steps(sliding, 1.0).state["qd"][0] - before == pytest.approx(a, rel=1e-12)
+    assert advance(sliding, 1.0).state["qd"][0] - before == pytest.approx(a, rel=1e-12)
 
 
 @pytest.mark.parametrize("speed", [0.5, 50.0])
@@ -84,7 +78,7 @@ def test_a_block_that_is_thrown_stops_where_its_energy_is_spent(speed):
     """f x = m v^2/2, at any speed."""
     f = 4.0
     thrown = running(block(speed=speed, friction=f, gravity=None))
-    steps(thrown, MASS * speed / f + 1.0)
+    advance(thrown, MASS * speed / f + 1.0)
     exact = MASS * speed**2 / (2 * f)
     deflection = 16 * f / MASS * 2e-3**2
     assert thrown.state["q"][0] == pytest.approx(exact, abs=1.1 * deflection)
@@ -107,8 +101,8 @@ def test_a_spring_with_friction_rests_where_coulomb_says():
     )
     turns = math.ceil((k * start / f - 1) / 2)
     rest = (-1) ** turns * (start - 2 * turns * f / k)
-    assert steps(sprung, 5.0, 2000).state["q"][0] == pytest.approx(rest, abs=3e-5)
-    assert steps(sprung, 60.0).state["q"][0] == pytest.approx(rest, abs=3e-5)
+    assert advance(sprung, 5.0, 2000).state["q"][0] == pytest.approx(rest, abs=3e-5)
+    assert advance(sprung, 60.0).state["q"][0] == pytest.approx(rest, abs=3e-5)
 
 
 def test_stick_slip_against_scipy():
@@ -159,10 +153,10 @@ def test_friction_in_longer_steps_than_its_own_stays_bounded():
 def test_defaults_suit_the_step(step_s):
     """At any rate a block stops where Coulomb says, to the deflection 16 f h^2/m, and stays."""
     thrown = running(block(speed=2.0, friction=4.0, gravity=None), step_s)
-    steps(thrown, 1.0 + 300 * step_s, 1 / step_s)
+    advance(thrown, 1.0 + 300 * step_s, 1 / step_s)
     rest = thrown.state["q"][0]
     assert rest == pytest.approx(1.0, abs=1.1 * 16 * 2.0 * step_s**2)
-    assert steps(thrown, 100 * step_s, 1 / step_s).state["q"][0] == pytest.approx(rest, abs=1e-9)
+    assert advance(thrown, 100 * step_s, 1 / step_s).state["q"][0] == pytest.approx(rest, abs=1e-9)
 
 
 def test_a_start_at_a_dead_centre_says_nothing_about_the_joint():
@@ -184,7 +178,7 @@ def test_a_start_at_a_dead_centre_says_nothing_about_the_joint():
         thrown.step(5e-4)
         way, before = way + abs(thrown.state["q"][index] - before), thrown.state["q"][index]
     assert thrown.y["energy"] == pytest.approx(energy - 5.0 * way, rel=1e-3)
-    steps(thrown, 5.0)
+    advance(thrown, 5.0)
     assert np.abs(thrown.state["qd"]).max() < 1e-9
 
 
@@ -197,7 +191,7 @@ def test_what_a_step_cannot_integrate_is_refused(key, value):
     with pytest.raises(ValueError, match=f"`{key}` = .*too fast for steps of 0.002 s"):
         running(linkage)
     held = running(linkage, integrator="linearly-implicit")
-    assert abs(steps(held, 1.0).state["q"][0]) < 1e-9
+    assert abs(advance(held, 1.0).state["q"][0]) < 1e-9
 
 
 @given(st.floats(0, 50), st.floats(1e-4, 1e-2), st.integers(0, 2**32 - 1))
@@ -228,7 +222,7 @@ def test_a_linkage_with_a_redundant_loop_sticks_in_all_its_joints():
     held = running(replace(linkage, joint=joints, spring=(), gravity=(0.0, -G)))
     start, deflection = held.state["q"], held.state["deflection"]
     assert np.abs(deflection).min() > 0
-    assert np.abs(steps(held, 60.0).state["q"] - start).max() < 1e-9
+    assert np.abs(advance(held, 60.0).state["q"] - start).max() < 1e-9
     np.testing.assert_allclose(held.state["deflection"], deflection, atol=1e-9)
 
 
@@ -272,7 +266,7 @@ def test_a_cut_joint_rubs_as_one_of_the_tree():
     runs = [running(cut, 5e-4), running(whole, 5e-4)]
     runs[0].put(q=q)
     for _ in range(20):
-        first, second = (steps(r, 0.05, 2000).y for r in runs)
+        first, second = (advance(r, 0.05, 2000).y for r in runs)
         np.testing.assert_allclose(first["x"], second["x"], atol=1e-6)
         assert first["energy"] == pytest.approx(second["energy"], abs=1e-6)
     assert runs[0].state["deflection"] == pytest.approx(runs[1].state["deflection"], abs=1e-6)
@@ -284,8 +278,8 @@ def test_a_linkage_with_a_loop_slides_and_sticks():
     linkage = replace(linkage, joint=tuple(replace(j, friction=5e-3) for j in linkage.joint))
     five = running(linkage)
     five.set(F_hand=(-0.5, 0.3, 0.0))
-    steps(five, 0.2, 2000)
+    advance(five, 0.2, 2000)
     assert np.abs(five.state["qd"]).max() > 0.5
     five.set(F_hand=(0.0, 0.0, 0.0))
-    steps(five, 2.0, 2000)
+    advance(five, 2.0, 2000)
     assert np.abs(five.state["qd"]).max() < 1e-3
