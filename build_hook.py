@@ -1,7 +1,8 @@
 """Build hook: compiles the event loop, and links what editable installs import.
 
 Wheels map the top-level folders through `sources` in pyproject.toml. For an editable install
-`.editable/hapticlink/` gets links to them, and to the package's own files, which are in `public/`.
+`.editable/hapticlink/` gets links to them, and to the package's own files, which are in
+`package_root/`.
 """
 
 import os
@@ -61,7 +62,7 @@ class Build(BuildHookInterface):
         package = root / ".editable" / "hapticlink"
         package.mkdir(parents=True, exist_ok=True)
         targets = [root / name for name in FOLDERS]
-        targets += [path for path in (root / "public").iterdir() if path.is_file()]
+        targets += [path for path in (root / "package_root").iterdir() if path.is_file()]
         for target in targets:
             link = package / target.name
             if sys.platform == "win32" and target.is_file():

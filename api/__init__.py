@@ -1,1 +1,1 @@
-"""The functions and classes of `import hapticlink`; `public/__init__.pyi` lists them."""
+"""The functions and classes of `import hapticlink`; `package_root/__init__.pyi` lists them."""

@@ -20,7 +20,7 @@ from hapticlink.orchestrator.run import start_parameters
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
 

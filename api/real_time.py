@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hapticlink.api import runs
 from hapticlink.api.result import Run
-from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.real_time_session import LiveRun
 
 
 class RealTime(LiveRun):

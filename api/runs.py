@@ -17,7 +17,7 @@ from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders, tables
-from hapticlink.orchestrator.results.record import content
+from hapticlink.orchestrator.results.run_record import content
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.scene.overrides import Options

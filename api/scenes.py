@@ -11,7 +11,7 @@ from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.scene import find_scene
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 
 
 def shipped() -> dict[str, str]:

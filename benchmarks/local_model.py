@@ -15,7 +15,7 @@ from time import perf_counter
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.ours import in_place
+from benchmarks.our_mechanism import in_place
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
 from hapticlink.components.specs.linkage import Mechanism

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import hapticlink.orchestrator
-from benchmarks import closed_loop, master_page, rings, state
+from benchmarks import closed_loop, code_version, master_page, rings
 from benchmarks.peers.masters import MASTERS
 from benchmarks.rows import Rows
 
@@ -65,7 +65,7 @@ def measured(master: str, folder: Path) -> tuple[float, float, float]:
 
 def bench(folder: Path, quick: bool, told: Told, command: str) -> None:
     """Write README.md, the tables and a figure to `folder`."""
-    state.begin(folder, ROWS, hapticlink.orchestrator)
+    code_version.begin(folder, ROWS, hapticlink.orchestrator)
     cases, rounds = (QUICK, 1) if quick else (CASES, ROUNDS)
     rows = Rows(folder / ROWS[0], COLUMNS, 5)
     whole = Rows(folder / ROWS[1], closed_loop.COLUMNS, 3)

@@ -20,8 +20,8 @@ from unittest.mock import patch
 import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks import mechanisms, state
-from benchmarks.ours import Ours
+from benchmarks import code_version, mechanisms
+from benchmarks.our_mechanism import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.dynamics import closed_loop_solver, projection
 from hapticlink.components.specs.linkage import Linkage, Mechanism
@@ -42,7 +42,7 @@ COLOURS = dict(zip(MUS, ("#8a8a8a", "#d1495b", "#1b6ca8", "#2a9d5c"), strict=Tru
 
 def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
     """Write README.md, rates.csv and tip-error.png to `out`."""
-    state.begin(out, ("rates.csv",))
+    code_version.begin(out, ("rates.csv",))
     rows = Rows(out / "rates.csv", COLUMNS, keys=2)
     rates = RATES[::10] if quick else RATES
     exact = turned(mechanisms.n_four_bar_tip(N, END))

@@ -26,7 +26,7 @@ import numpy as np
 
 import hapticlink.orchestrator
 import hapticlink.scenes
-from benchmarks import state
+from benchmarks import code_version
 from benchmarks.rows import Rows
 from hapticlink.analysis.findings import block_costs
 from hapticlink.orchestrator import experiment
@@ -149,7 +149,7 @@ def bench(out: Path, quick: bool, told: Told, command: str) -> None:
     """Write README.md, skip.png and the rows to `out`."""
     from benchmarks import skip_page  # loads Matplotlib
 
-    state.begin(out, ("runs.csv", "same.csv"), hapticlink.orchestrator, hapticlink.scenes)
+    code_version.begin(out, ("runs.csv", "same.csv"), hapticlink.orchestrator, hapticlink.scenes)
     scenes = list(find_scene.shipped())
     rows, same = measure(out, scenes[::6] if quick else scenes, 2 if quick else ROUNDS, told)
     skip_page.write(out, rows, same, command)

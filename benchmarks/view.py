@@ -28,10 +28,10 @@ from numpy.typing import ArrayLike
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.visualization.live.link import Link
 from hapticlink.visualization.live.mouse_hand import viewed
+from hapticlink.visualization.live.server_pipe import Link
 from hapticlink.visualization.live.session import Session
 
 SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 5

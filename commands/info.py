@@ -51,7 +51,7 @@ def info(
     from hapticlink.orchestrator.plan import sample_ages
     from hapticlink.orchestrator.plan.plan import Plan
     from hapticlink.orchestrator.run.fetched_outputs import with_fetched
-    from hapticlink.orchestrator.system.built import built
+    from hapticlink.orchestrator.system.build_system import built
 
     if scene is None:
         for name, title in hl.shipped().items():

@@ -10,7 +10,7 @@ import webbrowser
 from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
@@ -20,7 +20,9 @@ from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
-from hapticlink.visualization.live.link import Link
+
+if TYPE_CHECKING:
+    from hapticlink.visualization.live.server_pipe import Link
 
 Host = Annotated[
     str,
@@ -172,6 +174,8 @@ def _served(host: str, port: int | None, token: str) -> Link:
     """The server, on the port asked for. Raises InputFault where it cannot start."""
     if not find_spec("websockets"):
         raise InputFault(f"the page needs the package websockets: {install_command('view')}")
+    from hapticlink.visualization.live.server_pipe import Link
+
     module = "hapticlink.visualization.live.server"
     made = Link(module, host, str(PORT if port is None else port), token)
     if port is None and made.first and "error" in made.first:

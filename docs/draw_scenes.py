@@ -13,7 +13,7 @@ from pathlib import Path
 
 import hapticlink as hl
 from hapticlink.commands.info import at_start, coordinates
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 from hapticlink.visualization.figures import block_diagram
 from hapticlink.visualization.mechanism import drawing, workspace_drawing
 

@@ -27,8 +27,8 @@ import casadi as ca
 from hapticlink.components.component import Component, Variable
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
+from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.fmus.model_description import model_description
-from hapticlink.fmus.one_pass import one_pass
 from hapticlink.fmus.straight_line import program
 
 PYTHONFMU = Path(str(distribution("pythonfmu").locate_file("pythonfmu")))

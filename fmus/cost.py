@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hapticlink.fmus.blocks import component
-from hapticlink.fmus.one_pass import one_pass
+from hapticlink.fmus.fmu_functions import one_pass
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
-from hapticlink.orchestrator.results.record import content
 from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_record import content
 from hapticlink.orchestrator.results.tables import Results, Table, load, size
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, beside
@@ -27,10 +27,10 @@ from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.open_fmus import isolated
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.run_json import setup
+from hapticlink.orchestrator.run_setup import setup
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.system import System
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.run.compiled.library import Unavailable, load
-from hapticlink.orchestrator.run.compiled.machine import too_long
+from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.frames import Frames
+from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.holds import HOLDS
@@ -29,13 +29,13 @@ from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.holds import CompiledHold
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.compiled.machine import Machine
 from hapticlink.orchestrator.run.compiled.memory import Memory
+from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.metered_operations import Move, Sample
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.system import Recording, System
 from hapticlink.programs import refusals
 

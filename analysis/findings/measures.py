@@ -19,7 +19,7 @@ from hapticlink.analysis.findings.tracking import (
 )
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.base.loop_names import CLOSURE_ERROR
-from hapticlink.orchestrator.results.record import Energy, PortEnergy
+from hapticlink.orchestrator.results.run_record import Energy, PortEnergy
 from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results, Vector
 

@@ -36,7 +36,7 @@ from hapticlink.orchestrator.base.loop_names import (
     user_of_block,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.record import RunRecord, StepErrors
+from hapticlink.orchestrator.results.run_record import RunRecord, StepErrors
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene.start_pose import outside
 from hapticlink.orchestrator.system.system import Replacement

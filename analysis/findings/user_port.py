@@ -52,7 +52,7 @@ from hapticlink.orchestrator.base.loop_names import (
     block_of_user,
     signal_of_user,
 )
-from hapticlink.orchestrator.results.record import BlockEnergy, PortEnergy
+from hapticlink.orchestrator.results.run_record import BlockEnergy, PortEnergy
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 

@@ -9,8 +9,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from hapticlink.analysis.maps import lines, run_checks
-from hapticlink.analysis.maps.lines import DONE
+from hapticlink.analysis.maps import boundary_lines, run_checks
+from hapticlink.analysis.maps.boundary_lines import DONE
 from hapticlink.analysis.sweep import Unfinished, pool, table
 from hapticlink.analysis.sweep.grid import Axis, number
 from hapticlink.analysis.sweep.job import Job
@@ -71,13 +71,15 @@ def compute_map(
             [
                 line
                 for panel in panels
-                for line in lines.along(scene, options, panel, y or x, y and x)
+                for line in boundary_lines.along(scene, options, panel, y or x, y and x)
             ],
-            lines.work,
+            boundary_lines.work,
             processes,
         )
         if y:
-            rows = keep.all(lines.across(scene, options, rows, x, y), lines.work, processes)
+            rows = keep.all(
+                boundary_lines.across(scene, options, rows, x, y), boundary_lines.work, processes
+            )
         if check:
             points = run_checks.chosen(rows, check, seed)
             rows = keep.all(run_checks.jobs(scene, options, points), run_checks.work, processes)

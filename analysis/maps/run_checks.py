@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.analysis.maps.lines import COLUMNS, DONE, Line, judged
+from hapticlink.analysis.maps.boundary_lines import COLUMNS, DONE, Line, judged
 from hapticlink.analysis.stability.loaded_variants import LoadedVariants
 from hapticlink.analysis.sweep.grid import Point
 from hapticlink.analysis.sweep.job import job

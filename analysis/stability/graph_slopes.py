@@ -1,7 +1,7 @@
 """The exact slopes of a doStep and of a get of our FMUs: from the graph that a Python FMU carries,
 or that of the component from which a native one was generated.
 
-With trial states x_0 = x, x_{k+1} = f(x_k, u, p, t_k, h), k < n substeps (fmus/one_pass.py),
+With trial states x_0 = x, x_{k+1} = f(x_k, u, p, t_k, h), k < n substeps (fmus/fmu_functions.py),
 
     dx_{k+1}/d(x, u) = f_x dx_k/d(x, u) + (0, f_u)
 
@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.fmus.blocks import component
-from hapticlink.fmus.one_pass import one_pass
+from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.scene.blocks import blocks

@@ -23,8 +23,8 @@ from hapticlink.analysis.stability.frozen_nonlinearities import discrete, withou
 from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.plan.operations import Event, Operation, Record, StopWhen

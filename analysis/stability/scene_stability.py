@@ -16,15 +16,16 @@ from hapticlink.analysis.stability.forward_sensitivity import KINK
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.mode_frequency import traced
-from hapticlink.analysis.stability.modes import NEAR, Mode, counted, leading, modes, verdict
+from hapticlink.analysis.stability.modes import NEAR, Mode, counted, leading, modes
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
+from hapticlink.analysis.stability.verdict import verdict
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.system import System
 
 SHOWN = 6

@@ -21,7 +21,7 @@ from hapticlink.fmus.versions import version
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import Fault, InputFault
-from hapticlink.orchestrator.run_json import PACKAGES
+from hapticlink.orchestrator.run_setup import PACKAGES
 from hapticlink.orchestrator.scene.scene import Scene
 
 

@@ -26,10 +26,10 @@ import numpy as np
 from hapticlink.analysis.tune.felt_stiffness import Feel
 from hapticlink.analysis.tune.held_equilibria import Held
 from hapticlink.analysis.tune.poses import Pose, at_equilibrium, poses
-from hapticlink.analysis.tune.requirements import near_rates, required, whole_frames
 from hapticlink.analysis.tune.run_measures import RunLimit, motion, simulated
 from hapticlink.analysis.tune.search import COARSE, search
 from hapticlink.analysis.tune.stability_limits import FINE, Judge
+from hapticlink.analysis.tune.tunable_scene import near_rates, required, whole_frames
 from hapticlink.analysis.tune.tuning_result import Tuned as Tuned
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt

@@ -21,7 +21,7 @@ from benchmarks.continuous.guards import Guards
 from benchmarks.continuous.hand import Hand
 from hapticlink.components.component import Component
 from hapticlink.components.device import pantograph
-from hapticlink.components.device.torques import numbers
+from hapticlink.components.device.numeric_torques import numbers
 from hapticlink.fmus.blocks import component
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene

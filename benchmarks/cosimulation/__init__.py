@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import hapticlink.orchestrator
-from benchmarks import state
+from benchmarks import code_version
 from benchmarks.continuous import kept
 from benchmarks.cosimulation.measure import Told, measure
 from benchmarks.cosimulation.points import CONTACT, LOOP, points
@@ -19,7 +19,7 @@ def bench(out: Path, quick: bool, told: Told, command: str) -> None:
     version of the code are reused."""
     from benchmarks.cosimulation import page  # loads Matplotlib
 
-    state.begin(out, KEPT, hapticlink.orchestrator)
+    code_version.begin(out, KEPT, hapticlink.orchestrator)
     references = {}
     for k, name in enumerate((LOOP, CONTACT)):
         told(f"{name}: two continuous runs", k, 2)

@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import state
+from benchmarks import code_version
 
 ROWS = ("runs.csv", "energy.csv", "growth.csv", "references.json")
 
@@ -15,7 +15,7 @@ def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command
     """Write README.md, table.csv and two figures to `out`."""
     from benchmarks.mechanism import energy, errors, growth, page  # load Matplotlib
 
-    state.begin(out, ROWS)
+    code_version.begin(out, ROWS)
     drifts = energy.measure(out, told)
     sizes = growth.measure(out, quick, told)
     page.write(out, *errors.measure(out, quick, told), drifts, sizes, command)

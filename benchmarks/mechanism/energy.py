@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks import mechanisms
 from benchmarks.mechanism.errors import ALL, setting
-from benchmarks.ours import Ours
+from benchmarks.our_mechanism import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.specs.linkage import Mechanism
 

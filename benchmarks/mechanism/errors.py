@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks import mechanisms
 from benchmarks.mechanism import reference
-from benchmarks.ours import Ours
+from benchmarks.our_mechanism import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.linkage import Linkage, Mechanism

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks import mechanisms
-from benchmarks.ours import Ours
+from benchmarks.our_mechanism import Ours
 from benchmarks.rows import Rows
 from hapticlink.components.specs.linkage import Mechanism
 

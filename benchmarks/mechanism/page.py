@@ -16,8 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
+from benchmarks.code_version import versions
 from benchmarks.mechanism.errors import LOST, MACHINE, NATIVE, SLOW, advantage
-from benchmarks.state import versions
 
 COLOURS = {
     NATIVE: "#1b6ca8",

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.maximal import Bodies
-from benchmarks.ours import Ours
+from benchmarks.our_mechanism import Ours
 
 TOLERANCE = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
 

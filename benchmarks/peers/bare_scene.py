@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 
 
 class Bare(ctypes.Structure):

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 import casadi as ca
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.native.pieces import split
-from hapticlink.fmus.one_pass import one_pass
+from hapticlink.fmus.fmu_functions import one_pass
+from hapticlink.fmus.native.split_functions import split
 
 
 def component_source(component: Component) -> tuple[str, Iterable[str]]:

@@ -14,7 +14,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 
-from hapticlink.orchestrator.base.frames import Frames
+from hapticlink.orchestrator.base.communication_points import Frames
 
 
 def exact(number: int | float | str) -> Fraction:

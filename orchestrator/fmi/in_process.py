@@ -22,7 +22,7 @@ from fmpy import fmi2
 
 from hapticlink.orchestrator.base import current_directory
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi import arithmetic, messages, process_cache, python_libraries
+from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries, rounding_mode
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
 from hapticlink.orchestrator.fmi.input_derivatives import Varying
@@ -234,7 +234,7 @@ class InProcess(WithStates):
 
     def _keep_arithmetic(self) -> None:
         """Restores how this process rounds numbers where an FMU of others has changed it."""
-        if self.description.block is None and arithmetic.restored():
+        if self.description.block is None and rounding_mode.restored():
             self.place.altered += 1
 
     # --- the loop -------------------------------------------------------------------------

@@ -9,7 +9,7 @@ by H: order 1.
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import Transition
-from hapticlink.orchestrator.holds.laws import LAWS
+from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 
 class Delayed(Transition):

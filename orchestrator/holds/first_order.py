@@ -7,7 +7,7 @@ until the second sample.
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.laws import LAWS
+from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 
 class FirstOrder(OfSamples):

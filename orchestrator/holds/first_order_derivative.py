@@ -8,7 +8,7 @@ beside x): a sample is y followed by yd (unit of y per s).
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.laws import LAWS
+from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 
 class FirstOrderDerivative(OfSamples):

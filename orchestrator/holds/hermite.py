@@ -9,7 +9,7 @@ hold. With one sample it is the first-order hold from the derivative.
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.laws import LAWS
+from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 
 class Hermite(OfSamples):

@@ -10,7 +10,7 @@ import numpy as np
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.hold import Hold, Vector
-from hapticlink.orchestrator.holds.laws import Law, Value, arguments
+from hapticlink.orchestrator.holds.polynomial_hold_laws import Law, Value, arguments
 
 
 class History:

@@ -7,7 +7,7 @@ constant over the period, and no delay at low frequency. Zero-order until the se
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.laws import LAWS
+from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 
 class Lead(OfSamples):

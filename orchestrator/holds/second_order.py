@@ -9,7 +9,7 @@ omega H = 2.61. With two samples it is the first-order hold, with one the zero-o
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.laws import LAWS
+from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 
 class SecondOrder(OfSamples):

@@ -9,7 +9,7 @@ pose as an output as well: a sample is the velocity followed by the pose (its un
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import OfSamples
-from hapticlink.orchestrator.holds.laws import LAWS
+from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 
 class Slope(OfSamples):

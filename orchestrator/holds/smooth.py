@@ -12,7 +12,7 @@ Order 1. The first sample is held until the second arrives.
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.history import Transition
-from hapticlink.orchestrator.holds.laws import LAWS
+from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 
 class Smooth(Transition):

@@ -14,7 +14,13 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault, Interrupted
 from hapticlink.orchestrator.results import json_file, rows
 from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
-from hapticlink.orchestrator.results.record import End, RecordedFault, RunEnding, RunSetup, content
+from hapticlink.orchestrator.results.run_record import (
+    End,
+    RecordedFault,
+    RunEnding,
+    RunSetup,
+    content,
+)
 
 ROOM = 1 << 14
 """Bytes reserved in run.json for how the run ends, in case the disk is full by then."""

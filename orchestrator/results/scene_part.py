@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.results.record import first_error
+from hapticlink.orchestrator.results.run_record import first_error
 from hapticlink.orchestrator.results.tables import Results
 
 

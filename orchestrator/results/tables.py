@@ -17,8 +17,8 @@ import numpy as np
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.results import json_file, record, rows
-from hapticlink.orchestrator.results.record import RunRecord
+from hapticlink.orchestrator.results import json_file, rows, run_record
+from hapticlink.orchestrator.results.run_record import RunRecord
 
 TABLES = (".csv", rows.SUFFIX)
 """Endings of the names of tables."""
@@ -98,7 +98,7 @@ class Results:
     def record(self) -> RunRecord:
         """The content of run.json as a record. Raises InputFault where it is of another version, or
         was changed."""
-        return record.read(self.run, self.folder)
+        return run_record.read(self.run, self.folder)
 
     @property
     def haptics(self) -> Table:

@@ -15,12 +15,12 @@ from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Inte
 from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal, delays
-from hapticlink.orchestrator.results.record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.run.bind_operations import Stop
 from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.compiled.machine import too_long
+from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, kinds

@@ -9,7 +9,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.plan.operations import Repeat
-from hapticlink.orchestrator.results.record import Iterations
+from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.jacobians import Through
 from hapticlink.orchestrator.run.signals import SignalVector

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results.record import Iterations
+from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.run.bind_operations import Binder, Bound
 from hapticlink.orchestrator.run.fixed_point import total
 from hapticlink.orchestrator.run.simulation import Call, Simulation

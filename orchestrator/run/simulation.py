@@ -11,8 +11,8 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.results.files import Recorder
-from hapticlink.orchestrator.results.record import LinkCounts
 from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_record import LinkCounts
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meters import Meters

@@ -29,7 +29,7 @@ from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
-from hapticlink.orchestrator.results.record import StepErrors
+from hapticlink.orchestrator.results.run_record import StepErrors
 
 EVERY = 97
 """One step in so many is checked, which adds two half steps, a saved state and two reads to them. A

@@ -17,8 +17,8 @@ from hapticlink.orchestrator.scene.frame_trace import frame_times
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Origin, Source
 from hapticlink.orchestrator.scene.toml_keys import flat, flatten
+from hapticlink.orchestrator.scene.unrepresentable_values import unsound
 from hapticlink.orchestrator.scene.validation_errors import beyond, problems
-from hapticlink.orchestrator.scene.value_ranges import unsound
 
 
 def read(

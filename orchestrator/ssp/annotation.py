@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.scene.extends import traced
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
-from hapticlink.orchestrator.scene.value_ranges import unsound
+from hapticlink.orchestrator.scene.unrepresentable_values import unsound
 from hapticlink.orchestrator.ssp.names import ANNOTATION, NOT_IN_ANNOTATION, RUN, SSC, SSD
 
 OF_GRAPHICS = ("rate", "align", "phase")

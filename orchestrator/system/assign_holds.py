@@ -17,7 +17,7 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system import declared, springs
+from hapticlink.orchestrator.system import annotated_ports, springs
 from hapticlink.orchestrator.system.ports import carries_power, derivative, integral, kind, names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
@@ -161,7 +161,7 @@ def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connec
         {**scene.holds, **own},
         delays,
         scene.kinds,
-        (*scene.power, *declared.power(fmus)),
+        (*scene.power, *annotated_ports.power(fmus)),
         scene.iteration.interpolation if scene.coupling == "iterated" else None,
-        (*scene.spring, *declared.springs(fmus, connections)),
+        (*scene.spring, *annotated_ports.springs(fmus, connections)),
     )

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.faults import SceneFault
-from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import (
     Clock,
     Timeline,

@@ -42,7 +42,7 @@ from hapticlink.fmus.blocks import component
 from hapticlink.fmus.build import build, build_native
 from hapticlink.fmus.check import check_fmu, session
 from hapticlink.fmus.errors import FmuError
-from hapticlink.fmus.native import compile_library, compiler, pieces
+from hapticlink.fmus.native import compile_library, compiler, split_functions
 from hapticlink.fmus.native.compiler_cache import compiler_cache
 from hapticlink.fmus.native.source import component_source
 from hapticlink.orchestrator import open_scene
@@ -212,7 +212,7 @@ def test_plain_python_gives_the_same_bits(both, name, monkeypatch):
 def test_pieces_of_long_functions_give_the_same_bits(both, name, tmp_path, monkeypatch):
     """The arm calls look-ups; the statements of the slider are pieces in several files."""
     for size, statements in (("MAX_STATEMENTS", 30), ("PIECE_STATEMENTS", 20), ("FILE_PIECES", 5)):
-        monkeypatch.setattr(pieces, size, statements)
+        monkeypatch.setattr(split_functions, size, statements)
     made = arm(300) if name == "arm" else driven_slider()
     header, files = component_source(made)
     assert header.count("noinline") > len([*files]) >= 1

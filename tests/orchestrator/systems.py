@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.connections import connect
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused, System
 

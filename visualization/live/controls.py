@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, MECHANISM, block_of_user
-from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.visualization.live import messages

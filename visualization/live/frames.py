@@ -8,56 +8,16 @@ from typing import Any
 
 from hapticlink.analysis.findings.limits import NOTICEABLE_J
 from hapticlink.orchestrator.base.loop_names import (
-    CLOSURE_ERROR,
-    CONSTRAINT_COUNTS,
-    CONTACT_GAP,
-    COPY_BRANCH_OK,
-    COPY_JOINT_COORDINATES,
     DEVICE,
-    DRIFT_WRENCH,
-    ENVIRONMENT_WRENCH,
     HAND,
-    HAND_WRENCH,
-    HANDLE_POSE,
-    JOINT_COORDINATES,
-    MEASURED_HANDLE_POSE,
     MECHANISM_ENERGY,
-    MOTOR_WRENCH,
-    MULTIPLIERS,
-    POINT_POSE,
-    PROJECTORS,
-    TOPOLOGY_WRENCH,
-    WORKSPACE_MARGIN,
-    signal_of_user,
 )
-from hapticlink.orchestrator.live_run import LiveRun
-from hapticlink.orchestrator.results.record import Energy
+from hapticlink.orchestrator.real_time_session import LiveRun
+from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.energy.balance import generated_and_put_in
+from hapticlink.visualization.frame_signals import shown, shown_of_user
 from hapticlink.visualization.mechanism.picture import PORT
 
-SHOWN = {
-    "q": (JOINT_COORDINATES,),
-    "ghost": (COPY_JOINT_COORDINATES,),
-    "lambda": (MULTIPLIERS,),
-    "closure_error": (CLOSURE_ERROR,),
-    "gap": (CONTACT_GAP,),
-    "branch_ok": (COPY_BRANCH_OK,),
-}
-"""By name in a frame, the output that it is, the first that the scene has."""
-OF_USER = {
-    "x": (POINT_POSE,),
-    "handle": (HANDLE_POSE, POINT_POSE),
-    "F_hand": (HAND_WRENCH,),
-    "F_drift": (DRIFT_WRENCH,),
-    "F_constraint": (TOPOLOGY_WRENCH,),
-    "F_env": (ENVIRONMENT_WRENCH,),
-    "n": CONSTRAINT_COUNTS,
-    "P_c": PROJECTORS,
-    "margin": (WORKSPACE_MARGIN,),
-    "F_motor": (MOTOR_WRENCH,),
-    "measured": (MEASURED_HANDLE_POSE,),
-}
-"""The same of each user; what further ones have is in `others` of a frame, by their points."""
 SELDOM = 5
 """Turns between two readings of energies and deadlines, which take longer."""
 WINDOW = 1.0
@@ -128,16 +88,6 @@ def light(generated: float, put_in: float) -> str:
     `NOTICEABLE_J`; amber from a tenth of that on; green otherwise."""
     most = max(put_in, 0.0) + NOTICEABLE_J
     return "red" if generated > most else "amber" if generated > 0.1 * most else "green"
-
-
-def shown() -> dict[str, tuple[str, ...]]:
-    """What a frame shows of a scene and of its first user, without `others`."""
-    return SHOWN | shown_of_user("")
-
-
-def shown_of_user(user: str) -> dict[str, tuple[str, ...]]:
-    """What a frame shows of a user, whose name is that of the point, "" for the first one's."""
-    return {k: tuple(signal_of_user(n, user) for n in names) for k, names in OF_USER.items()}
 
 
 def _there(fmus: Any, asked: Mapping[str, tuple[str, ...]]) -> dict[str, str]:

@@ -25,7 +25,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from hapticlink.visualization.live import messages
-from hapticlink.visualization.live.link import read
+from hapticlink.visualization.live.server_pipe import read
 from hapticlink.visualization.live.stability_process import StabilityProcess
 from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
 from hapticlink.visualization.mechanism.picture import Picture

@@ -12,13 +12,13 @@ from typing import Any
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
-from hapticlink.orchestrator.live_run import LiveRun
+from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.scene_part import by_user
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization.live import messages
 from hapticlink.visualization.live.controls import Controls, Settings, target, users
 from hapticlink.visualization.live.frames import PORT, Frames
-from hapticlink.visualization.live.link import Link
+from hapticlink.visualization.live.server_pipe import Link
 
 TURN, FRAME = 0.0035, 0.015
 """Times (s) between two looks at the messages while the scene runs, every other tick at 512 Hz,

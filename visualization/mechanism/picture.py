@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.analysis.findings.limits import FULL_TORQUE, NOTICEABLE_J
-from hapticlink.components.device.torques import torque_function
+from hapticlink.components.device.numeric_torques import torque_function
 from hapticlink.components.device.workspace import link_function
 from hapticlink.components.linkage.poses import pose_function
 from hapticlink.components.specs.contacts import Contacts

@@ -24,7 +24,7 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.loop_names import JOINT_COORDINATES, POINT_POSE
 from hapticlink.orchestrator.results.scene_part import by_user, scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector, load
-from hapticlink.visualization.live.frames import shown, shown_of_user
+from hapticlink.visualization.frame_signals import shown, shown_of_user
 from hapticlink.visualization.mechanism.picture import PORT, Picture
 
 PLACES = ("q", "x", "handle")

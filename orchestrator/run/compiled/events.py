@@ -11,7 +11,7 @@ import numpy as np
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Event, Firing
 from hapticlink.orchestrator.run.compiled import structures
-from hapticlink.orchestrator.run.compiled.machine import PATIENCE, Machine
+from hapticlink.orchestrator.run.compiled.operation_records import PATIENCE, Machine
 from hapticlink.orchestrator.run.concurrent_fmus import Side
 from hapticlink.orchestrator.run.pace import Pace
 

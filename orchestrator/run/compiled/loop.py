@@ -8,7 +8,7 @@ from collections.abc import Callable
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled.events import Events
-from hapticlink.orchestrator.run.compiled.machine import Machine
+from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.simulation import Simulation
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 from hapticlink.orchestrator.base.faults import Diverged
 from hapticlink.orchestrator.base.loop_names import CONTROLLER, MECHANISM
-from hapticlink.orchestrator.results.record import Energy
+from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import System
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.results.record import Energy
+from hapticlink.orchestrator.results.run_record import Energy
 
 Read = Callable[[], Vector]
 Rows = TypeVar("Rows", NDArray[np.float64], NDArray[np.int64])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.results.record import Energy
+from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.energy.meter import Mark, Meter
 from hapticlink.orchestrator.run.signals import SignalVector

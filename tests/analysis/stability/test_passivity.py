@@ -11,7 +11,7 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.port_response import hand_port, mechanism_port
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 
 T = 1 / 512
 WALL: dict[str, Any] = {

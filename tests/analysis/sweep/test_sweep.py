@@ -27,7 +27,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import process_cache
-from hapticlink.orchestrator.results.record import Energy
+from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.visualization.figures import sweep_figure
 from tests.orchestrator.results.records import run_json

@@ -23,7 +23,7 @@ from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 from tests.orchestrator.foreign_fmus import python_fmu_of, run
 
 Vector = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from hapticlink.orchestrator.results.record import RunSetup, content
+from hapticlink.orchestrator.results.run_record import RunSetup, content
 
 
 def run_json(**changes: Any) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.results.record import Timings
+from hapticlink.orchestrator.results.run_record import Timings
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.records import Iteration
 from tests.orchestrator import coupled

@@ -26,7 +26,7 @@ from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.varying_rate import edges_of
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
-from hapticlink.orchestrator.base.frames import Frames
+from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan

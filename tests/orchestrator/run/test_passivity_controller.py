@@ -14,8 +14,8 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.components.blocks.controller import controller
 from hapticlink.components.device.encoder_count import count_energies
+from hapticlink.components.device.numeric_torques import numbers
 from hapticlink.components.device.pantograph import base_angles, dynamics
-from hapticlink.components.device.torques import numbers
 from hapticlink.components.specs.control import Controller, Passivity
 from hapticlink.components.specs.device import Device
 from tests.blocks import Running

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.system.built import built
+from hapticlink.orchestrator.system.build_system import built
 from hapticlink.visualization.figures import block_diagram
 
 

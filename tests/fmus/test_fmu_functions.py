@@ -7,7 +7,7 @@ import pytest
 
 from hapticlink.components.component import Block, Variable
 from hapticlink.fmus.blocks import component
-from hapticlink.fmus.one_pass import one_pass
+from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.orchestrator.open_scene import load
 from hapticlink.orchestrator.scene.blocks import blocks
 from tests.fmus import sample_components

@@ -9,7 +9,12 @@ from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.loop_names import MECHANISM
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results.record import ClockSteps, RecordedFmu, RefusedHold, RunSetup
+from hapticlink.orchestrator.results.run_record import (
+    ClockSteps,
+    RecordedFmu,
+    RefusedHold,
+    RunSetup,
+)
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene

@@ -10,8 +10,8 @@ Files: `build`, `export`. Before a hand is on the device: `stability`, `tune`.
 Raised: `InputFault` for bad input, with all findings of a scene `SceneFault`; each is a `Fault`.
 """
 
-# In a checkout this file is `public/__init__.py`; installed, it is the package's own. The names are
-# listed once, with where they are, in `__init__.pyi`, which type checkers read.
+# In a checkout this file is `package_root/__init__.py`; installed, it is the package's own. The
+# names are listed once, with where they are, in `__init__.pyi`, which type checkers read.
 
 from __future__ import annotations
 

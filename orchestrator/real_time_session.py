@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.faults import InputFault, shortened, unknown
-from hapticlink.orchestrator.base.frames import Frames
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.results.record import Energy
+from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
