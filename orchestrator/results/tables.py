@@ -155,6 +155,8 @@ def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
             found = np.loadtxt(lines, delimiter=",", ndmin=2) if first else None
     except OSError as error:
         raise InputFault(f"{path}: {error.strerror}: run the scene again") from error
+    except csv.Error as error:  # a line without end
+        raise InputFault(f"{path}: {error}: run the scene again") from error
     except ValueError as error:
         raise InputFault(f"{path}: {_malformed(path) or error}: run the scene again") from error
     values = np.zeros((0, len(columns))) if found is None else found

@@ -11,7 +11,7 @@ from hapticlink.visualization.mechanism.workspace_drawing import draw
 from tests.shared_fixtures import status
 
 FAR = ("--set", "linkage.start.float=[0.22, 0.0, 0.0]")
-OUTSIDE = "is outside the device's workspace by 0.0144 m (move linkage.operational_point"
+OUTSIDE = "is outside the device's workspace by 0.0144 m (lengths are in m: move linkage"
 
 
 def test_info_tells_and_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -150,8 +150,8 @@ def test_every_command_can_be_parsed(page: Path) -> None:
 def test_extras_that_are_installed_exist() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     text = "".join(block.text for page in PAGES for block in blocks(page, "sh"))
-    named = set(re.findall(r"'\.\[(\w+)\]'", text))
-    assert named >= {"test", "native"}
+    named = set(re.findall(r"(?:'\.|\"hapticlink)\[(\w+)\]['\"]", text))
+    assert named >= {"test", "native", "view"}
     assert named <= {*project["optional-dependencies"]}
 
 

@@ -41,10 +41,10 @@ Row = tuple[str, str, str, str]
 def declared() -> Iterator[Row]:
     for name, options in SCENES:
         scene = hl.scene(name, options)
-        for block in blocks(scene):
-            made = component(block.made_by, block.settings)
+        for block in blocks(scene).built:
+            made = component(block.block, block.settings)
             for side, variables in (("input", made.inputs), ("output", made.outputs)):
-                yield from ((block.made_by, side, port(v), units(v)) for v in variables)
+                yield from ((block.block, side, port(v), units(v)) for v in variables)
 
 
 def port(variable: Variable) -> str:
