@@ -97,7 +97,9 @@ def _lines(result: Run, warnings: Sequence[str], name: str, folder: Path) -> Ite
     from hapticlink.orchestrator.results.tables import TABLES
 
     yield f"{name}: {summary.ending(result)}"
-    for line in (*summary.numbers(result), *warnings):
+    doubtful = [line for line in warnings if line.startswith("warning: ")]
+    notes = [line for line in warnings if line not in doubtful]
+    for line in (*doubtful, *summary.numbers(result), *notes):
         yield f"  {line}"
     wall_time = result.run["timings"]["run"]
     if wall_time:  # none where a signal came before the first event
