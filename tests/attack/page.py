@@ -1,5 +1,5 @@
-"""Resets, changes of holds, delays, rates and gains at random behind a page: `Session` itself, whose
-page is played here, in one process for all cases.
+"""Resets, changes of holds, delays, rates and gains at random behind a page: `Session` itself,
+whose page is played here, in one process for all cases.
 
 Whatever the page asks for: a reset begins a run anew, a change is described or refused, and what a
 case leaves behind does not add up: no file handles, no memory maps, and no memory beyond
