@@ -65,8 +65,12 @@ def _case(name: str, folder: Path, draw: random.Random) -> tuple[str, str]:
     while (processes := _marked(str(folder))) and time.monotonic() < until:
         time.sleep(0.05)
     left = [p.name for p in temporary.iterdir()]
+    left += [str(p.relative_to(folder)) for p in (folder / "here").rglob(".*")]
     shutil.rmtree(temporary)
     temporary.mkdir()
+    for path in (folder / "here").iterdir():
+        if path.name not in ("first", "swept"):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
     if process.returncode == -number or _python_itself(process.returncode, said):
         return "before", ""
     broken = any(mark in said for mark in ("Traceback", "Exception ignored", "leaked", "Fatal"))
