@@ -44,8 +44,8 @@ ACTS = (
 PACKED = {"C": ACTS, "Python": tuple(hostile_slave.ACTS)}
 FILES = {"C": "hostile.fmu", "Python": "Hostile{fmi}.fmu"}
 ENDS_THE_PROCESS = ("exit", "exit3", "leave", "abort", "null", "stack", "thread", "queue")
-"""thread: where it outlives the library that it runs; queue: pythonfmu's libraries read the fields of
-what is no message."""
+"""thread: where it outlives the library that it runs; queue: pythonfmu's libraries read the fields
+of what is no message."""
 NEVER_RETURNS = ("loop", "sleep")
 PATIENCE = 90.0
 """Seconds after which a process counts as hung, on a machine that is busy with other things."""
