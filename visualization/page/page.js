@@ -1,6 +1,7 @@
 // The page: messages from and to the run, the buttons, and who draws what.
 import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
+import { Energies } from "./energies.js";
 import { tags } from "./legend.js";
 import { connected } from "./socket.js";
 import { Stage } from "./stage.js";
@@ -12,7 +13,7 @@ const charts = new Charts($("charts"));
 const controls = new Controls($("controls"), send);
 const view = { frame: null, state: {}, frames: 0, refused: null, stage };
 window.view = view; // for tests and for the curious, in the browser's console
-let refusedUntil = 0;
+let refusedUntil = 0, energies = null;
 
 function send(message) { run.send(message); }
 
@@ -21,7 +22,8 @@ const HANDLERS = {
     document.title = $("title").textContent = message.title;
     stage.begin(message.marks, message.shapes);
     view.kinds = message.kinds;
-    charts.begin(message.energies, message.users);
+    energies = new Energies(message);
+    charts.begin([message.port, ...message.power.map(({ name }) => name)], message.users);
     view.frame = null;
   },
   controls: (message) => controls.show(message),
@@ -35,6 +37,7 @@ const HANDLERS = {
   },
   frame(message) {
     const first = !view.frame;
+    energies.add(message);
     view.frame = message;
     view.frames += 1;
     if (first) note();
