@@ -29,19 +29,19 @@ class Drawing:
     places: Sequence[int]
 
 
-def webassembly(
-    program: Resolved,
-    components: Mapping[str, Component],
-    ports: Sequence[Port],
-    drawing: Drawing,
-    folder: Path,
-) -> bytes:
-    """The module, compiled in `folder`; its functions are those of page.c. Raises CompilerError."""
+def webassembly_files(
+    program: Resolved, components: Mapping[str, Component], ports: Sequence[Port], drawing: Drawing
+) -> dict[str, str]:
+    """The C files of the module, whose functions are those of page.c."""
     texts = sources(program, components, ports)
-    program_h = texts.pop("program.c")
-    texts |= {"program.inc": program_h, **_picture(drawing)}
+    texts |= {"program.inc": texts.pop("program.c"), **_picture(drawing)}
     texts[PAGE] = (HERE / PAGE).read_text().replace('"program.c"', '"program.inc"')
     texts["scene.h"] = f'#define GUID ""\n{texts["scene.h"]}'
+    return texts
+
+
+def webassembly(texts: Mapping[str, str], folder: Path) -> bytes:
+    """The module of these files, compiled in `folder`. Raises CompilerError."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
         for file, text in texts.items():

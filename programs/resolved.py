@@ -88,6 +88,8 @@ class Resolved:
     """Of each clock."""
     recorded: frozenset[str]
     """The outputs, `fmu.output`, that the scene records."""
+    start_values: NDArray[np.float64]
+    """The vector of signals at t = 0."""
     changes: Changes
     """What it can be changed to while it runs."""
     kept: object
@@ -173,6 +175,7 @@ def _resolved(
     recorded: frozenset[str],
     changing: bool,
 ) -> Resolved:
+    start_values = simulation.signals.values.copy()
     _as_before_the_start(simulation, outside, changing)
     system = simulation.system
     machine = Machine(load(), simulation)
@@ -223,6 +226,7 @@ def _resolved(
         meters=machine.names("meter"),
         patterns=events.patterns,
         recorded=recorded,
+        start_values=start_values,
         changes=found,
         tables=machine.names("table"),
         kept=(machine, events, setters, memory, rows),

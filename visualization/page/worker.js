@@ -21,6 +21,8 @@ function begin() {
 function tell() {
   postMessage({ type: "controls", ...run.controls });
   postMessage(state);
+  const is_changed = JSON.stringify(run.controls) !== JSON.stringify(data.controls);
+  postMessage(is_changed ? { ...data.map, verdict: "", said: "computed for the settings of the start alone" } : data.map);
 }
 
 // Ends a run that cannot go on, with the reason.
@@ -63,7 +65,6 @@ const HANDLERS = {
     Object.assign(changed, message.changed);
     module = new WebAssembly.Module(await unpacked(message.program));
     begin();
-    postMessage(data.map);
     setInterval(turn, 2);
   },
   frame() {

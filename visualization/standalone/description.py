@@ -40,6 +40,11 @@ class Description:
         references: dict[str, list[int]] = {}
         for reference, port in enumerate(ports):
             references.setdefault(port.name.partition("[")[0], []).append(reference)
+        self.parameters = {name: value.tolist() for name, (value, _) in offered.gains.items()}
+        """The gains with which the page begins, with all hands pulling where the handles are."""
+        for user, found in places.items():
+            handle = [float(program.start_values[place]) for place in found["handle"]]
+            self.parameters[target(user)] = handle
         hands = {u: {"stiffness": stiffness(u), "target": target(u)} for u in users(scene)}
         chosen = [*offered.gains, *(hand["target"] for hand in hands.values())]
         self.data: dict[str, Any] = {
