@@ -4,7 +4,8 @@
 static int64_t previous(const Model *m, int clock) {
     const Clock *c = m->now.scene.events.clocks + clock;
     if (c->at) return c->starts[c->at - 1];
-    return patterns[clock].n ? c->starts[patterns[clock].n - 2] - patterns[clock].ticks : 0;
+    if (!patterns[clock].n || !m->now.scene.events.events) return 0;
+    return c->starts[patterns[clock].n - 2] - patterns[clock].ticks;
 }
 
 /* --- holds ----------------------------------------------------------------------------------- */

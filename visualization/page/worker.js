@@ -14,6 +14,7 @@ function begin() {
   origin = seconds();
   rows = state.recording ? [] : null;
   run = new Program(module, data, changed);
+  guarded(tick); // that of t = 0
   postMessage({ ...data.scene, type: "scene" });
   tell();
 }
