@@ -1,5 +1,7 @@
 // A scene compiled to WebAssembly (programs/page.c): one run of it, its frames, and what is changed of it.
 
+import { loudness } from "./loudness.js";
+
 // The bytes of a module, which the page has compressed and as text.
 export const unpacked = async (text) => {
   const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -130,6 +132,14 @@ export class Program {
     const work = this.numbers(this.c.work(this.m), 2 * data.scene.power.length);
     frame.booked = data.scene.power.map((_, i) => [work[2 * i], work[2 * i + 1]]);
     return frame;
+  }
+
+  // What is heard of the newest signals.
+  heard(signal) {
+    const values = this.numbers(this.c.signal_values(this.m), this.data.n_values);
+    this.places ??= Object.fromEntries(this.data.signals.filter(({ user }) => !user).map(({ name, places }) => [name, places]));
+    const of = (name) => this.places[name].map((place) => values[place]);
+    return loudness(signal, { F_hand: of("F_hand"), x: of("x"), handle: of("handle") });
   }
 
   // Time and all outputs at the newest haptic event.

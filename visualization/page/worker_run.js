@@ -1,5 +1,5 @@
 // A run in a worker of the page's own file: the same messages as with a server. A frame is asked for whenever the
-// screen is drawn.
+// screen is drawn. Beyond what a server can, it compares two settings, and sends samples to be heard.
 export function started({ received, opened, lost }) {
   const element = (id) => document.getElementById(id).textContent;
   const worker = new Worker(URL.createObjectURL(new Blob([element("worker")], { type: "text/javascript" })));
@@ -9,7 +9,11 @@ export function started({ received, opened, lost }) {
   opened();
   const ask = () => { worker.postMessage({ type: "frame" }); requestAnimationFrame(ask); };
   ask();
-  return { send: (message) => worker.postMessage(message) };
+  return {
+    send: (message) => worker.postMessage(message),
+    compare: (on) => worker.postMessage({ type: "compare", on }),
+    listen: (signal, port) => worker.postMessage({ type: "sound", signal, port }, port ? [port] : []),
+  };
 }
 
 function save({ name, text }) {

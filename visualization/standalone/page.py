@@ -26,8 +26,8 @@ from hapticlink.visualization.replay import one_file
 from hapticlink.visualization.standalone.description import Description
 
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; "
-    "style-src 'unsafe-inline'; img-src data:"
+    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob: data:; "
+    "worker-src blob:; style-src 'unsafe-inline'; img-src data:"
 )
 """Content security policy of the file: what is in it, and nothing from elsewhere."""
 MODULE = "page.wasm"
@@ -54,7 +54,11 @@ def html(scene: Scene, name: str) -> str:
     verdict = predicted(scene, Settings(), description.parameters)
     description.data["map"] = {"type": "map"} | verdict
     packed = base64.b64encode(gzip.compress(module, 9, mtime=0)).decode()
-    extra = {"worker": one_file.bundle("worker.js"), "program": packed}
+    extra = {
+        "worker": one_file.bundle("worker.js"),
+        "sound": one_file.bundle("sound_worklet.js"),
+        "program": packed,
+    }
     return one_file.page("index.html", description.data, extra, POLICY)
 
 

@@ -26,6 +26,8 @@ def javascript(module: str, statements: str, given: Any) -> Any:
         f"let answer;\nconst given = {json.dumps(given)};\n{program}\n{statements}\n"
         "console.log(JSON.stringify(answer));"
     )
-    done = subprocess.run([NODE, "-"], input=whole, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [NODE, "--input-type=module", "-"], input=whole, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
