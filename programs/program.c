@@ -41,6 +41,12 @@ typedef struct {
     int64_t n, ticks;
 } Pattern;
 
+/* Kinds of events in which the changed clock takes steps of any length, others as in `key`: for one of
+ * `dticks` the operations from `first` on, that grow with each tick by `slopes` from there on. */
+typedef struct {
+    int64_t first, n, dticks, slopes, key[8];
+} Family;
+
 enum { GET_REAL, SET_REAL, DO_STEP, GET_STATE, SET_STATE };
 
 typedef struct {
@@ -100,12 +106,22 @@ static const double TOLERANCE = 1e-12; /* of start values: run/initialize.py */
 static const double GROWTH = 1e12;     /* of outputs without a bound: fmi/output_bounds.py */
 static const double NEAR = 1e-3;       /* of a tick, by which a time may be before it */
 
+enum { MOST_POINTS = 64 }; /* of the window of a clock whose rate was changed */
+
+typedef struct { /* of the scene while it runs: changes.h */
+    int64_t chosen[N_HOLDS + 1], delay[N_HOLDS + 1]; /* 1 + choice, 0: the scene's; ticks, -1: the scene's */
+    int64_t millihertz, begun, index, kinds; /* 0: the scene's rate; points and kinds made since */
+    double jitter;
+    Pcg64 generator;
+} Changes;
+
 typedef struct { /* what fmi2GetFMUstate saves, beside the states of the blocks */
     char guid[40];
     int64_t mode, settled, tick; /* settled: start values agree. tick: where the program stands */
     double time;
     Pcg64 generators[N_LATENCIES + 1];
     double step_errors[N_FMUS][N_CHECKED + 1]; /* sums of the rows of step checks that are dropped */
+    Changes changes;
     Scene scene;
 } State;
 
@@ -189,6 +205,8 @@ static const void *function(const Member *member, int which) {
     return (const void *)member->set_state;
 }
 
+static void use_chosen(Model *m);
+
 /* Writes all pointers of the scene: into itself, to the blocks and to their functions. */
 static void relocate(Model *m) {
     for (int i = 0; i < N_POINTERS; i++)
@@ -197,6 +215,7 @@ static void relocate(Model *m) {
     for (int i = 0; i < N_CALLS; i++)
         put(m, calls[i].at, function(members + calls[i].member, calls[i].function));
     for (int i = 0; i < N_SLOTS; i++) put(m, slots[i], m->slots + i);
+    use_chosen(m);
 }
 
 static void restart(Model *m) {
@@ -270,6 +289,8 @@ static int begin(Model *m) {
     return loop_carry_out(l, 0, &at);
 }
 
+#include "changes.h"
+
 /* --- events ---------------------------------------------------------------------------------- */
 
 static int64_t next_tick(const Events *e) {
@@ -294,10 +315,12 @@ static int next_window(Clock *c, const Pattern *p) {
 
 static void draw(Model *m, int64_t hold) {
     int i = 0;
-    while (latencies[i].hold != hold) i++;
     Link *link = m->now.scene.loop.holds[hold]->link;
+    const Changes *now = &m->now.changes;
+    const int is_changed = now->chosen[hold] && now->delay[hold] >= 0;
+    while (!is_changed && latencies[i].hold != hold) i++;
     for (int64_t k = 0; k < link->n_late; k++)
-        link->late[k] = latency_draw(latencies + i, m->now.generators + i);
+        link->late[k] = is_changed ? now->delay[hold] : latency_draw(latencies + i, m->now.generators + i);
     link->at_late = 0;
 }
 
@@ -348,10 +371,14 @@ static int serve(Model *m, int code) {
     switch (code) {
     case PAUSE: return 1;
     case STARTS:
+        if (next_rated_window(m, s->events.clocks + at->what)) return 1;
         if (next_window(s->events.clocks + at->what, patterns + at->what)) return 1;
         fail(m, fmi2Error, "the scene's communication points end at t = %.17g s: give it a longer "
              "duration", seconds(m, next_tick(&s->events)));
         return 0;
+    case KIND:
+        if (new_kind(m)) return 1;
+        break;
     case DRAW: draw(m, op->a); return 1;
     case JUDGE:
         at->op++;
