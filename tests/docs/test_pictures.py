@@ -26,8 +26,9 @@ def test_the_pages_of_scenes_are_those_of_their_files() -> None:
 
 
 def test_every_scene_has_its_picture() -> None:
-    """Those of the shipped scenes and of the examples of own-linkage.md, and no others."""
-    examples = [b.title.removesuffix(".toml") for b in blocks(DOCS / "own-linkage.md", "toml")]
+    """Those of the shipped scenes and of the linkages that pages describe, and no others."""
+    pages = ("own-linkage.md", "scenes.md")
+    examples = [b.title.removesuffix(".toml") for p in pages for b in blocks(DOCS / p, "toml")]
     wanted = sorted([*hl.shipped(), *filter(None, examples)])
     assert sorted(p.stem for p in FOLDERS[0].iterdir()) == wanted
 

@@ -1,8 +1,10 @@
-// The page: the socket to the run, the buttons, and who draws what.
+// The page: messages from and to the run, the buttons, and who draws what.
 import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
 import { tags } from "./legend.js";
+import { connected } from "./socket.js";
 import { Stage } from "./stage.js";
+import { started } from "./worker_run.js";
 
 const $ = (id) => document.getElementById(id);
 const stage = new Stage($("scene"), $("legend"), (at, user) => send({ type: "hand", at, user }));
@@ -10,11 +12,9 @@ const charts = new Charts($("charts"));
 const controls = new Controls($("controls"), send);
 const view = { frame: null, state: {}, frames: 0, refused: null, stage };
 window.view = view; // for tests and for the curious, in the browser's console
-let socket = null, refusedUntil = 0;
+let refusedUntil = 0;
 
-function send(message) {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
-}
+function send(message) { run.send(message); }
 
 const HANDLERS = {
   scene(message) {
@@ -67,20 +67,9 @@ function note() {
     (recording && `recording to ${recording}`) || (!view.frame && "the FMUs are being built ...") || "";
 }
 
-function connect() {
-  const url = new URL("run", location.href);
-  url.protocol = "ws:";
-  socket = new WebSocket(url);
-  socket.onopen = note;
-  socket.onmessage = (event) => {
-    const message = JSON.parse(event.data);
-    HANDLERS[message.type]?.(message);
-  };
-  socket.onclose = () => {
-    $("note").textContent = "The run has ended, or its connection: start hapticlink view again.";
-    setTimeout(connect, 2000);
-  };
-}
+function received(message) { HANDLERS[message.type]?.(message); }
+
+function lost(why) { $("note").textContent = why; }
 
 const act = (what) => send({ type: "time", do: what });
 $("pause").onclick = () => act(view.state.paused ? "resume" : "pause");
@@ -104,5 +93,6 @@ function draw() {
   charts.draw();
   requestAnimationFrame(draw);
 }
-connect();
+// The run is in this file, as its data, or behind the server that the page is from.
+const run = ($("data") ? started : connected)({ received, opened: note, lost });
 draw();
