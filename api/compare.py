@@ -16,6 +16,7 @@ from hapticlink.visualization.compare.numbers import Row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+SETTINGS = "Settings that differ"
 AnyRun = Results | Path | str
 
 
@@ -32,7 +33,7 @@ class Comparison:
         performance, energies, stability, timing."""
         every = list(self.runs.values())
         rows = [Row(key, values) for key, values in settings.differing(every).items()]
-        return {"Settings that differ": rows, **numbers.sections(every)}
+        return {SETTINGS: rows, **numbers.sections(every)}
 
     @property
     def note(self) -> str:
@@ -62,9 +63,14 @@ class Comparison:
         return f"comparison of {', '.join(self.runs)}"
 
     def _repr_html_(self) -> str:
-        (title, rows), *_ = self.tables.items()
-        opening = page.opening(self.runs, "h3")
-        return f"{opening}<h4>{title}</h4>{page.table(list(self.runs), rows)}"
+        rows = [
+            row
+            for title, rows in self.tables.items()
+            if title == SETTINGS or title.startswith(numbers.PERFORMANCE)
+            for row in rows
+            if len({*row.values}) > 1
+        ]
+        return page.opening(self.runs, "h3") + page.table(list(self.runs), rows)
 
 
 def compare(

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from hapticlink.commands.options import (
     Json,
+    Map,
     Out,
     Quiet,
     Scene,
@@ -42,6 +43,7 @@ def run(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
+    map: Map = None,
     figures: Figures = True,
     explain: Explain = False,
     real_time: RealTime = False,
@@ -63,11 +65,11 @@ def run(
     import hapticlink as hl
     from hapticlink.analysis.findings import summary
 
-    overrides = options(set, swap)
+    overrides = options(set, swap, map)
     if explain:
         say(*hl.explain(scene, overrides), sep="\n")
         return 0
-    folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ())))
+    folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ()), *(map or ())))
     try:
         read = hl.scene(scene, overrides)
         with progress(read.title, read.duration, hidden=quiet) as report:

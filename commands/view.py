@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter, validators
 
 from hapticlink.commands import completion
-from hapticlink.commands.options import Out, Set, Swap, default_folder, options
+from hapticlink.commands.options import Map, Out, Set, Swap, default_folder, options
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
@@ -70,6 +70,7 @@ def view(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
+    map: Map = None,
     host: Host = "127.0.0.1",
     port: Port = None,
     browser: Browser = True,
@@ -89,7 +90,7 @@ def view(
         hapticlink view runs/on runs/off --export on-and-off.gif
     """
     if Path(scene).is_dir() and (second or export or not _is_scene(scene)):
-        if set or swap or out:
+        if set or swap or map or out:
             raise InputFault(
                 f"{scene} is the folder of a run: --set, --swap and --out apply to scenes only"
             )
@@ -106,7 +107,7 @@ def view(
     from hapticlink.visualization.live.mouse_hand import viewed
     from hapticlink.visualization.live.session import Session
 
-    read = viewed(scene, options(set, swap))
+    read = viewed(scene, options(set, swap, map))
     if standalone:
         return _written(read, scene, standalone)
     default = default_folder("runs", scene)

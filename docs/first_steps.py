@@ -19,7 +19,7 @@ r = hl.run("closed-loop-direct", {"graphics.rate": 30, "duration": 1.0})
 if r.fault:
     raise SystemExit(r.fault)
 print(r)
-r  # noqa: B018
+r
 
 # %% [markdown]
 # Signals are NumPy arrays by name. Rates differ, so that each signal has its own times.

@@ -80,9 +80,9 @@ def test_the_first_steps_show_themselves_in_a_notebook(tmp_path: Path) -> None:
     value = {
         last: found[-1]["data"] for last, found in shown.items() if "data" in (found or [{}])[-1]
     }
-    run = "".join(value["r  # noqa: B018"]["text/html"])
-    assert ": done at 1 s" in "".join(shown["r  # noqa: B018"][0]["text"])
-    assert '<p class="verdict">done at 1 s</p>' in run
+    run = "".join(value["r"]["text/html"])
+    assert ": done at 1 s" in "".join(shown["r"][0]["text"])
+    assert "<p><b>done at 1 s</b></p>" in run
     assert run.count("<img ") == 1
     assert run.count("<li>") == 3
     for figure in ('r.figures()["distance"]', "s.figure()"):

@@ -10,5 +10,5 @@ from hapticlink.visualization.figure_axes import png
 class ShownFigure(Figure):
     """A Matplotlib figure with a picture of itself."""
 
-    def _repr_png_(self) -> bytes:
-        return png(self)
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        return png(self), {"width": round(100 * self.get_figwidth())}

@@ -312,9 +312,11 @@ def _percent(how: str, share: float) -> str:
 
 
 def replaced(replacements: Mapping[str, Replacement]) -> Iterator[str]:
-    """Lines for the ports that FMUs in the place of blocks lack, and for their inputs that nothing
-    feeds."""
+    """Lines for the ports that FMUs in the place of blocks call otherwise or lack, and for their
+    inputs that nothing feeds."""
     for name, replacement in replacements.items():
+        for port, own in replacement.mapped.items():
+            yield f"{name}: {port} is what the FMU calls {', '.join(own)}"
         if lost := replacement.lost:
             yield f"{name} has no ports for {len(lost)} connections: {', '.join(lost)}"
         if unfed := replacement.unfed:

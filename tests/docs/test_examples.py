@@ -12,7 +12,6 @@ import shlex
 import subprocess
 import sys
 import tomllib
-from itertools import groupby
 from pathlib import Path
 
 import jsonschema
@@ -75,10 +74,12 @@ TOOLS = ("fmpy", "pythonfmu")
 """Commands of other packages, which are installed beside Python."""
 
 
-def shown(command: str) -> str:
-    """A command as it is run, some with a shorter duration."""
+def shown(command: str, folder: Path) -> str:
+    """A command as it is run: some with a shorter duration; after the first run of a page without
+    figures, which that one has drawn."""
     limits = (f" --set duration={limit}" for key, limit in SHORTER.items() if key in command)
-    return command + next(limits, "")
+    again = command.startswith("hapticlink run ") and (folder / "runs").exists()
+    return command + next(limits, "") + " --no-figures" * (again and "--no-fig" not in command)
 
 
 def failures(folder: Path, block: Block) -> dict[str, str]:
@@ -88,19 +89,17 @@ def failures(folder: Path, block: Block) -> dict[str, str]:
         return {}
     if block.language == "python":
         return _failed(folder, sys.executable, "-c", block.text)
-    found = {}
-    wanted = [c for c in block.commands if c not in NOT_RUN and not UNTIL_STOPPED.match(c)]
-    for ours, commands in groupby(wanted, lambda c: c.startswith("hapticlink ")):
-        if ours:
-            each = [*commands]
-            ended = hapticlink(folder, *map(shown, each))
-            found |= {c: e.said for c, e in zip(each, ended, strict=True) if e.status}
+    failed = {}
+    for command in block.commands:
+        words = shlex.split(command)
+        if command in NOT_RUN or UNTIL_STOPPED.match(command):
             continue
-        for command in commands:
-            words = shlex.split(command)
-            if words[0] in TOOLS:
-                found |= _failed(folder, str(Path(sys.executable).with_name(words[0])), *words[1:])
-    return found
+        if words[0] == "hapticlink":
+            (ended,) = hapticlink(folder, shown(command, folder))
+            failed |= {command: ended.said} if ended.status else {}
+        elif words[0] in TOOLS:
+            failed |= _failed(folder, str(Path(sys.executable).with_name(words[0])), *words[1:])
+    return failed
 
 
 def _failed(folder: Path, *words: str) -> dict[str, str]:

@@ -36,7 +36,7 @@ def opening(runs: Mapping[str, Results], heading: str = "h1") -> str:
     titles = dict.fromkeys(run.record.scene["title"] for run in every)
     if len(every) == 1:
         (run,) = every
-        parts = [f"<{heading}>{escape(*titles)}</{heading}>", _verdict(summary.ending(run), run)]
+        parts = [f"<{heading}>{escape(*titles)}</{heading}>", f"<p>{_verdict(run)}</p>"]
         if drawn := of_a_run.drawings(run).get("mechanism"):
             parts.append(_picture("mechanism", drawn()))
         lines = "".join(f"<li>{escape(x)}</li>" for x in islice(summary.numbers(run), NUMBERS))
@@ -45,16 +45,20 @@ def opening(runs: Mapping[str, Results], heading: str = "h1") -> str:
     first = next((name for name in figures), None)
     headline = figures[first].axes[0].get_title() if first else "; ".join(titles)
     parts = [f"<{heading}>{escape(headline)}</{heading}>"]
-    parts += [_verdict(f"{name}: {summary.ending(run)}", run) for name, run in runs.items()]
+    ends: dict[str, list[str]] = {}
+    for name, run in runs.items():
+        ends.setdefault(_verdict(run), []).append(name)
+    parts += [f"<p>{escape(', '.join(names))}: {said}</p>" for said, names in ends.items()]
     if other := settings.other_scenes(every):
         parts.append(f'<p class="note">{escape(other)}</p>')
     return "\n".join([*parts, *([_picture(first, figures[first])] if first else [])])
 
 
-def _verdict(text: str, run: Results) -> str:
-    fault = run.record.fault
-    said = f"{text}: {fault.message}" if fault else text
-    return f'<p class="{"bad" if fault else "verdict"}">{escape(said)}</p>'
+def _verdict(run: Results) -> str:
+    """How a run ended, with its fault."""
+    if fault := run.record.fault:
+        return f'<b class="bad">{escape(f"{summary.ending(run)}: {fault.message}")}</b>'
+    return f"<b>{escape(summary.ending(run))}</b>"
 
 
 def page(runs: Mapping[str, Results]) -> str:
