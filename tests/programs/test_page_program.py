@@ -4,7 +4,6 @@ changed in the same way at the same ticks."""
 from __future__ import annotations
 
 import json
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -31,6 +30,7 @@ from hapticlink.programs.page_program import webassembly_files
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolved import resolved
 from hapticlink.visualization.live.mouse_hand import STIFFNESS, viewed
+from hapticlink.visualization.replay import one_file
 from hapticlink.visualization.standalone import page
 from hapticlink.visualization.standalone.description import Description
 from tests.visualization.live.javascript import javascript
@@ -64,18 +64,11 @@ for (let i = 1; i <= given.events; i++) {
 """
 
 
-def of_page(text: str, id_: str) -> str:
-    """The text of an element of a page."""
-    found = re.search(rf'id="{id_}">(.*?)</script>', text, re.DOTALL)
-    assert found
-    return found[1]
-
-
 def under_node(scene: Scene, changes: list[tuple[int, dict[str, Any]]]) -> np.ndarray:
     """The vector of signals after each haptic event."""
     text = page.html(scene, "page")
-    data = json.loads(of_page(text, "data"))
-    given = {"data": data, "program": of_page(text, "program"), "changes": changes}
+    data = json.loads(one_file.element(text, "data"))
+    given = {"data": data, "program": one_file.element(text, "program"), "changes": changes}
     return np.array(javascript("program.js", RUN, given | {"events": EVENTS}))
 
 

@@ -41,6 +41,12 @@ def page(
     )
 
 
+def element(html: str, name: str) -> str:
+    """The text in an element of a page that `page` has written."""
+    _, _, rest = html.partition(f'id="{name}">')
+    return rest.partition("</script>")[0]
+
+
 def bundle(name: str) -> str:
     """A module of the page with those that it imports, each a function that returns what it
     exports, in the order in which they need each other."""
