@@ -23,6 +23,7 @@ Benchmark = Literal[
     "stress",
     "view",
     "one",
+    "standalone",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores."""
 FOLDERS = {"stress": "stability"}
@@ -50,6 +51,7 @@ def bench(
     - stress: hard scenes at the edge of stability and beyond, each with the outcome it has to have
     - view: deadlines missed and latencies while a browser drags
     - one: a scene as one FMU, beside its run through FMUs
+    - standalone: a scene as a page in one file: size, and speed in a browser
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.

@@ -139,27 +139,22 @@ typedef struct {
     fmi2FMUstate members[N_MEMBERS];
 } Saved;
 
+#include "fmi2_common.h"
+
 /* --- messages ------------------------------------------------------------------------------- */
 
-static void say(const Model *m, fmi2Status status, const char *text) {
-    static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
-                                             "logStatusError", "logStatusFatal"};
-    m->callbacks.logger(m->callbacks.componentEnvironment, m->name, status, categories[status], text);
+static const char *standing(const Model *m) {
+    switch (m->now.mode) {
+    case INSTANTIATED: return "is instantiated";
+    case INITIALIZATION: return "is in initialisation mode";
+    case STEP_MODE: return "is initialised";
+    case ENDED: return "has ended the simulation";
+    case FAILURE: return "has failed; reset it or restore a state";
+    }
+    return "is terminated";
 }
 
-static fmi2Status fail(const Model *m, fmi2Status status, const char *format, ...) {
-    if (!m) return fmi2Error; /* without an instance there is nobody to tell */
-    char message[1024], text[2 * sizeof message], *to_text = text;
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(message, sizeof message, format, arguments);
-    va_end(arguments);
-    for (const char *c = message; *c; *to_text++ = *c++)
-        if (*c == '%') *to_text++ = '%'; /* the logger takes a message for a format (2.1.5) */
-    *to_text = 0;
-    say(m, status, text);
-    return status;
-}
+static int has_ended(const Model *m) { return m->now.mode == ENDED; }
 
 /* Messages of a block, with its name. */
 static void member_logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
@@ -168,25 +163,6 @@ static void member_logger(fmi2ComponentEnvironment environment, fmi2String name,
     snprintf(text, sizeof text, "%s: %s", name, message);
     say(environment, status, text);
     (void)category;
-}
-
-static int out_of_order(const Model *m, const char *call, int allowed) {
-    const int64_t mode = m ? m->now.mode : 0;
-    if (mode & allowed) return 0;
-    fail(m, fmi2Error, "%s may not be called: the FMU %s", call,
-         mode == INSTANTIATED     ? "is instantiated"
-         : mode == INITIALIZATION ? "is in initialisation mode"
-         : mode == STEP_MODE      ? "is initialised"
-         : mode == ENDED          ? "has ended the simulation"
-         : mode == FAILURE        ? "has failed; reset it or restore a state"
-                                  : "is terminated");
-    return 1;
-}
-
-static int is_null(const Model *m, const char *call, size_t n, const void *a, const void *b) {
-    if (m && (!n || (a && b))) return 0;
-    fail(m, fmi2Error, "%s got a null pointer for %zu entries", call, n);
-    return 1;
 }
 
 /* --- the data of the scene ------------------------------------------------------------------- */
@@ -423,9 +399,6 @@ static int advance(Model *m, int64_t until) {
 
 /* --- life of an instance -------------------------------------------------------------------- */
 
-const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
-const char *fmi2GetVersion(void) { return fmi2Version; }
-
 void fmi2FreeInstance(fmi2Component c) {
     Model *m = c;
     if (!m) return;
@@ -461,11 +434,6 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     }
     restart(m);
     return m;
-}
-
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
-                               const fmi2String categories[]) {
-    return c ? fmi2OK : fmi2Error; /* failures are always logged; there is nothing else to say */
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
@@ -575,17 +543,6 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
     return fmi2OK;
 }
 
-#define HAS_NO(verb, kind, type)                                                                \
-    fmi2Status fmi2##verb##kind(fmi2Component c, References vr, size_t n, type value[]) {       \
-        return c && !n ? fmi2OK : fail(c, fmi2Error, "no variable is of type " #kind);          \
-    }
-HAS_NO(Get, Integer, fmi2Integer)
-HAS_NO(Get, Boolean, fmi2Boolean)
-HAS_NO(Get, String, fmi2String)
-HAS_NO(Set, Integer, const fmi2Integer)
-HAS_NO(Set, Boolean, const fmi2Boolean)
-HAS_NO(Set, String, const fmi2String)
-
 /* --- stepping ------------------------------------------------------------------------------- */
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolean no_way_back) {
@@ -611,53 +568,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     return fmi2OK;
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c) {
-    return fail(c, fmi2Error, "no step is ever pending");
-}
-
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
-    if (!c || !value) return fmi2Error;
-    if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = ((Model *)c)->now.time;
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
-    if (!c || !value) return fmi2Error;
-    if (kind != fmi2Terminated) return fmi2Discard;
-    *value = ((Model *)c)->now.mode == ENDED;
-    return fmi2OK;
-}
-
-#define NOT_KEPT(name, type)                                                                    \
-    fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) { return fmi2Discard; }
-NOT_KEPT(fmi2GetStatus, fmi2Status)
-NOT_KEPT(fmi2GetIntegerStatus, fmi2Integer)
-NOT_KEPT(fmi2GetStringStatus, fmi2String)
-
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, References vr, size_t n,
-                                       const fmi2Integer order[], const fmi2Real value[]) {
-    return fail(c, fmi2Error, "inputs are constant over a step");
-}
-
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, References vr, size_t n,
-                                        const fmi2Integer order[], fmi2Real value[]) {
-    return fail(c, fmi2Error, "there are no derivatives of outputs");
-}
-
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, References unknown, size_t n,
-                                        References known, size_t k, const fmi2Real seed[],
-                                        fmi2Real derivative[]) {
-    return fail(c, fmi2Error, "there are no directional derivatives");
-}
-
 /* --- FMU state ------------------------------------------------------------------------------ */
-
-static int is_ours(const Model *m, const void *bytes) {
-    if (m && bytes && !memcmp(bytes, GUID, sizeof GUID)) return 1;
-    fail(m, fmi2Error, "this FMU state was not saved by this FMU");
-    return 0;
-}
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     Model *m = c;

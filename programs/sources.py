@@ -15,7 +15,7 @@ import fmpy
 import numpy as np
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.native.archive import WRAPPER
+from hapticlink.fmus.native.archive import COMMON, WRAPPER
 from hapticlink.fmus.native.source import component_source, number
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.in_process import InProcess
@@ -44,6 +44,7 @@ def sources(
 ) -> dict[str, str]:
     """All C files by name; scene.h lacks the GUID. components: by member."""
     files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in REPLACED}
+    files[COMMON.name] = COMMON.read_text()
     files["hold_laws.h"] = loop.LAWS["text"]()
     files |= {name: (HERE / name).read_text() for name in OWN}
     headers = Path(fmpy.__file__).parent / "c-code"

@@ -4,7 +4,6 @@ changed in the same way at the same ticks."""
 from __future__ import annotations
 
 import json
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -31,6 +30,7 @@ from hapticlink.programs.page_program import webassembly_files
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolved import resolved
 from hapticlink.visualization.live.mouse_hand import STIFFNESS, viewed
+from hapticlink.visualization.replay import one_file
 from hapticlink.visualization.standalone import page
 from hapticlink.visualization.standalone.description import Description
 from tests.visualization.live.javascript import javascript
@@ -52,7 +52,8 @@ CHANGES: list[tuple[int, dict[str, Any]]] = [
 """After so many haptic events."""
 EVENTS = 512
 RUN = """
-const module = new WebAssembly.Module(await unpacked(given.program)), program = new Program(module, given.data);
+const module = new WebAssembly.Module(await unpacked(given.program));
+const program = new Program(module, given.data);
 const changes = [...given.changes];
 answer = [];
 for (let i = 1; i <= given.events; i++) {
@@ -63,18 +64,11 @@ for (let i = 1; i <= given.events; i++) {
 """
 
 
-def of_page(text: str, id_: str) -> str:
-    """The text of an element of a page."""
-    found = re.search(rf'id="{id_}">(.*?)</script>', text, re.DOTALL)
-    assert found
-    return found[1]
-
-
 def under_node(scene: Scene, changes: list[tuple[int, dict[str, Any]]]) -> np.ndarray:
     """The vector of signals after each haptic event."""
     text = page.html(scene, "page")
-    data = json.loads(of_page(text, "data"))
-    given = {"data": data, "program": of_page(text, "program"), "changes": changes}
+    data = json.loads(one_file.element(text, "data"))
+    given = {"data": data, "program": one_file.element(text, "program"), "changes": changes}
     return np.array(javascript("program.js", RUN, given | {"events": EVENTS}))
 
 
@@ -99,6 +93,8 @@ def changed_run(scene: Scene, folder: Path, apply: Callable[[LiveRun, Any], None
             rows.append(simulation.signals.values.copy())
             while changes and changes[0][0] == len(rows):
                 apply(live, changes.pop(0)[1])
+                for instance in simulation.instances.values():
+                    instance.settle()  # which a run in real time does before its steps
 
         loop.events.patience(0)
         loop.run(turn)
@@ -172,8 +168,8 @@ def test_webassembly_has_the_bits_of_the_same_c_with_the_same_sine(tmp_path: Pat
         (tmp_path / name).write_text(text)
     numbers = description.data["n_values"]
     sizes = [f"-DEVENTS={EVENTS}", f"-DN_NUMBERS={numbers}", "-DEXPORT="]
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-linux-musl", *FLAGS, *sizes,
-               "-w", "-o", "native", *(p.name for p in tmp_path.glob("*.c")), "-lm"]  # fmt: skip
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-linux-musl", *FLAGS, "-w"]
+    command += [*sizes, "-o", "native", *(p.name for p in tmp_path.glob("*.c")), "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
     native = subprocess.run(["./native"], cwd=tmp_path, check=True, capture_output=True).stdout
     expected = np.frombuffer(native).reshape(EVENTS, numbers)

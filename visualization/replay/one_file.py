@@ -41,11 +41,17 @@ def page(
     )
 
 
+def element(html: str, name: str) -> str:
+    """The text in an element of a page that `page` has written."""
+    _, _, rest = html.partition(f'id="{name}">')
+    return rest.partition("</script>")[0]
+
+
 def bundle(name: str) -> str:
     """A module of the page with those that it imports, each a function that returns what it
-    exports, in the order in which they need each other."""
+    exports, in the order in which they need each other; it comes last, and as it is."""
     *needed, last = _ordered(name, [])
-    wrapped = (f"const {_variable(n)} = (() => {{\n{_module(n)}}})();\n" for n in needed)
+    wrapped = (f"const {_variable(n)} = (() => {{\n{_module(n)}{_end(n)}}})();\n" for n in needed)
     return "".join([*wrapped, _module(last)])
 
 
@@ -62,10 +68,13 @@ def _needs(name: str) -> Iterator[str]:
 
 def _module(name: str) -> str:
     text = _text(name)
-    exported = ", ".join(EXPORT.findall(text))
     text = IMPORT.sub(lambda found: f"const {{ {found[1]} }} = {_variable(found[2])};", text)
-    end = f"return {{ {exported} }};\n" if exported else ""
-    return EXPORT.sub("", text) + end
+    return EXPORT.sub("", text)
+
+
+def _end(name: str) -> str:
+    """The statement by which a module returns what it exports."""
+    return f"return {{ {', '.join(EXPORT.findall(_text(name)))} }};\n"
 
 
 def _variable(name: str) -> str:

@@ -19,11 +19,8 @@ def javascript(module: str, statements: str, given: Any) -> Any:
     given."""
     if not NODE:
         pytest.skip("node is not installed")
-    text = one_file.bundle(module)
-    head, _, end = text.rpartition("return {")
-    program = text if not end else head
     whole = (
-        f"let answer;\nconst given = {json.dumps(given)};\n{program}\n{statements}\n"
+        f"let answer;\nconst given = {json.dumps(given)};\n{one_file.bundle(module)}\n{statements}\n"
         "console.log(JSON.stringify(answer));"
     )
     done = subprocess.run(
