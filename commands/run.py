@@ -81,7 +81,7 @@ def run(
         result = ended.run
     if result.fault:
         say(f"hapticlink: {result.fault}", file=sys.stderr)
-    warnings = result.run.get("warnings")
+    warnings = result.record.warnings
     if warnings is None:  # no row is in the folder, or too many to be read back
         warnings = list(summary.lines(result))
     if quiet or json:
@@ -99,12 +99,12 @@ def _lines(result: Run, warnings: Sequence[str], name: str, folder: Path) -> Ite
     yield f"{name}: {summary.ending(result)}"
     for line in (*summary.numbers(result), *warnings):
         yield f"  {line}"
-    wall_time = result.run["timings"]["run"]
-    if wall_time:  # none where a signal came before the first event
-        speed = result.run["end"]["time"] / wall_time
+    wall_time, end_time = result.record.timings.run, result.record.end.time
+    if wall_time and end_time is not None:  # none where a signal came before the first event
+        speed = end_time / wall_time
         yield f"  {wall_time:.2f} s of run time, {speed:.1f} times real time"
     if result.folder:
-        names = sorted(result.run["files"], key=lambda name: not name.endswith(TABLES))
+        names = sorted(result.record.files, key=lambda name: not name.endswith(TABLES))
         yield f"  {folder}/: {', '.join(names)}"
     else:
         yield f"  {folder}/: nothing written, the run failed before the first sample"
