@@ -63,9 +63,9 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     for several labels y."""
     from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
-    end = results.run["end"]
-    if end["reason"] != "duration":
-        why = _ENDS.get(end["reason"], "a fault ended the run")
+    reason = results.record.end.reason
+    if reason != "duration":
+        why = _ENDS.get(reason, "a fault ended the run")
         title += f", until {why} at {short(last_time(results))} s"
     figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
     framed(figure)

@@ -217,9 +217,10 @@ def _stopped(results: Results) -> Iterator[str]:
     its energy between steps."""
     table = of_block(results, MECHANISM_STOPS)
     if table and (results.record.scene["contacts"] or {}).get("detection") == "graphics":
+        method = results.record.scene["mechanism"]["integrator"]
         yield (
-            "passive-midpoint makes no energy within a step, but each new frame of contacts may "
-            "change it: take contacts.detection = 'haptics'"
+            f"{method} makes no energy within a step, but each new frame of contacts may change "
+            "it: take contacts.detection = 'haptics'"
         )
     if table and len(table["time"]) and (stops := int(table[MECHANISM_STOPS][-1])):
         yield (

@@ -26,6 +26,8 @@ from hapticlink.analysis.tune.spring_hand import FIRM, HANDS, spring
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.overrides import written
 
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
+
 RECORDED = Path(__file__).parents[3] / "results" / "tune"
 TUNED = ("closed-loop", "enclosure", "obstacles", "serial", "telescope")
 NO_ENCODER = ("device.encoder_resolution=1e-12",)
