@@ -22,6 +22,7 @@ Benchmark = Literal[
     "stress",
     "view",
     "one",
+    "engine",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores."""
 FOLDERS = {"stress": "stability"}
@@ -47,6 +48,7 @@ def bench(
     - stress: hard scenes at the edge of stability and beyond, each with the outcome it has to have
     - view: deadlines missed and latencies while a browser drags
     - one: a scene as one FMU, beside its run through FMUs
+    - engine: MuJoCo in the place of the graphics copy and of the mechanism
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
