@@ -24,6 +24,7 @@ Benchmark = Literal[
     "view",
     "one",
     "standalone",
+    "engine",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores."""
 FOLDERS = {"stress": "stability"}
@@ -52,6 +53,7 @@ def bench(
     - view: deadlines missed and latencies while a browser drags
     - one: a scene as one FMU, beside its run through FMUs
     - standalone: a scene as a page in one file: size, and speed in a browser
+    - engine: MuJoCo in the place of the graphics copy and of the mechanism
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
