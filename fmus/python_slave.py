@@ -28,6 +28,7 @@ import array
 import atexit
 import ctypes
 import functools
+import importlib
 import json
 import math
 import os
@@ -108,6 +109,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         self._new_outputs, self._end = new_y if self._sampled else y, end
         self._buffers: list = []
         self._blocks: dict = {}
+        self._engine = self._read_engine() if about.get("engine") else None
         self._evaluate_x0 = self._bind("initialize", (u, p), x)
         self._evaluate_y = self._bind("output", (x, u, p, t), y, z)
         whole = self._bind("advance", (trial, u, p, t, h, end, z), after, self._new_outputs, next_z)
@@ -158,7 +160,14 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         self._buffers.append(buffer)  # `evaluate` holds a bare pointer to it
         return evaluate
 
+    def _read_engine(self) -> dict:
+        """The functions of a physics engine, whose module lies beside this one."""
+        engine = importlib.import_module(f"{__name__.removesuffix('_slave')}_engine")
+        return engine.functions(self.resources)
+
     def _functions(self) -> dict:
+        if self._engine is not None:
+            return self._engine
         pure = os.environ.get("HAPTICLINK_PURE_PYTHON") == "1"
         if pure not in self._loaded:
             self._loaded[pure] = self._read_text() if pure else self._read_casadi()
