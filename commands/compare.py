@@ -36,19 +36,19 @@ def compare(runs: Runs, /, *, out: Out = None, json: Json = False) -> int:
 
     if len(runs) < 2:
         raise InputFault("compare takes two runs or more: `hapticlink report` is for one")
-    found = named(runs)
-    every = list(found.values())
+    run_by_name = named(runs)
+    every = list(run_by_name.values())
     rows = [numbers.Row(key, values) for key, values in settings.differing(every).items()]
     tables = {"Settings that differ": rows, **numbers.sections(every)}
-    lines = [*_lines(list(found), tables)]
+    lines = [*_lines(list(run_by_name), tables)]
     if other := settings.other_scenes(every):
         lines.insert(0, f"warning: {other}")
     if out:
-        names = run_figures.save(overlay.figures(found), folders.ensure(out))
+        names = run_figures.save(overlay.figures(run_by_name), folders.ensure(out))
         lines.append(f"{out}/: {', '.join(names)}")
     by_run = {
         name: {title: {row.label: row.values[i] for row in told} for title, told in tables.items()}
-        for i, name in enumerate(found)
+        for i, name in enumerate(run_by_name)
     }
     tell(lines, {"note": other, "runs": by_run}, False, json)
     return 0

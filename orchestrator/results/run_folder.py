@@ -138,8 +138,8 @@ class RunFolder:
         if self._setup is not None:
             ending = content(RunEnding(end, fault))
             known = ("end", "fault") if fault else ("end",)
-            told = content(self._setup) | {key: ending[key] for key in known}
-            write_json(self.folder / RUN, told, room)
+            record = content(self._setup) | {key: ending[key] for key in known}
+            write_json(self.folder / RUN, record, room)
 
 
 def _has_rows(folder: Path) -> bool:

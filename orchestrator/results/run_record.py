@@ -240,10 +240,10 @@ class RunRecord(RunEnding, RunSetup):
 
 def content(section: RunSetup | RunEnding | PortEnergy) -> dict[str, Any]:
     """A section as run.json has it, in the same order; its end without what is not known."""
-    found = asdict(section)
-    if "end" in found:
-        found["end"] = {k: v for k, v in found["end"].items() if v not in (None, "")}
-    return found
+    values = asdict(section)
+    if "end" in values:
+        values["end"] = {k: v for k, v in values["end"].items() if v not in (None, "")}
+    return values
 
 
 def read(run: Mapping[str, Any], folder: Path | None) -> RunRecord:

@@ -35,10 +35,10 @@ class Picture:
         self.marks = marks(linkage, contacts, devices)
         self._linkage = linkage
         self._names, self._poses = pose_function(linkage)
-        self._arms = {user: link_function(each) for user, each in devices.items()}
+        self._arms = {user: link_function(device) for user, device in devices.items()}
         self._limits = {
-            user: (torque_function(each), FULL_TORQUE * each.torque_limit)
-            for user, each in devices.items()
+            user: (torque_function(device), FULL_TORQUE * device.torque_limit)
+            for user, device in devices.items()
         }
 
     def drawn(self, frame: dict[str, Any]) -> dict[str, Any]:
@@ -69,30 +69,30 @@ class Picture:
             (frame.setdefault("others", {}).setdefault(user, {}) if user else frame)["arms"] = arms
         return frame
 
-    def _of(self, user: str, found: dict[str, Any]) -> dict[str, Any]:
-        shown = {k: v for k, v in found.items() if k not in RAW}
-        if user in self._arms and "handle" in found:
-            shown["arms"] = self._arms_at(user, found["handle"])
-        if "P_c" in found:
-            shown["directions"] = directions(found["P_c"])
+    def _of(self, user: str, values: dict[str, Any]) -> dict[str, Any]:
+        shown = {k: v for k, v in values.items() if k not in RAW}
+        if user in self._arms and "handle" in values:
+            shown["arms"] = self._arms_at(user, values["handle"])
+        if "P_c" in values:
+            shown["directions"] = directions(values["P_c"])
         return shown
 
-    def _states(self, user: str, found: Mapping[str, Any]) -> list[str]:
+    def _states(self, user: str, values: Mapping[str, Any]) -> list[str]:
         """The kinds of `KINDS` that a frame shows by itself."""
         kinds = {
-            "folded": reach(found, ("branch_ok", 0)) == 0,
-            "saturated": self._saturated(user, found),
-            "energy": (reach(found, ("energy", PORT)) or 0.0) > NOTICEABLE_J,
-            "contacts": (reach(found, ("gap", 0)) or 0.0) < 0 and any(found.get("F_env", ())),
-            "outside": (reach(found, ("margin", 0)) or 0.0) < 0,
+            "folded": reach(values, ("branch_ok", 0)) == 0,
+            "saturated": self._saturated(user, values),
+            "energy": (reach(values, ("energy", PORT)) or 0.0) > NOTICEABLE_J,
+            "contacts": (reach(values, ("gap", 0)) or 0.0) < 0 and any(values.get("F_env", ())),
+            "outside": (reach(values, ("margin", 0)) or 0.0) < 0,
         }
         return [state(kind, user) for kind, holds in kinds.items() if holds]
 
-    def _saturated(self, user: str, found: Mapping[str, Any]) -> bool:
-        if user not in self._limits or not {"F_motor", "measured"} <= {*found}:
+    def _saturated(self, user: str, values: Mapping[str, Any]) -> bool:
+        if user not in self._limits or not {"F_motor", "measured"} <= {*values}:
             return False
         torques, most = self._limits[user]
-        return bool(ca.norm_inf(torques(found["F_motor"], found["measured"])) >= most)
+        return bool(ca.norm_inf(torques(values["F_motor"], values["measured"])) >= most)
 
     def _cut(self, multipliers: list[float], poses: dict[str, list[float]]) -> list[list[float]]:
         """The force (N) in each joint that is cut. It has two multipliers, a slot one; that of what
