@@ -11,6 +11,7 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folder_lock, json_file, rows
 from hapticlink.orchestrator.results.files import make_csv, write_json
+from hapticlink.orchestrator.results.numbers import last_time
 from hapticlink.orchestrator.results.run_folder import RUN
 from hapticlink.orchestrator.results.tables import load
 
@@ -49,7 +50,7 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
             recovered[name] = Recovered(make_csv(table), float(kept[-1, 0]), lost)
     changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
     if record.end.process is not None:
-        last = next((r.time for r in recovered.values()), 0.0)
+        last = last_time(load(folder))  # its tables may be whole: an FMU may crash at its end
         changes["end"] = {"reason": "fault", "time": last}
         changes["fault"] = {"kind": kind, "time": last, "message": message}
     if recovered or record.end.process is not None:

@@ -62,6 +62,7 @@ NOT_RUN = {
     "hapticlink compare runs/closed-loop "
     "runs/closed-loop,graphics.rate=10,controller.topology=false": "as its runs; replay.md",
     "hapticlink bench one": "takes minutes, and measures the machine",
+    "hapticlink bench standalone": "takes minutes, and measures the machine",
     "hapticlink bench view": "takes a minute, and measures the machine",
     "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
         "compiles for minutes; tests/orchestrator/scene/test_packaging.py",

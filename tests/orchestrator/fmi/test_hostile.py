@@ -147,6 +147,18 @@ def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
     assert found.haptics["time"].tolist() == [k / 64 for k in range(20)]
 
 
+def test_a_crash_at_the_end_is_recorded_at_the_time_of_its_rows(tmp_path: Path) -> None:
+    """The tables are whole by then, and nothing is recovered."""
+    hostile_fmu(tmp_path)
+    scene, out = hostile_scene(tmp_path, "end_null_9"), tmp_path / "out"
+    subprocess.run([*COMMAND, "run", scene, "--no-figures", "--out", out], check=False)
+    until = time.monotonic() + 30
+    while (end := tables.load(out).run["end"])["reason"] == "running" and time.monotonic() < until:
+        time.sleep(0.05)
+    assert end == {"reason": "fault", "time": 0.5}
+    assert tables.load(out).haptics["time"][-1] == 0.5
+
+
 def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path: Path) -> None:
     """A tool that never answers would hang the run; one signal ends it while it loads."""
     hostile_fmu(tmp_path, "2", needsExecutionTool="true")
