@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
 
@@ -28,7 +29,8 @@ def changes(
     rules: Rules,
     problems: list[Problem],
 ) -> tuple[Change, ...]:
-    """The changes in the order of their times. Findings are appended to `problems`."""
+    """The changes in the order of their times, without those after the end of the run. Findings are
+    appended to `problems`."""
     if scene.at and scene.coupling == "iterated":
         problems.append((("at",), 'steps are repeated with coupling = "iterated": take another'))
     events = _Events(scene, {u.name: u for u in fmus}, connections, timeline, rules)
@@ -41,8 +43,9 @@ def changes(
             _take(found, problems, ("at", i, "freeze"), events.brought, event, name, 0.0)
         for name, noise in event.noise.items():
             _take(found, problems, ("at", i, "noise", name), events.brought, event, name, noise)
-        problems += ((("at", i, key), why) for key, why in _times(scene, event))
-    return tuple(sorted(found, key=lambda change: change.begin))
+        problems += ((("at", i, key), why) for key, why in _times(event))
+    end = timeline.seconds(timeline.end)
+    return tuple(sorted((c for c in found if c.begin < end), key=lambda change: change.begin))
 
 
 def _take(
@@ -59,9 +62,7 @@ def _take(
         problems.append((path, str(error)))
 
 
-def _times(scene: Scene, event: TimedEvent) -> Iterator[tuple[str, str]]:
-    if event.time > scene.duration:
-        yield "time", f"{event.time:g} s is after the end of the run, {scene.duration:g} s"
+def _times(event: TimedEvent) -> Iterator[tuple[str, str]]:
     if event.until is not None and event.until <= event.time:
         yield "until", f"{event.until:g} s is not after time = {event.time:g} s"
     if not (event.set or event.override or event.freeze or event.noise):
@@ -125,13 +126,15 @@ class _Events:
         return Change(begin, text, fmu, **parts)  # type: ignore[arg-type]
 
     def _begin(self, clock: str, time: float) -> float:
-        """The first communication point of a clock at or after a time (s)."""
+        """The first communication point of a clock at or after a time (s), infinity where there is
+        none in the run."""
         timeline = self._timeline
         if clock not in (c.name for c in timeline.clocks):
             raise ValueError(f"no FMU runs at the rate of {clock}")
         starts = timeline.clock(clock).starts
         tick = exact(time) / timeline.base
-        return timeline.seconds(starts[bisect_left(starts, tick)])
+        k = bisect_left(starts, tick)
+        return timeline.seconds(starts[k]) if k < len(starts) else math.inf
 
     def _end(self, event: TimedEvent) -> float:
         return self._scene.duration + 1.0 if event.until is None else event.until
