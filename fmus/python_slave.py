@@ -60,7 +60,23 @@ def _surviving(method: typing.Callable) -> typing.Callable:
     return surviving
 
 
-class HapticlinkSlave(Fmi2Slave):
+class _Named:
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def __repr__(self) -> str:
+        return self._text
+
+
+class Short(type(Fmi2Slave)):
+    """Shows pythonfmu 0.7 the two texts that it looks for in the order of a class's bases: for each
+    instance it keeps a list of these and a copy of the text of each for ever, 0.6 kB otherwise."""
+
+    _shown = (_Named(""), _Named("<class 'pythonfmu.Fmi2Slave'>"))
+    __mro__ = property(lambda cls: cls._shown)
+
+
+class HapticlinkSlave(Fmi2Slave, metaclass=Short):
     _loaded: typing.ClassVar[dict] = {}
     """Functions by way of evaluation, read once for all instances."""
     _released: typing.ClassVar[list] = []

@@ -26,6 +26,8 @@ def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
         taken[fmu.name] = None
         yield from _source(path, fmu)
         yield from _velocity(path, fmu, scene)
+        if fmu.map and fmu.replaces is None:
+            yield (*path, "map"), "is of an FMU that replaces a block: lead [[connection]]s instead"
         if fmu.replaces is not None:
             yield from _replacement(path, fmu, [b.name for b in blocks.loop])
     for i, wire in enumerate(scene.connection):
