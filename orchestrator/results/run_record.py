@@ -82,6 +82,8 @@ class RunSetup:
     power_across_rates: list[str]
     not_recorded: list[str]
     """The outputs `fmu.port` of which an entry is not written."""
+    events: list[tuple[float, str]] = field(default_factory=list)
+    """Times (s) and texts of what `[[at]]` does, each with the first step that it acts on."""
 
 
 @dataclass(frozen=True)
