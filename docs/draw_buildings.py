@@ -42,7 +42,7 @@ BUILDINGS = {
         ".",
     ),
     "programs": (".",),
-    "analysis": ("findings", "stability", "sweep", "maps", "tune"),
+    "analysis": ("findings", "stability", "sweep", "maps", "tune", "transparency"),
     "visualization": (".", "mechanism", "figures", "live", "replay", "compare"),
     "api": (".",),
     "commands": (".",),

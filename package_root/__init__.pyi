@@ -9,6 +9,8 @@ from hapticlink.analysis.stability.passivity import passivity as passivity
 from hapticlink.analysis.stability.scene_stability import Stability as Stability
 from hapticlink.analysis.stability.scene_stability import stability as stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability as VaryingStability
+from hapticlink.analysis.transparency import Transparency as Transparency
+from hapticlink.analysis.transparency import transparency as transparency
 from hapticlink.analysis.tune import Tuned as Tuned
 from hapticlink.analysis.tune import tune as tune
 from hapticlink.api.files import build as build

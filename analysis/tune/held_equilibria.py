@@ -1,14 +1,5 @@
 """A scene at its equilibrium in a pose, in a hand: its lifted map under changed gains, and its
-compliance.
-
-With the hand cut off (stability/port_response.py), the poses x of the handle at the N haptic
-periods T of a hyperperiod answer to its stacked wrenches u by z' = A z + B u, x = C z + D u. The
-wrench n exp(i w kT), held over each period, moves it at w by
-
-    z = (exp(i w NT) - A)^-1 B W n,   X n = W' (C z + D W n),   W_k = exp(i w kT)/sqrt(N)
-
-the sum over a hyperperiod first: where exp(i w NT) is 1, as the z of a neutral mode is, responses
-to single wrenches leave few digits. X is the compliance (3, 3).
+compliance with the hand cut off (stability/port_response.py).
 """
 
 from __future__ import annotations
@@ -113,11 +104,7 @@ class Held:
         except FmuFault as fault:
             raise InputFault(str(fault)) from None
         found = response(self._map, at, hand_port(self._map.system))
-        N, wT = found.forces // found.m, 2 * np.pi * hertz * self._T
-        W = np.kron(np.exp(1j * wT * np.arange(N))[:, None], np.eye(found.m)) / np.sqrt(N)
-        left = np.exp(1j * wT * N) * np.eye(len(found.A)) - found.A
-        X: Complex = W.conj().T @ (found.C @ np.linalg.solve(left, found.B @ W) + found.D @ W)
-        return X
+        return found.compliance(hertz, self._T)
 
     def _settled(self, scales: Scales, hand: float) -> Linearisation:
         """The map linearised at the equilibrium with these gains, searched from `equilibrium`, so
