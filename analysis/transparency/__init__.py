@@ -3,11 +3,11 @@
 At a pose, with the hand cut off, the compliance X(w) of the handle (stability/port_response.py) is
 compared with that of the mechanism, -Lambda^-1/w^2, both scaled by S = diag(1, 1, L), L the mean
 link length (m), so that all entries are in m/N. With e_i and 1/m_i the eigenvectors and eigenvalues
-of S Lambda^-1 S, in the free directions E = (e_i), and in the constrained ones p_j, where they are 0,
+of S Lambda^-1 S, E = (e_i) the free directions, and p_j the constrained ones, with eigenvalues of 0,
 
-    M(w) = -(E' S X S E)^-1/w^2         what the hand meets when it moves along e_i: M e_i, ideally m_i e_i
+    M(w) = -(E' S X S E)^-1/w^2         M e_i is met when moving along e_i, ideally m_i e_i
     error_i = |M e_i - m_i e_i|/m_i     of that force, in size, phase and direction
-    angle_i = angle between Re M e_i and e_i
+    angle_i                             between Re M e_i and e_i
     k_j(w) = 1/|p_j' S X S p_j|         felt stiffness (N/m), ideally infinite
 
 A force is right where its error is below the differential threshold of a person. Springs, dampers
@@ -176,16 +176,18 @@ def transparency(
 
 def at_pose(scene: str | Path | Scene, options: Sequence[str], name: str) -> Transparency:
     """How a scene feels where it is at rest. Raises InputFault where it is not."""
-    with linearisable(scene, options) as (read, system, _):
-        with lifted_map(long_enough(read, system), 0.0, read) as map_:
-            linear = nearby(map_, map_.start)
-            if linear is None or not rests(linear):
-                raise InputFault("it has no equilibrium in a spring that holds it")
-            cut = response(map_, linear, hand_port(map_.system))
-            T = float(1 / exact(read.haptics.rate))
-            X = np.array([cut.compliance(hertz, T) for hertz in HERTZ])
-            linkage = _linkage(read)
-            return of(read.title, name, X, mobility(map_, linear), mean_link_length(linkage))
+    with (
+        linearisable(scene, options) as (read, system, _),
+        lifted_map(long_enough(read, system), 0.0, read) as map_,
+    ):
+        linear = nearby(map_, map_.start)
+        if linear is None or not rests(linear):
+            raise InputFault("it has no equilibrium in a spring that holds it")
+        cut = response(map_, linear, hand_port(map_.system))
+        T = float(1 / exact(read.haptics.rate))
+        X = np.array([cut.compliance(hertz, T) for hertz in HERTZ])
+        length = mean_link_length(_linkage(read))
+        return of(read.title, name, X, mobility(map_, linear), length)
 
 
 def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Transparency:
