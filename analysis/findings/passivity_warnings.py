@@ -147,8 +147,8 @@ def _counts(results: Results) -> Iterator[str]:
             yield (
                 f"warning: {key}.passivity.noise is {law.noise:g} J, and one count of an encoder "
                 f"in a period {short(count)} J: the passivity controller damps counts, which give "
-                f"no energy; take {key}.passivity.noise={1.1 * count:.2g} or more, which "
-                "damps fewer of them and bounds less"
+                f"no energy; fewer of them, and with a looser bound, from {key}.passivity.noise="
+                f"{1.1 * count:.2g}"
             )
 
 

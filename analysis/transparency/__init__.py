@@ -3,7 +3,7 @@
 At a pose, with the hand cut off, the compliance X(w) of the handle (stability/port_response.py) is
 compared with that of the mechanism, -Lambda^-1/w^2, both scaled by S = diag(1, 1, L), L the mean
 link length (m), so that all entries are in m/N. With e_i and 1/m_i the eigenvectors and eigenvalues
-of S Lambda^-1 S, E = (e_i) the free directions, and p_j the constrained ones, with eigenvalues of 0,
+of S Lambda^-1 S, E = (e_i) the free directions, p_j the constrained ones, whose eigenvalues are 0,
 
     M(w) = -(E' S X S E)^-1/w^2         M e_i is met when moving along e_i, ideally m_i e_i
     error_i = |M e_i - m_i e_i|/m_i     of that force, in size, phase and direction

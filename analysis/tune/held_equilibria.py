@@ -14,7 +14,8 @@ from hapticlink.analysis.stability.equilibrium import newton_step, rests
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.linearisation import Linearisation, linearised
-from hapticlink.analysis.stability.modes import modes
+from hapticlink.analysis.stability.mode_frequency import traced
+from hapticlink.analysis.stability.modes import Mode, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.tune.gains import Gains, Scales
 from hapticlink.analysis.tune.spring_hand import FIRM, LEVER
@@ -41,6 +42,8 @@ SHARED, NEARBY = 1e-4, 1e-2
 of the scene's own gains, next to which that of others is."""
 SURE = 0.01
 """Uncertainty of an eigenvalue below which it may count as 1."""
+DRIFT, DRIFT_HERTZ = 0.2, 1.0
+"""Growth (1/s) and frequency (Hz) below which a mode is drift."""
 GROWN = 1e7
 """Growth over a period with which rounding errors move the state that is linearised."""
 
@@ -75,15 +78,22 @@ class Held:
         return bool(self.signal(ENVIRONMENT_WRENCH).any())
 
     def stable(self, scales: Scales, hand: float) -> bool:
-        """Whether no mode grows, neutral ones aside, with gains scaled by `scales` in a spring hand
-        of the stiffness `hand` (N/m)."""
+        """Whether no mode grows, neutral ones and slow drift aside, with gains scaled by `scales`
+        in a spring hand of the stiffness `hand` (N/m)."""
         try:
             at = self._settled(scales, hand)
         except (FmuFault, InputFault):  # diverges at once
             return False
         found = modes(at, self._map.period)  # an error as large as z says nothing of z = 1
         counted = [mode for mode in found if not (mode.neutral and mode.uncertainty < SURE)]
-        return bool(counted) and counted[0].growth <= 0.0
+        growing = (mode for mode in counted if mode.growth > 0.0)
+        return bool(counted) and all(self._drifts(at, mode) for mode in growing)
+
+    def _drifts(self, at: Linearisation, mode: Mode) -> bool:
+        """Whether a mode is slow drift, which a hand does not feel: no vibration."""
+        if mode.growth >= DRIFT or mode.omega >= 2 * np.pi * DRIFT_HERTZ:
+            return False
+        return traced(self._map, at, mode).omega < 2 * np.pi * DRIFT_HERTZ
 
     def signal(self, port: str) -> Matrix:
         """The values of an output `fmu.port` at the `equilibrium`; none without such an output."""
