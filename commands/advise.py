@@ -32,7 +32,7 @@ def advise(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
-    draws: Draws = 6,
+    draws: Draws = 8,
     seed: Seed = 0,
     jobs: Jobs = None,
     quiet: Quiet = False,

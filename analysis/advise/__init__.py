@@ -35,7 +35,7 @@ SHARE, LEAST = 0.25, 1e-3
 APART = 42.0, 1.0
 """Tracking errors (mm, the length of a link, and rad) from which on a run counts as unstable."""
 PEAK, WORK = "port_peak_J", "hand_work_J"
-ROUND = 4
+ROUND = 8
 """Methods of a round."""
 OWN = "own"
 """The gains of the scene."""
@@ -133,7 +133,7 @@ def advise(
     folder: Path,
     *,
     processes: int = 1,
-    count: int = 6,
+    count: int = 8,
     seed: int = 0,
     tell: Callable[[int, int], object] = lambda done, of: None,
 ) -> Advice:

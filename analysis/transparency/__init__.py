@@ -44,8 +44,6 @@ from hapticlink.orchestrator.scene.scene import Scene
 FORCE = 0.1
 """Differential threshold of a force, 5 to 10 % from 2.5 to 10 N: Pang, Tan, Durlach, Perception &
 Psychophysics 49 (1991), 531."""
-STIFFNESS = 0.23
-"""That of a stiffness: Jones, Hunter, Experimental Brain Research 79 (1990), 150."""
 DIRECTION = 25.6
 """That of the direction of a force (degrees), by touch alone: Barbagli, Salisbury, Ho, Spence, Tan,
 ACM Trans. Applied Perception 3 (2006), 125."""
