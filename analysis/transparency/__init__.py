@@ -30,6 +30,7 @@ from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.tune.poses import poses
 from hapticlink.analysis.tune.run_measures import simulated
+from hapticlink.analysis.tune.tunable_scene import whole_frames
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
@@ -156,15 +157,15 @@ def transparency(
     scene: str | Path | Scene, options: Sequence[str] = (), *, count: int = 2
 ) -> list[Transparency]:
     """How a scene feels at `count` poses of its own run, held there by a spring that is cut off
-    again. Raises InputFault for a scene without device, controller or linkage, and where no pose
-    has an equilibrium."""
+    again, with frames of whole haptic periods. Raises InputFault for a scene without device,
+    controller or linkage, and where no pose has an equilibrium."""
     read = open_scene.load(scene, options)
     linkage = _linkage(read)
     found, why = [], ""
     given = tuple(options)
     for pose in poses(simulated(scene, given), linkage, count):  # type: ignore[arg-type]
         try:
-            found.append(at_pose(scene, pose.options(given), pose.name))
+            found.append(at_pose(scene, pose.options(whole_frames(read, given)), pose.name))
         except (InputFault, FmuFault) as fault:
             why = f"{pose.name}: {fault}"
     if not found:
@@ -242,7 +243,8 @@ def costs(
         changes |= {f"hold {name}": {"hold": name} for name in ("zoh", "foh", "smooth")}
     for name, change in changes.items():
         try:
-            told = pose.options((*given, *overrides.written(change)))
+            changed = (*given, *overrides.written(change))
+            told = pose.options(whole_frames(open_scene.load(scene, changed), changed))
             yield name, replace(at_pose(scene, told, pose.name), pose=name)
         except (InputFault, FmuFault) as fault:
             tell(f"  {name}: {fault}")
