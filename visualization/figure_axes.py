@@ -6,7 +6,7 @@ and `savefig` draws twice, which together takes longer than the rest of a short 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -61,13 +61,13 @@ def _letters() -> frozenset[int]:
 def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     """A figure whose title tells where a run ended early, and its axes: one, or one below the other
     for several labels y."""
-    from matplotlib.figure import Figure
+    from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
-    end = results.run["end"]
-    if end["reason"] != "duration":
-        why = _ENDS.get(end["reason"], "a fault ended the run")
+    reason = results.record.end.reason
+    if reason != "duration":
+        why = _ENDS.get(reason, "a fault ended the run")
         title += f", until {why} at {short(last_time(results))} s"
-    figure = Figure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
+    figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
     framed(figure)
     every = figure.subplots(len(y), 1, sharex=True, squeeze=False)[:, 0]
     for axes, label in zip(every, y, strict=True):
@@ -116,6 +116,11 @@ def png(figure: Figure) -> bytes:
         file, metadata={"Software": None}, pil_kwargs={"compress_level": 1}
     )
     return file.getvalue()
+
+
+def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
+    """Write each figure as a PNG; returns the file names. Raises Interrupted."""
+    return write(((name, png(figure)) for name, figure in figures.items()), folder)
 
 
 def write(pngs: Iterable[tuple[str, bytes]], folder: Path) -> list[str]:

@@ -28,9 +28,8 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long
 from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.port_response import hand_port, response
-from hapticlink.analysis.tune.poses import poses
-from hapticlink.analysis.tune.run_measures import simulated
-from hapticlink.analysis.tune.tunable_scene import whole_frames
+from hapticlink.analysis.stability.poses import evenly_spaced, simulated
+from hapticlink.analysis.stability.rates import whole_frames
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
@@ -163,7 +162,7 @@ def transparency(
     linkage = _linkage(read)
     found, why = [], ""
     given = tuple(options)
-    for pose in poses(simulated(scene, given), linkage, count):  # type: ignore[arg-type]
+    for pose in evenly_spaced(simulated(scene, given), linkage, count):  # type: ignore[arg-type]
         try:
             found.append(at_pose(scene, pose.options(whole_frames(read, given)), pose.name))
         except (InputFault, FmuFault) as fault:
@@ -230,7 +229,7 @@ def costs(
 ) -> Iterator[tuple[str, Transparency]]:
     """How the scene feels at its start with other rates, delays and holds, by what is changed."""
     read, given = open_scene.load(scene, options), tuple(options)
-    pose = poses(simulated(scene, given), _linkage(read), 1)[0]  # type: ignore[arg-type]
+    pose = evenly_spaced(simulated(scene, given), _linkage(read), 1)[0]  # type: ignore[arg-type]
     rate = exact(read.haptics.rate)
     changes: dict[str, dict[str, object]] = {
         "as it is": {},

@@ -44,10 +44,16 @@ class ForeignFmu:
     both have: [foreign FMUs](swap-an-fmu.md)."""
     path: str | None = None
     """Its file, relative to the scene's file."""
+    map: Mapping[str, str | tuple[str, ...]] = field(default_factory=dict)
+    """By port of the block that it replaces, what the FMU calls it: a variable, or one for each
+    entry of a vector. Names that differ in brackets, underscores or case alone need none."""
     block: Annotated[str, BLOCKS.names()] | None = None
     """In place of a file, the block to build ([extending](extending.md#a-block))."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the block, by name."""
+    engine: Literal["mujoco"] | None = None
+    """In place of a file, the physics engine by which the block that it replaces is made:
+    [MuJoCo](engine.md)."""
     rate: Literal["haptics", "graphics"] | AnyRate | None = None
     """Its communication rate: one of the scene's, or its own, written as graphics.rate is. By
     default that of the block that it replaces, else "haptics"."""

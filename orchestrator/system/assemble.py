@@ -43,9 +43,10 @@ def from_scene(
     of = timeline.of
     replaced = replacements.replaced(blocks.replaced)
     ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in blocks.own)
+    tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
     foreign = (
         Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
-        for fmu, description, starts in fmu_tables.fmus(scene, files, replaced, problems)
+        for fmu, description, starts, _ in tables
     )
     order = {b.name: i for i, b in enumerate(blocks.loop)}
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
@@ -81,7 +82,13 @@ def from_scene(
         EnergyPorts(rules.power, rules.springs, haptic_loop.energy_in_play(scene)),
         Recording(written, scene.record.every),
         refused,
-        replacements.replacements(replaced, haptic_loop.rows(scene), fmus, assigned),
+        replacements.replacements(
+            replaced,
+            haptic_loop.rows(scene),
+            fmus,
+            assigned,
+            {fmu.name: names for fmu, *_, names in tables},
+        ),
     )
 
 

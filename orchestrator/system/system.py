@@ -72,10 +72,12 @@ class Connection:
 @dataclass(frozen=True)
 class Replacement:
     """An FMU in the place of a block. lost: connections of the block to ports that the FMU does not
-    have. unfed: inputs of the FMU that no connection feeds, which keep their start values."""
+    have. unfed: inputs of the FMU that no connection feeds, which keep their start values. mapped:
+    by port of the block, what the FMU calls its entries where that is another name."""
 
     lost: tuple[str, ...]
     unfed: tuple[str, ...]
+    mapped: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

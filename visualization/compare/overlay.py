@@ -83,11 +83,9 @@ def _force(run: Results) -> tuple[Vector, Vector] | None:
 
 
 def _figure(title: str, x: str, y: str, curves: Curves, steps: bool = False) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
-    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = ShownFigure(figsize=(6.4, 4.0), layout="constrained")
     axes = figure.add_subplot()
     style: Any = "steps-post" if steps else "default"
     for i, (time, values) in enumerate(curves.values()):

@@ -5,11 +5,10 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
-from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -103,11 +102,6 @@ def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
     """Name and PNG of each figure of a run, each drawn when it is asked for."""
     for name, draw in drawings(results).items():
         yield name, png(draw())
-
-
-def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
-    """Write each figure as a PNG; returns the file names. Raises Interrupted."""
-    return figure_axes.write(((name, png(figure)) for name, figure in figures.items()), folder)
 
 
 def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:

@@ -89,9 +89,9 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def _axes(wide: bool) -> tuple[Figure, Any]:
-    from matplotlib.figure import Figure
+    from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
-    figure = Figure(figsize=(8.4 if wide else 6.4, 4.6), layout="constrained")
+    figure = ShownFigure(figsize=(8.4 if wide else 6.4, 4.6), layout="constrained")
     axes = figure.add_subplot()
     axes.grid(alpha=0.3)
     return figure, axes

@@ -7,6 +7,7 @@ has its newest sample there, as the other blocks had it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,9 +44,9 @@ class Recorded:
 
     Raises InputFault for a folder without a run of a linkage, or without its poses."""
 
-    def __init__(self, folder: str) -> None:
-        self.results = results = load(folder)
-        self.folder = folder
+    def __init__(self, run: Results | Path | str) -> None:
+        self.results = results = run if isinstance(run, Results) else load(run)
+        self.name = folder = str(results.folder or results.record.scene["title"])
         linkage: Linkage | None = scene_part(results, "linkage", Linkage)
         if linkage is None:
             said = f"there is nothing to draw; `hapticlink report {folder}` has its figures"

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 import hapticlink as hl
 from hapticlink.analysis import transparency
 from hapticlink.analysis.stability.equilibrium import nearby
+from hapticlink.analysis.stability.hands import spring
 from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
 from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.transparency import FORCE, HERTZ
-from hapticlink.analysis.tune.spring_hand import spring
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.overrides import written

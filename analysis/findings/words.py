@@ -1,0 +1,60 @@
+"""Blocks and signals of the haptic loop in words, as tables, figures and pages name them."""
+
+from __future__ import annotations
+
+from hapticlink.orchestrator.base.loop_names import (
+    CONTROLLER,
+    DEVICE,
+    ENVIRONMENT,
+    HAND,
+    MECHANISM,
+    user_of_block,
+)
+
+BLOCKS = {
+    HAND: "hand",
+    DEVICE: "device",
+    CONTROLLER: "controller",
+    MECHANISM: "mechanism",
+    ENVIRONMENT: "graphics copy",
+}
+SIGNALS = {
+    "F": "hand force",
+    "F_hand": "hand force",
+    "F_motor": "motor force",
+    "F_drift": "coupling force",
+    "F_env": "contact force",
+    "F_constraint": "topology force",
+    "Lambda_inv": "mobility",
+    "P_c": "blocked directions",
+    "x": "pose",
+    "v": "velocity",
+    "q": "joint coordinates",
+    "q_dot": "joint rates",
+}
+"""By the last part of a port's name; all others stand as they are."""
+
+
+def signal(name: str) -> str:
+    """A signal `block.port`, or `block.user.port`, in words: `mobility`, `left: coupling force`."""
+    block, _, port = name.partition(".")
+    user, _, last = port.rpartition(".")
+    users = (user_of_block(block, own) for own in BLOCKS)
+    user = user or next((found for found in users if found), "")
+    words = SIGNALS.get(last, last) if _block(block) else name
+    return f"{user}: {words}" if user else words
+
+
+def connection(name: str) -> str:
+    """A connection `source -> target` in words: `coupling force on the mechanism`."""
+    source, arrow, target = name.partition(" -> ")
+    if not arrow:
+        return name
+    block = target.partition(".")[0]
+    to = f"the {known}" if (known := _block(block)) else block
+    return f"{signal(source)} {'on' if '.F' in target else 'to'} {to}"
+
+
+def _block(name: str) -> str:
+    """A block in words, "" for an FMU that is none of the loop's."""
+    return next((w for b, w in BLOCKS.items() if user_of_block(name, b) is not None), "")
