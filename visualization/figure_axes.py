@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hapticlink.analysis.findings.summary import stopped_by
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.tables import Results
@@ -66,6 +67,8 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     end = results.run["end"]
     if end["reason"] != "duration":
         why = _ENDS.get(end["reason"], "a fault ended the run")
+        if (said := stopped_by(results.run["stop_when"])).startswith("the device"):
+            why = said if end["reason"] == "stop_when" else why
         title += f", until {why} at {short(last_time(results))} s"
     figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
     framed(figure)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from hapticlink.orchestrator.base.loop_names import (
     CONTROLLER,
     DEVICE,
@@ -46,13 +48,23 @@ def signal(name: str) -> str:
 
 
 def connection(name: str) -> str:
-    """A connection `source -> target` in words: `coupling force on the mechanism`."""
+    """A connection `source -> target` in words: `coupling force on the mechanism`, `pose of the
+    mechanism to the controller`."""
     source, arrow, target = name.partition(" -> ")
     if not arrow:
         return name
-    block = target.partition(".")[0]
-    to = f"the {known}" if (known := _block(block)) else block
-    return f"{signal(source)} {'on' if '.F' in target else 'to'} {to}"
+    of, to = (end.partition(".")[0] for end in (source, target))
+    at = f"the {known}" if (known := _block(to)) else to
+    if ".F" in target:
+        return f"{signal(source)} on {at}"
+    return f"{signal(source)} of the {_block(of)} to {at}" if _block(of) else f"{source} to {at}"
+
+
+def connections(names: Iterable[str]) -> dict[str, str]:
+    """Connections in words, by name; as they are where the words would be those of another."""
+    said = {name: connection(name) for name in names}
+    every = [*said.values()]
+    return {name: text if every.count(text) == 1 else name for name, text in said.items()}
 
 
 def _block(name: str) -> str:
