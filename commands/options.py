@@ -38,7 +38,8 @@ Swap = Annotated[
         name="--swap",
         consume_multiple=False,
         negative="",
-        help="block=file.fmu, an FMU that replaces a block of the haptic loop; repeatable.",
+        help="block=file.fmu, an FMU that replaces a block of the haptic loop, or block=mujoco; "
+        "repeatable.",
     ),
 ]
 Map = Annotated[
@@ -85,9 +86,8 @@ def _swap(given: str) -> str:
     block, equals, file = given.partition("=")
     if not (block and equals and file):
         raise InputFault(f"--swap {given}: write block=file.fmu, e.g. --swap controller=my.fmu")
-    return (
-        f"fmu.+={overrides.text({'replaces': block, 'path': str(Path(file).resolve())}, '--swap')}"
-    )
+    by = {"engine": file} if file == "mujoco" else {"path": str(Path(file).resolve())}
+    return f"fmu.+={overrides.text({'replaces': block} | by, '--swap')}"
 
 
 def _map(given: str, swaps: Sequence[str]) -> str:

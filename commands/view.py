@@ -22,6 +22,7 @@ from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
 
 if TYPE_CHECKING:
+    from hapticlink.orchestrator.scene.scene import Scene
     from hapticlink.visualization.live.server_pipe import Link
 
 Host = Annotated[
@@ -42,6 +43,12 @@ Export = Annotated[
     Parameter(
         help="Write the replay to this file: .html, which opens without a network, or an animation "
         "of the drawing, .gif, .webp or .png."
+    ),
+]
+Standalone = Annotated[
+    Path | None,
+    Parameter(
+        help="Write the page with the scene in it to this .html file, which needs no server."
     ),
 ]
 PORT = 8512
@@ -68,6 +75,7 @@ def view(
     port: Port = None,
     browser: Browser = True,
     export: Export = None,
+    standalone: Standalone = None,
 ) -> int:
     """Show a scene that runs in real time on a page, where the mouse is the hand; Ctrl-C ends it.
     Recordings are written to OUT-1, OUT-2, ... (default runs/SCENE-view).
@@ -77,6 +85,7 @@ def view(
     For example:
 
         hapticlink view closed-loop
+        hapticlink view closed-loop --standalone demo.html
         hapticlink view runs/closed-loop
         hapticlink view runs/on runs/off --export on-and-off.gif
     """
@@ -85,6 +94,8 @@ def view(
             raise InputFault(
                 f"{scene} is the folder of a run: --set, --swap and --out apply to scenes only"
             )
+        if standalone:
+            raise InputFault(f"--standalone: {scene} is the folder of a run; give a scene")
         return _replayed([scene, *([second] if second else [])], host, port, browser, export)
     if second or export:
         given = second or f"--export {export}"
@@ -97,6 +108,8 @@ def view(
     from hapticlink.visualization.live.session import Session
 
     read = viewed(scene, options(set, swap, map))
+    if standalone:
+        return _written(read, scene, standalone)
     default = default_folder("runs", scene)
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
@@ -108,6 +121,17 @@ def view(
             session.run()
     for folder in session.recordings:
         say(f"  {folder}/")
+    return 0
+
+
+def _written(scene: Scene, name: str, path: Path) -> int:
+    """Write the page of a scene that needs no server."""
+    from hapticlink.visualization.standalone import page
+
+    if path.suffix.lower() != ".html":
+        raise InputFault(f"--standalone {path}: name a file that ends in .html")
+    page.write(scene, default_folder("", name).name, path)
+    say(f"{path}: {path.stat().st_size / 1e3:.0f} kB; open it in a browser and drag")
     return 0
 
 

@@ -43,7 +43,7 @@ BUILDINGS = {
     ),
     "programs": (".",),
     "analysis": ("findings", "stability", "sweep", "maps", "tune"),
-    "visualization": (".", "mechanism", "figures", "live", "replay", "compare"),
+    "visualization": (".", "mechanism", "figures", "live", "replay", "standalone", "compare"),
     "api": (".",),
     "commands": (".",),
 }

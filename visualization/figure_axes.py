@@ -64,11 +64,12 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     for several labels y."""
     from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
-    end = results.run["end"]
-    if end["reason"] != "duration":
-        why = _ENDS.get(end["reason"], "a fault ended the run")
-        if (said := stopped_by(results.run["stop_when"])).startswith("the device"):
-            why = said if end["reason"] == "stop_when" else why
+    reason = results.record.end.reason
+    if reason != "duration":
+        why = _ENDS.get(reason, "a fault ended the run")
+        said = stopped_by(results.record.stop_when)
+        if reason == "stop_when" and said.startswith("the device"):
+            why = said
         title += f", until {why} at {short(last_time(results))} s"
     figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
     framed(figure)

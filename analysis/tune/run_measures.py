@@ -8,30 +8,13 @@ gains, scaled to the margin where they lack it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-
 import numpy as np
 
 from hapticlink.analysis.findings.measures import Measures
-from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
-from hapticlink.orchestrator.scene import overrides
 
 TRACKED = 1.2
-
-
-def simulated(
-    scene: str | Path, given: Sequence[str], gains: Mapping[str, float | list[float]] = {}
-) -> Results:
-    """A run of the scene with gains as options. Raises InputFault where it has no row."""
-    with temporary_folders.room() as room:
-        made = simulate(scene, room, (*given, *overrides.written(gains)), csv=False)
-        if not made.outcome.published:
-            raise InputFault(f"the scene's own run fails: {made.outcome.fault}")
-        return made.results
 
 
 def motion(run: Results, end: float = 0.0) -> dict[str, float]:

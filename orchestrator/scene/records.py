@@ -51,6 +51,9 @@ class ForeignFmu:
     """In place of a file, the block to build ([extending](extending.md#a-block))."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the block, by name."""
+    engine: Literal["mujoco"] | None = None
+    """In place of a file, the physics engine by which the block that it replaces is made:
+    [MuJoCo](engine.md)."""
     rate: Literal["haptics", "graphics"] | AnyRate | None = None
     """Its communication rate: one of the scene's, or its own, written as graphics.rate is. By
     default that of the block that it replaces, else "haptics"."""

@@ -81,7 +81,7 @@ def unfit(
     heard = {c.source for c in connections}
     for i, table in enumerate(scene.fmu):
         name = table.replaces
-        if name not in blocks or name not in described or name in heard:
+        if table.engine or name not in blocks or name not in described or name in heard:
             continue
         block, scalars = blocks[name], described[name].scalars
         gives, takes = (

@@ -15,7 +15,15 @@ from tests.docs.pages import PAGES, ROOT, blocks, name, prose
 DOCS = ROOT / "docs"
 FOLDERS = [DOCS / "pictures", DOCS / "figures"]
 IMAGE = re.compile(r"!\[.*?\]\((.+?)\)", re.DOTALL)
-TEXT_ALONE = {"index.md", "api.md", "ports.md", "scene-reference.md", "glossary.md", "errata.md"}
+TEXT_ALONE = {
+    "index.md",
+    "api.md",
+    "ports.md",
+    "scene-reference.md",
+    "glossary.md",
+    "errata.md",
+    "install.md",
+}
 """Tables to look things up in."""
 
 

@@ -1,8 +1,12 @@
 // The page: messages from and to the run, the buttons, and who draws what.
 import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
+import { Energies } from "./energies.js";
 import { tags } from "./legend.js";
+import { asked, differing, written } from "./links.js";
+import { loudness } from "./loudness.js";
 import { connected } from "./socket.js";
+import { Sound } from "./sound.js";
 import { Stage } from "./stage.js";
 import { started } from "./worker_run.js";
 
@@ -10,21 +14,40 @@ const $ = (id) => document.getElementById(id);
 const stage = new Stage($("scene"), $("legend"), (at, user) => send({ type: "hand", at, user }));
 const charts = new Charts($("charts"));
 const controls = new Controls($("controls"), send);
-const view = { frame: null, state: {}, frames: 0, refused: null, stage };
+const SECOND = "#dd6600"; // of run B, where two settings are compared
+const view = { frame: null, levels: [], state: {}, frames: 0, refused: null, stage };
 window.view = view; // for tests and for the curious, in the browser's console
-let refusedUntil = 0;
+let refusedUntil = 0, energies = [], sound = null;
+let start = null, shown = null, acts_on_b = false; // controls at the start, and as they are
+let address = "", later = null;
 
-function send(message) { run.send(message); }
+function send(message) { run.send(acts_on_b ? { ...message, b: true } : message); }
 
 const HANDLERS = {
   scene(message) {
     document.title = $("title").textContent = message.title;
     stage.begin(message.marks, message.shapes);
     view.kinds = message.kinds;
-    charts.begin(message.energies, message.users);
+    const runs = message.runs ?? 1;
+    energies = Array.from({ length: runs }, () => new Energies(message));
+    charts.begin([message.port, ...message.power.map(({ name }) => name)], message.users, runs);
     view.frame = null;
+    view.levels = [];
+    view.marks = message.marks;
+    view.sound = sound ??= new Sound(run.listen, message.haptics);
   },
-  controls: (message) => controls.show(message),
+  controls(message) {
+    const begins = !start;
+    start ??= message;
+    shown = message;
+    acts_on_b &&= Boolean(message.b);
+    $("acts").textContent = acts_on_b ? "Controls: B" : "Controls: A";
+    $("acts").hidden = !message.b;
+    $("compare").ariaPressed = Boolean(message.b);
+    controls.show(acts_on_b ? message.b : message);
+    if (begins) follow();
+    else note_address();
+  },
   state(message) {
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
@@ -38,8 +61,14 @@ const HANDLERS = {
     view.frame = message;
     view.frames += 1;
     if (first) note();
+    [message, message.b].forEach((frame, i) => {
+      if (!frame || !energies[i]) return;
+      energies[i].add(frame);
+      if (frame.light) view.levels[i] = frame.light;
+      charts.add(frame, i);
+    });
     if (message.light) show({ energy: message.light });
-    charts.add(message);
+    if (sound.signal) sound.feel(loudness(sound.signal, message));
   },
   map: (message) => show({ map: message }),
   refused(message) {
@@ -53,7 +82,8 @@ const HANDLERS = {
 // The light, with the level of the sampling energy and the stability verdict.
 function show(change) {
   Object.assign(view, change);
-  const level = { green: "none", amber: "low", red: "high" }[view.energy];
+  const levels = view.levels.map((light) => ({ green: "none", amber: "low", red: "high" })[light]);
+  const level = levels.length > 1 ? `A ${levels[0]}, B ${levels[1]}` : levels[0];
   $("light").className = `light ${view.map?.verdict === "unstable" ? "red" : view.energy ?? ""}`;
   $("energy").textContent = level ? `sampling energy: ${level}` : "sampling energy";
   $("map").textContent = view.map ? `stability: ${view.map.said}` : "";
@@ -71,9 +101,35 @@ function received(message) { HANDLERS[message.type]?.(message); }
 
 function lost(why) { $("note").textContent = why; }
 
+// Does what the page's address asks for, of run A and, where it has settings of B, of both.
+function follow() {
+  const { "": a, "b.": b, why } = asked(location.hash, start);
+  for (const message of a) run.send(message);
+  if (b.length && run.compare) {
+    run.compare(true);
+    for (const message of b) run.send({ ...message, b: true });
+  }
+  if (why.length) HANDLERS.refused({ why: why.join("; ") });
+}
+
+// Writes into the address how the controls differ from the start, so that a link leads there; once they rest, since
+// browsers take few changes of it.
+function note_address() {
+  clearTimeout(later);
+  later = setTimeout(() => {
+    const b = shown.b ? differing(shown.b, start).map(([key, value]) => [`b.${key}`, value]) : [];
+    address = written([...differing(shown, start), ...b]);
+    if (address !== location.hash.slice(1)) location.replace(`#${address}`);
+  }, 300);
+}
+window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== address) follow(); });
+
 const act = (what) => send({ type: "time", do: what });
 $("pause").onclick = () => act(view.state.paused ? "resume" : "pause");
 for (const what of ["step", "reset", "record"]) $(what).onclick = () => act(what);
+$("compare").onclick = () => run.compare(!shown.b);
+$("acts").onclick = () => { acts_on_b = !acts_on_b; HANDLERS.controls(shown); };
+$("hear").onchange = () => sound.hear($("hear").value || null);
 document.addEventListener("keydown", (event) => {
   if (event.target.closest("input, select, button")) return;
   const button = { " ": "pause", ".": "step", r: "reset" }[event.key];
@@ -81,13 +137,22 @@ document.addEventListener("keydown", (event) => {
   if (button && !event.ctrlKey && !event.metaKey) { event.preventDefault(); $(button).click(); }
 });
 
+function label(state) {
+  const [kind, user] = state.split(" "), [color, meaning] = view.kinds[kind];
+  return [color, user ? `${meaning}: ${user}` : meaning];
+}
+
+// Run B, which is drawn over A, and how its controls differ.
+function second() {
+  const other = shown.b ? differing(shown.b, shown).map((pair) => pair.join(" ")) : [];
+  return `B, in orange: ${other.join(", ") || "as A; choose Controls: B and change something"}`;
+}
+
 function draw() {
   if (view.frame) {
-    stage.draw(view.frame);
-    tags($("tags"), view.frame.states.map((state) => {
-      const [kind, user] = state.split(" "), [color, meaning] = view.kinds[kind];
-      return [color, user ? `${meaning}: ${user}` : meaning];
-    }));
+    const { b } = view.frame;
+    stage.draw(view.frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
+    tags($("tags"), [...view.frame.states.map(label), ...(b ? [[SECOND, second()]] : [])]);
     $("time").textContent = `${view.frame.t.toFixed(2)} s`;
   }
   charts.draw();
@@ -95,4 +160,5 @@ function draw() {
 }
 // The run is in this file, as its data, or behind the server that the page is from.
 const run = ($("data") ? started : connected)({ received, opened: note, lost });
+for (const id of ["compare", "hear"]) $(id).hidden = !run.compare;
 draw();

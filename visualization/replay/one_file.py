@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
@@ -17,16 +18,22 @@ IMPORT = re.compile(r'^import \{ (.+?) \} from "\./(\w+\.js)";$', re.MULTILINE)
 EXPORT = re.compile(r"^export (?=(?:class|function|const) (\w+))", re.MULTILINE)
 
 
-def page(name: str, data: Any) -> str:
-    """The page `name` of the folder `page`, with `data` as JSON in its element `data`."""
+def page(
+    name: str, data: Any, texts: Mapping[str, str] = MappingProxyType({}), policy: str = POLICY
+) -> str:
+    """The page `name` of the folder `page`, with `data` as JSON in its element `data`, and further
+    `texts`, scripts of a worker among them, in elements by these names."""
     html = (PAGE / name).read_text(encoding="utf-8")
-    policy = f'<meta http-equiv="Content-Security-Policy" content="{escape(POLICY)}">'
-    html = html.replace('<meta charset="utf-8">', f'<meta charset="utf-8">\n{policy}', 1)
+    tag = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">'
+    html = html.replace('<meta charset="utf-8">', f'<meta charset="utf-8">\n{tag}', 1)
     html = re.sub(r'<link rel="icon" href="(.+?)">', _icon, html)
     html = re.sub(r'<link rel="stylesheet" href="(.+?)">', _style, html)
     # "<" could end the element, or begin a comment in it.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     kept = f'<script type="application/json" id="data">{text}</script>\n'
+    for element, text in texts.items():
+        assert "</" not in text
+        kept += f'<script type="text/plain" id="{element}">{text}</script>\n'
     return re.sub(
         r'<script type="module" src="(.+?)"></script>',
         lambda found: f'{kept}<script type="module">\n{bundle(found[1])}</script>',
@@ -34,11 +41,17 @@ def page(name: str, data: Any) -> str:
     )
 
 
+def element(html: str, name: str) -> str:
+    """The text in an element of a page that `page` has written."""
+    _, _, rest = html.partition(f'id="{name}">')
+    return rest.partition("</script>")[0]
+
+
 def bundle(name: str) -> str:
     """A module of the page with those that it imports, each a function that returns what it
-    exports, in the order in which they need each other."""
+    exports, in the order in which they need each other; it comes last, and as it is."""
     *needed, last = _ordered(name, [])
-    wrapped = (f"const {_variable(n)} = (() => {{\n{_module(n)}}})();\n" for n in needed)
+    wrapped = (f"const {_variable(n)} = (() => {{\n{_module(n)}{_end(n)}}})();\n" for n in needed)
     return "".join([*wrapped, _module(last)])
 
 
@@ -55,10 +68,13 @@ def _needs(name: str) -> Iterator[str]:
 
 def _module(name: str) -> str:
     text = _text(name)
-    exported = ", ".join(EXPORT.findall(text))
     text = IMPORT.sub(lambda found: f"const {{ {found[1]} }} = {_variable(found[2])};", text)
-    end = f"return {{ {exported} }};\n" if exported else ""
-    return EXPORT.sub("", text) + end
+    return EXPORT.sub("", text)
+
+
+def _end(name: str) -> str:
+    """The statement by which a module returns what it exports."""
+    return f"return {{ {', '.join(EXPORT.findall(_text(name)))} }};\n"
 
 
 def _variable(name: str) -> str:

@@ -151,8 +151,12 @@ int fmu_do_step(const Fmu *f, double time, double size) {
 }
 
 /* The status of saving an FMU's state. */
-int fmu_save(const Fmu *f, void *get_state, void *state) {
+int fmu_save(const Fmu *f, void *get_state, void **state) {
     f->place->saves++;
+    if (f->free_state && *state) {
+        ((GetState)f->free_state)(f->fmu, state);
+        *state = NULL;
+    }
     return ((GetState)get_state)(f->fmu, state);
 }
 

@@ -76,6 +76,7 @@ typedef struct {
     const Transfer *fewer /* [n_fewer] */;
     int64_t n_fewer;
     void *state;                          /* saved by get_state */
+    void *free_state;                     /* before a state is saved over, or NULL */
     uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
     double *reached;
 } Fmu;
@@ -325,7 +326,7 @@ int loop_carry_out(Loop *l, int64_t tick, At *at);
 int fmu_get(const Fmu *f, int64_t judged, At *at);
 int fmu_set(const Setter *s, const double *board, At *at);
 int fmu_do_step(const Fmu *f, double time, double size);
-int fmu_save(const Fmu *f, void *get_state, void *state);
+int fmu_save(const Fmu *f, void *get_state, void **state);
 int fmu_step(Fmu *f, double time, double end, double size, At *at);
 int fmu_checked_step(Fmu *f, double time, double end, double size, At *at);
 int meter_sample(Meter *m, const double *board, int64_t stamp);

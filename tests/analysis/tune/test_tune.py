@@ -18,13 +18,15 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
+from hapticlink.analysis.stability.hands import FIRM, HANDS, spring
+from hapticlink.analysis.stability.held_equilibria import held
 from hapticlink.analysis.stability.linearisation import linearised
-from hapticlink.analysis.tune.held_equilibria import held
-from hapticlink.analysis.tune.poses import LIGHT, Pose
+from hapticlink.analysis.stability.poses import LIGHT, Pose
 from hapticlink.analysis.tune.search import COARSE, search
-from hapticlink.analysis.tune.spring_hand import FIRM, HANDS, spring
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.overrides import written
+
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
 
 RECORDED = Path(__file__).parents[3] / "results" / "tune"
 TUNED = ("closed-loop", "enclosure", "obstacles", "serial", "telescope")

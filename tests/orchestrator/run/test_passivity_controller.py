@@ -21,6 +21,8 @@ from hapticlink.components.specs.device import Device
 from tests.blocks import Running
 from tests.shared_fixtures import run_once
 
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
+
 MASS, T = 0.3, 1 / 512
 M = np.diag([0.3, 0.3, 3e-4])
 ARM = {

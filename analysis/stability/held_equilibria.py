@@ -1,7 +1,7 @@
-"""A scene at its equilibrium in a pose, in a hand: its lifted map under changed gains, and its
-compliance.
+"""A scene at its equilibrium in a pose, in a hand: its linearised period under changed gains and in
+other hands, and its compliance.
 
-With the hand cut off (stability/port_response.py), the poses x of the handle at the N haptic
+With the hand cut off (port_response.py), the poses x of the handle at the N haptic
 periods T of a hyperperiod answer to its stacked wrenches u by z' = A z + B u, x = C z + D u. The
 wrench n exp(i w kT), held over each period, moves it at w by
 
@@ -13,20 +13,23 @@ to single wrenches leave few digits. X is the compliance (3, 3).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.stability.equilibrium import newton_step, rests
+from hapticlink.analysis.stability.equilibrium import newton_step, rests, unrest
+from hapticlink.analysis.stability.gains import Gains, Scales
+from hapticlink.analysis.stability.hand_slopes import HandSlopes, hand_slopes
+from hapticlink.analysis.stability.hands import FIRM, LEVER, spring_hand
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
+from hapticlink.analysis.stability.linear_period import LinearPeriod, linear_period
 from hapticlink.analysis.stability.linearisable_scene import linearisable
-from hapticlink.analysis.stability.linearisation import Linearisation, linearised
-from hapticlink.analysis.stability.modes import modes
+from hapticlink.analysis.stability.modes import Mode, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
-from hapticlink.analysis.tune.gains import Gains, Scales
-from hapticlink.analysis.tune.spring_hand import FIRM, LEVER
+from hapticlink.analysis.stability.trajectory import TOLERANCE
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.loop_names import (
@@ -34,44 +37,38 @@ from hapticlink.orchestrator.base.loop_names import (
     HAND,
     HAND_WRENCH,
     HANDLE_POSE,
+    POINT_POSE,
 )
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import System
 
 SOFT = 0.25
 """Scale of the scene's gains with which an equilibrium is searched where they throw the handle
 off."""
-STEPS = 12
-"""Newton steps to the equilibrium."""
-SHARED, NEARBY = 1e-4, 1e-2
-"""Relative difference of numbers that share slopes: on the way to the equilibrium, and about that
-of the scene's own gains, next to which that of others is."""
+STEPS, POINTS = 12, 6
+"""Newton steps to the equilibrium with the slopes of one point, and points."""
 SURE = 0.01
 """Uncertainty of an eigenvalue below which it may count as 1."""
-GROWN = 1e7
-"""Growth over a period with which rounding errors move the state that is linearised."""
 
 
 class Held:
-    """A scene at its equilibrium in a spring hand, searched from a `start`, such as the
+    """A scene at its equilibrium in a firm spring hand, searched from a `start`, such as the
     `equilibrium` of the same scene at other rates. T: the haptic period (s). gains: those of its
     laws; the map may begin with softer ones. Raises InputFault where there is none with them."""
 
     def __init__(
         self, map_: LiftedMap, gains: Gains, T: float, start: Vector | None = None
     ) -> None:
-        self._map, self.gains, self._T = map_, gains, T
+        self.map, self.gains, self.T = map_, gains, T
         if start is None or len(start) != len(map_.start):  # holds keep more or fewer samples
             start = map_.start
-        self._at = linearised(map_, start, SHARED)
-        self._iterate(SHARED)
-        map_.forget()  # slopes of the states on the way, which may touch less
-        self._home = self._at = linearised(map_, self._at.point, SHARED)
-        self._set: tuple[Scales, float] = {}, 0.0
+        self._home = self._rested(start)
+        self._known: tuple[Scales | None, LinearPeriod] = None, self._home
         with suppress(InputFault, FmuFault):  # gains too stiff for an equilibrium
-            self._home = self._settled({}, FIRM)
+            self._home = self.period({})
 
     @property
     def equilibrium(self) -> Vector:
@@ -83,83 +80,89 @@ class Held:
         """Whether a contact force acts at the `equilibrium`."""
         return bool(self.signal(ENVIRONMENT_WRENCH).any())
 
+    def modes(self, scales: Scales, hands: Mapping[str, HandSlopes]) -> list[Mode]:
+        """The modes with gains scaled by `scales`, in other hands by the FMUs in whose place they
+        are, that of the largest |z| first. Raises InputFault or FmuFault without equilibrium."""
+        return modes(self.period(scales).held(hands).linear, self.map.period)
+
     def stable(self, scales: Scales, hand: float) -> bool:
         """Whether no mode grows, neutral ones aside, with gains scaled by `scales` in a spring hand
         of the stiffness `hand` (N/m)."""
         try:
-            at = self._settled(scales, hand)
+            found = self.modes(scales, {HAND: hand_slopes(spring_hand(hand), self.T)})
         except (FmuFault, InputFault):  # diverges at once
             return False
-        found = modes(at, self._map.period)  # an error as large as z says nothing of z = 1
+        # An error as large as z says nothing of z = 1.
         counted = [mode for mode in found if not (mode.neutral and mode.uncertainty < SURE)]
         return bool(counted) and counted[0].growth <= 0.0
 
     def signal(self, port: str) -> Matrix:
         """The values of an output `fmu.port` at the `equilibrium`; none without such an output."""
-        return self._home.image[self._places(port)]
+        return self._home.point[self._places(port)]
 
     def _places(self, port: str) -> list[int]:
         return [
             i
-            for i, c in enumerate(self._map.coordinates)
+            for i, c in enumerate(self.map.coordinates)
             if c.kind == "signal" and str(c).partition("[")[0] == port
         ]
 
-    def compliance(self, scales: Scales, hand: float, hertz: float) -> Complex:
+    def compliance(self, scales: Scales, hertz: float) -> Complex:
         """The compliance (3, 3) of the handle at a frequency. Raises InputFault where it has no
         equilibrium with these gains."""
         try:
-            at = self._settled(scales, hand)
+            at = self.period(scales).in_map
         except FmuFault as fault:
             raise InputFault(str(fault)) from None
-        found = response(self._map, at, hand_port(self._map.system))
-        N, wT = found.forces // found.m, 2 * np.pi * hertz * self._T
+        found = response(self.map, at, hand_port(self.map.system))
+        N, wT = found.forces // found.m, 2 * np.pi * hertz * self.T
         W = np.kron(np.exp(1j * wT * np.arange(N))[:, None], np.eye(found.m)) / np.sqrt(N)
         left = np.exp(1j * wT * N) * np.eye(len(found.A)) - found.A
         X: Complex = W.conj().T @ (found.C @ np.linalg.solve(left, found.B @ W) + found.D @ W)
         return X
 
-    def _settled(self, scales: Scales, hand: float) -> Linearisation:
-        """The map linearised at the equilibrium with these gains, searched from `equilibrium`, so
-        that the result does not depend on what was asked before."""
-        if (scales, hand) != self._set:
-            self._map.set_parameters([*self.gains.parameters(scales), *self._held(hand)])
-            self._set = {}, 0.0  # until all is done
-            self._at = self._linear(self._home.point, NEARBY)
-            self._iterate(NEARBY)
-            if self.touches and not self._at.image[self._places(ENVIRONMENT_WRENCH)].any():
+    def period(self, scales: Scales) -> LinearPeriod:
+        """The period at the equilibrium with these gains, searched from `equilibrium`, so that the
+        result does not depend on what was asked before."""
+        if scales != self._known[0]:
+            self.map.set_parameters([*self.gains.parameters(scales), *self._pressing()])
+            found = self._rested(self._home.point)
+            if self.touches and not found.point[self._places(ENVIRONMENT_WRENCH)].any():
                 raise InputFault("it comes off what it touches")
-            self._set = dict(scales), hand
-        return self._at
+            self._known = dict(scales), found
+        return self._known[1]
 
-    def _iterate(self, same: float) -> None:
-        """Newton's method from where the map is."""
+    def _rested(self, point: Vector) -> LinearPeriod:
+        for _ in range(POINTS):
+            period = linear_period(self.map, point)
+            if period.moved <= TOLERANCE:
+                return period
+            point = self._nearer(period)
+        raise InputFault("it has no equilibrium in a hand that holds it")
+
+    def _nearer(self, period: LinearPeriod) -> Vector:
+        """Newton's method with the slopes of one point, while it converges."""
+        linear, left = period.in_map, np.inf
         for _ in range(STEPS):
-            if rests(self._at):
-                return
-            self._at = self._linear(self._at.moved(newton_step(self._at)), same)
-        if not rests(self._at):
-            raise InputFault("it has no equilibrium in a hand that holds it")
+            linear = replace(linear, image=self.map.image(linear.point))
+            before, left = left, unrest(linear).max()
+            if rests(linear):
+                return linear.image  # in which all that is overwritten is as at rest
+            if left > before / 2:
+                break
+            linear = replace(linear, point=linear.moved(newton_step(linear)))
+        return linear.point
 
-    def _linear(self, point: Vector, same: float) -> Linearisation:
-        """The map along the directions of the first linearisation, whatever the gains. Raises
-        InputFault where it is too unstable."""
-        V = self._at.V
-        image, M, D = self._map.slopes(point, V, same)
-        found = Linearisation(point, image, V, V.T @ M, V.T @ D)
-        d = found.scales
-        if not np.abs(found.A * d / d[:, None]).max() < GROWN:
-            raise InputFault("unstable: small motions grow at once")
-        return found
-
-    def _held(self, stiffness: float) -> Iterator[tuple[str, Scalar, float]]:
-        """The hand's stiffness, the target moved so that it presses as before."""
+    def _pressing(self) -> Iterator[tuple[str, Scalar, float]]:
+        """The hand's target, with which it presses as before."""
         x, F = self.signal(HANDLE_POSE), self.signal(HAND_WRENCH)
-        scalars = self._map.system.fmu[HAND].description.scalars
+        if not len(x):
+            x = self.signal(POINT_POSE)
+        scalars = self.map.system.fmu[HAND].description.scalars
         named = {s.name: s for s in scalars if s.causality == "parameter"}
-        for i, stiff in enumerate((stiffness, stiffness, stiffness * LEVER)):
-            yield HAND, named[f"stiffness[{i + 1}]"], stiff
-            yield HAND, named[f"target[{i + 1}]"], float(x[i] + F[i] / stiff)
+        stiffness = (FIRM, FIRM, FIRM * LEVER)
+        for i, (at, force, stiff) in enumerate(zip(x, F, stiffness, strict=True), 1):
+            yield HAND, named[f"target[{i}]"], float(at + force / stiff)
 
 
 @contextmanager
@@ -168,17 +171,26 @@ def held(
 ) -> Iterator[Held]:
     """A scene with `options`, whose hand is a `spring`, at its equilibrium. Raises InputFault or
     FmuFault where it has none."""
-    with linearisable(scene, options) as (read, system, _), ExitStack() as stack:
+    with linearisable(scene, options) as (read, system, _), held_system(read, system, start) as at:
+        yield at
+
+
+@contextmanager
+def held_system(read: Scene, system: System, start: Vector | None = None) -> Iterator[Held]:
+    """`held` of a system that is built."""
+    with ExitStack() as stack:
         system = long_enough(read, system)
         gains, T = Gains(system), float(1 / exact(read.haptics.rate))
 
         def rested(scale: float) -> Held:
             softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
-            map_ = stack.enter_context(lifted_map(softer, 0.0, read))
+            map_ = stack.enter_context(lifted_map(softer, 0.0, read, pinned=True))
             return Held(map_, gains, T, start)
 
         try:
             place = rested(1.0)
         except (InputFault, FmuFault):
+            if not gains.laws:
+                raise
             place = rested(SOFT)
         yield place
