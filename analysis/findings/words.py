@@ -32,18 +32,18 @@ SIGNALS = {
     "x": "pose",
     "v": "velocity",
     "q": "joint coordinates",
-    "q_dot": "joint rates",
+    "qd": "joint rates",
 }
 """By the last part of a port's name; all others stand as they are."""
 
 
 def signal(name: str) -> str:
     """A signal `block.port`, or `block.user.port`, in words: `mobility`, `left: coupling force`."""
-    block, _, port = name.partition(".")
+    fmu, _, port = name.partition(".")
     user, _, last = port.rpartition(".")
-    users = (user_of_block(block, own) for own in BLOCKS)
+    users = (user_of_block(fmu, own) for own in BLOCKS)
     user = user or next((found for found in users if found), "")
-    words = SIGNALS.get(last, last) if _block(block) else name
+    words = SIGNALS.get(last, last) if block(fmu) else name
     return f"{user}: {words}" if user else words
 
 
@@ -54,10 +54,10 @@ def connection(name: str) -> str:
     if not arrow:
         return name
     of, to = (end.partition(".")[0] for end in (source, target))
-    at = f"the {known}" if (known := _block(to)) else to
+    at = f"the {known}" if (known := block(to)) else to
     if ".F" in target:
         return f"{signal(source)} on {at}"
-    return f"{signal(source)} of the {_block(of)} to {at}" if _block(of) else f"{source} to {at}"
+    return f"{signal(source)} of the {block(of)} to {at}" if block(of) else f"{source} to {at}"
 
 
 def connections(names: Iterable[str]) -> dict[str, str]:
@@ -67,6 +67,6 @@ def connections(names: Iterable[str]) -> dict[str, str]:
     return {name: text if every.count(text) == 1 else name for name, text in said.items()}
 
 
-def _block(name: str) -> str:
+def block(name: str) -> str:
     """A block in words, "" for an FMU that is none of the loop's."""
     return next((w for b, w in BLOCKS.items() if user_of_block(name, b) is not None), "")
