@@ -57,10 +57,11 @@ from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 
 class UserPort(NamedTuple):
-    """Energy generated (J) at times (s), the mechanism's samples; that of each block, of which it
-    is the sum; and the works of single wrenches at the end (J), by name."""
+    """Work of the hands and energy generated (J) at times (s), the mechanism's samples; that of
+    each block, of which the latter is the sum; and the works of single wrenches at the end (J)."""
 
     time_s: Vector
+    put_in_J: Vector
     generated_J: Vector
     blocks_J: dict[str, Vector]
     works: dict[str, float]
@@ -117,7 +118,9 @@ def user_port(results: Results) -> UserPort | None:
     generated = stored - further - sum(put_in.values())
     lacks = needed(results, put_in) & {*results.record.not_recorded}
     blocks = {} if lacks else by_block(results, time, stored - further, put_in)
-    return UserPort(time, generated, blocks, _works(results, device, time))
+    return UserPort(
+        time, further + sum(put_in.values()), generated, blocks, _works(results, device, time)
+    )
 
 
 def pushed_by_others(results: Results) -> list[str]:

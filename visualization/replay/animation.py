@@ -27,8 +27,14 @@ MAX_FRAMES, MIN_PERIOD = 60, 1 / 20
 MIN_DURATION, LAST_FRAME = 2.0, 1.0
 """Times (s) that an animation takes at least, and for which its last frame stays."""
 COLORS = 64
-SIZE, DPI = (4.6, 5.0), 80
-"""Of the picture of one run (in)."""
+WIDTH, DPI = 4.6, 80
+"""Of the picture of one run (in); its height is that of what moves, with TEXT (in) for the
+title and the legend."""
+TEXT = (0.6, 0.35)
+LEGEND = (
+    "dashed: the linkage as the graphics block has it; dotted: from the handle (circle) to the "
+    "point that it should be at (cross); arrow: force of the hand"
+)
 ARROW = 60.0
 """Length (pt) of the largest force of the hand."""
 LEFT_OUT = ("centre", "directions", "cut")
@@ -116,14 +122,17 @@ def _pictures(panels: Sequence[_Panel], times: Array) -> Iterator[Image]:
     from matplotlib.figure import Figure
     from PIL import Image
 
-    figure = Figure(figsize=(SIZE[0] * len(panels), SIZE[1]), dpi=DPI)
-    canvas = FigureCanvasAgg(figure)
-    every = figure.subplots(1, len(panels), squeeze=False)[0]
-    figure.subplots_adjust(0.01, 0.01, 0.99, 0.89, wspace=0.03)
     both = np.array([panel.limits() for panel in panels])
     low, high = both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)
-    half = 0.56 * max(float((high - low).max()), 20.0)
-    limits = ((low + high) / 2)[:, None] + half * np.array([[-1.0, 1.0]])
+    half = 0.6 * np.maximum(high - low, 0.6 * float((high - low).max()) + 10.0)
+    limits = ((low + high) / 2)[:, None] + half[:, None] * np.array([[-1.0, 1.0]])
+    height = 0.98 * WIDTH * half[1] / half[0] + sum(TEXT)
+    figure = Figure(figsize=(WIDTH * len(panels), height), dpi=DPI)
+    canvas = FigureCanvasAgg(figure)
+    every = figure.subplots(1, len(panels), squeeze=False)[0]
+    figure.subplots_adjust(0.01, TEXT[1] / height, 0.99, 1 - TEXT[0] / height, wspace=0.03)
+    legend = fill(LEGEND, int(17 * figure.get_figwidth()))
+    figure.text(0.01, 0.08 / height, legend, fontsize="x-small", color="0.3")
     for k in range(len(times)):
         for axes, panel in zip(every, panels, strict=True):
             panel.draw(axes, k, limits)
