@@ -28,7 +28,6 @@ export class Charts {
     const fold = document.createElement("details"), title = document.createElement("summary");
     title.textContent = "Expert: closure error, deadlines";
     fold.append(title, ...this.charts.filter((chart) => chart.expert).map((chart) => chart.figure));
-    fold.addEventListener("toggle", () => this.host.dispatchEvent(new Event("changed")));
     this.host.replaceChildren(...this.charts.filter((chart) => !chart.expert).map((chart) => chart.figure), fold);
   }
 
@@ -91,7 +90,7 @@ class Chart {
   }
 
   draw(span, at) {
-    if (this.figure.hidden) return;
+    if (this.figure.hidden || this.figure.closest("details:not([open])")) return;
     const newest = Math.max(...this.runs.map(({ times }) => times.at(-1) ?? 0));
     const [from, to] = span ?? [newest - SPAN, newest];
     const { context, width, height } = fitted(this.canvas);
