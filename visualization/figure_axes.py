@@ -17,6 +17,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.summary import stopped_by
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import shortened
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.tables import Results
 
@@ -80,7 +81,25 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     # At a fixed height.
     every[0].set_title(plain(fill(title, 70)), fontsize="medium", y=1.0, pad=12)
     every[-1].set_xlabel(x)
+    if x == "time (s)":
+        for axes in every:
+            _events(axes, results)
     return figure, every if len(y) > 1 else every[0]
+
+
+def _events(axes: Axes, results: Results) -> None:
+    """A line at each time at which something happens in the scene, with its text."""
+    texts: dict[float, list[str]] = {}
+    for time, text in results.run.get("events", ()):
+        if time <= last_time(results):
+            texts.setdefault(time, []).append(shortened(text, 60))
+    for time, said in texts.items():
+        axes.axvline(time, color="0.4", linestyle=":", linewidth=1)
+        axes.annotate(
+            plain("\n".join(said)), (time, 1), xycoords=("data", "axes fraction"), rotation=90,
+            xytext=(-2, -3), textcoords="offset points", fontsize="xx-small", color="0.3",
+            horizontalalignment="right", verticalalignment="top",
+        )  # fmt: skip
 
 
 def framed(figure: Figure, **margins: float) -> None:

@@ -73,11 +73,11 @@ def figures(results: Results) -> dict[str, Figure]:
 
 def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     """By name, what draws each figure of a run."""
-    found: dict[str, Callable[[], Figure]] = {}
+    drawn_by: dict[str, Callable[[], Figure]] = {}
     with_rows = {name: table for name, table in results.tables.items() if len(table["time"])}
     results = replace(results, tables=with_rows)
     if not last_time(results):
-        return found
+        return drawn_by
     linkage = scene_part(
         results, "linkage", Linkage
     )  # an SSP has the block, but not its description
@@ -85,25 +85,25 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     if linkage and (coordinates := of_block(results, JOINT_COORDINATES, size)):
         q = coordinates[JOINT_COORDINATES]
         if len(q := q[np.isfinite(q).all(axis=1)]):
-            found["mechanism"] = partial(_mechanism, results, linkage, q)
+            drawn_by["mechanism"] = partial(_mechanism, results, linkage, q)
     if of_block(results, POINT_POSE, 3):
-        if "mechanism" not in found:
-            found["trajectories"] = partial(_trajectories, results)
+        if "mechanism" not in drawn_by:
+            drawn_by["trajectories"] = partial(_trajectories, results)
         if of_block(results, HANDLE_POSE, 3):
-            found["distance"] = partial(_distance, results)
+            drawn_by["distance"] = partial(_distance, results)
     if wrenches(results):
-        found["forces"] = partial(forces, results, all_devices(results))
+        drawn_by["forces"] = partial(forces, results, all_devices(results))
     if contact := touching(results):
-        found["contact"] = partial(_contact, results, *contact)
+        drawn_by["contact"] = partial(_contact, results, *contact)
     if counted := constrained(results):
-        found["constraints"] = partial(_constraints, results, *counted)
+        drawn_by["constraints"] = partial(_constraints, results, *counted)
     if port := user_port(results):
-        found["user_port"] = partial(_port, results, port)
+        drawn_by["user_port"] = partial(_port, results, port)
     if generated := _generated(results):
-        found["energies"] = partial(_energies, results, generated)
+        drawn_by["energies"] = partial(_energies, results, generated)
     if (paced := results.record.real_time) and paced["ticks"]:
-        found["real_time"] = partial(real_time, results)
-    return found
+        drawn_by["real_time"] = partial(real_time, results)
+    return drawn_by
 
 
 def pngs(results: Results) -> Iterator[tuple[str, bytes]]:

@@ -127,8 +127,8 @@ def paint(axes: Axes, marks: Iterable[Mark], frame: Frame, zorder: float | None 
 
 def place(frame: Frame, of: Place) -> Points | None:
     """The place (mm) of a point in the frame, (2,)."""
-    found = reach(frame, of.path)
-    return None if found is None else (np.array(found[:2]) + _turned(found, of.point)) * MM
+    pose = reach(frame, of.path)
+    return None if pose is None else (np.array(pose[:2]) + _turned(pose, of.point)) * MM
 
 
 def _turned(pose: Sequence[float], at: Any, by: float = 0.0) -> Points:
@@ -230,10 +230,10 @@ PAINTERS = {
 def _limits(axes: Axes) -> Points:
     """Limits of x and y (mm) that contain what is drawn with a margin for names, (2, 2), in a ratio
     between 3/4 and 4/3; 100 mm about a single point."""
-    found = np.array([axes.dataLim.intervalx, axes.dataLim.intervaly])
-    size = 1.3 * np.ptp(found, axis=1)
+    limits = np.array([axes.dataLim.intervalx, axes.dataLim.intervaly])
+    size = 1.3 * np.ptp(limits, axis=1)
     half = np.maximum(size, 0.75 * size.max() if size.max() > 1e-6 else 100.0) / 2
-    return found.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
+    return limits.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
 
 
 def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:

@@ -192,7 +192,7 @@ function draw() {
   charts.draw();
   requestAnimationFrame(draw);
 }
-// The run is in this file, as its data, or behind the server that the page is from.
-const run = ($("data") ? started : connected)({ received, opened: note, lost });
+// The run is in this file, as its program, or behind the server that the page is from.
+const run = ($("program") ? started : connected)({ received, opened: note, lost });
 for (const id of ["compare", "hear"]) $(id).hidden = !run.compare;
 draw();

@@ -52,10 +52,10 @@ def write(runs: Sequence[Recorded], names: Sequence[str], path: Path) -> None:
     times = np.linspace(0.0, end, int(np.clip(np.ceil(end / MIN_PERIOD) + 1, 2, MAX_FRAMES)))
     panels = [_Panel(run, name, times) for run, name in zip(runs, names, strict=True)]
     first, *others = _with_palette(list(_pictures(panels, times)))
-    each = round(1e3 * max(end, MIN_DURATION) / len(times))
+    milliseconds = round(1e3 * max(end, MIN_DURATION) / len(times))
     first.save(
         path, save_all=True, append_images=others, loop=0, optimize=True, lossless=True,
-        duration=[each] * (len(times) - 1) + [round(1e3 * LAST_FRAME)],
+        duration=[milliseconds] * (len(times) - 1) + [round(1e3 * LAST_FRAME)],
     )  # fmt: skip
 
 
@@ -79,11 +79,11 @@ class _Panel:
     def limits(self) -> Array:
         """Least and largest x and y (mm) of all that moves, (2, 2)."""
         fixed = [mark for mark in self._marks if mark.role in FITTED]
-        found = [self._x]
+        points = [self._x]
         for row in self._rows:
             at = (place(self._frames[row], each) for mark in fixed for each in mark.at)
-            found.append(np.array([each for each in at if each is not None]))
-        every = np.vstack(found)
+            points.append(np.array([each for each in at if each is not None]))
+        every = np.vstack(points)
         return np.array([every.min(axis=0), every.max(axis=0)]).T
 
     def draw(self, axes: Axes, k: int, limits: Array) -> None:
@@ -102,19 +102,19 @@ class _Panel:
 
     def _said(self, k: int, row: int) -> tuple[str, str]:
         """Time and tracking error, and what happens."""
-        told = f"{self.run.times[row]:.2f} s"
+        text = f"{self.run.times[row]:.2f} s"
         if self._handle is not None:
             apart = np.hypot(*(self._handle[row, :2] * MM - self._x[row]))
-            told += f", handle {short(round(float(apart), 1))} mm away"
-        return told, fill(self._now(k)[0], 46)
+            text += f", handle {short(round(float(apart), 1))} mm away"
+        return text, fill(self._now(k)[0], 46)
 
     def _now(self, k: int) -> tuple[str, str]:
         """The first episode at the k-th frame, or how the run has ended; and its colour."""
         time, end = self.times[k], self.run.times[-1]
         if time > end:
             return summary.ending(self.run.results), "k"
-        found = [e for e in self._episodes if e.begin <= time <= e.end]
-        return (found[0].said, KINDS[found[0].kind][0]) if found else ("", "k")
+        episodes = [e for e in self._episodes if e.begin <= time <= e.end]
+        return (episodes[0].said, KINDS[episodes[0].kind][0]) if episodes else ("", "k")
 
 
 def _pictures(panels: Sequence[_Panel], times: Array) -> Iterator[Image]:
