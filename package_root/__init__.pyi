@@ -7,8 +7,16 @@ from hapticlink.analysis.stability.finite_time_growth import (
 from hapticlink.analysis.stability.passivity import Passivity as Passivity
 from hapticlink.analysis.stability.passivity import passivity as passivity
 from hapticlink.analysis.stability.scene_stability import Stability as Stability
-from hapticlink.analysis.stability.scene_stability import stability as stability
+from hapticlink.analysis.stability.scene_stability import (
+    equilibrium_stability as equilibrium_stability,
+)
 from hapticlink.analysis.stability.varying_rate import VaryingStability as VaryingStability
+from hapticlink.analysis.stability.workspace_stability import stability as stability
+from hapticlink.analysis.stability.workspace_verdict import (
+    WorkspaceStability as WorkspaceStability,
+)
+from hapticlink.analysis.transparency import Transparency as Transparency
+from hapticlink.analysis.transparency import transparency as transparency
 from hapticlink.analysis.tune import Tuned as Tuned
 from hapticlink.analysis.tune import tune as tune
 from hapticlink.api.compare import Comparison as Comparison

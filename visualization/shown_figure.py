@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from matplotlib.figure import Figure
+from io import BytesIO
 
-from hapticlink.visualization.figure_axes import png
+from matplotlib.figure import Figure
 
 
 class ShownFigure(Figure):
-    """A Matplotlib figure with a picture of itself."""
+    """A Matplotlib figure with a picture of itself, at twice the dots of its size in a cell."""
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
-        return png(self), {"width": round(100 * self.get_figwidth())}
+        file = BytesIO()
+        self.savefig(file, format="png", dpi=200)
+        return file.getvalue(), {"width": round(100 * self.get_figwidth())}

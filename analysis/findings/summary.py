@@ -74,7 +74,9 @@ def told(results: Results, name: str) -> Iterator[str]:
     """The lines that `hapticlink run` and `print` show of a run: how it ended, its numbers,
     warnings, time and files."""
     yield f"{name}: {ending(results)}"
-    for line in (*numbers(results), *warnings(results)):
+    recorded = warnings(results)
+    doubtful = [line for line in recorded if line.startswith("warning: ")]
+    for line in (*doubtful, *numbers(results), *(r for r in recorded if r not in doubtful)):
         yield f"  {line}"
     record = results.record
     if record.timings.run and record.end.time:  # a signal may come before the first event
@@ -217,9 +219,10 @@ def _stopped(results: Results) -> Iterator[str]:
     its energy between steps."""
     table = of_block(results, MECHANISM_STOPS)
     if table and (results.record.scene["contacts"] or {}).get("detection") == "graphics":
+        method = results.record.scene["mechanism"]["integrator"]
         yield (
-            "passive-midpoint makes no energy within a step, but each new frame of contacts may "
-            "change it: take contacts.detection = 'haptics'"
+            f"{method} makes no energy within a step, but each new frame of contacts may change "
+            "it: take contacts.detection = 'haptics'"
         )
     if table and len(table["time"]) and (stops := int(table[MECHANISM_STOPS][-1])):
         yield (
@@ -342,23 +345,34 @@ def _start(results: Results) -> Iterator[str]:
 
 
 def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
-    """A line if assembly moved joints far from their start in [linkage]; q are the assembled joint
-    coordinates."""
-    if far := list(_far(linkage, q)):
-        yield f"warning: the loops do not close at the given start; assembly moved {', '.join(far)}"
-
-
-def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
-    coordinates = iter(q)
+    """A line with both poses if assembly moved joints far from their start in [linkage]; q are the
+    assembled joint coordinates."""
+    starts = linkage["start"]
+    given = {name: np.atleast_1d(start).tolist() for name, start in starts.items()}
+    poses, far, coordinates = {}, [], iter(q)
     for joint in linkage["joint"]:
-        units = COORDINATE_UNITS[joint["type"]]
-        assembled = list(islice(coordinates, len(units)))
-        if joint["name"] not in linkage["start"]:
-            continue
-        given = np.atleast_1d(linkage["start"][joint["name"]]).tolist()
-        for start, value, unit in zip(given, assembled, units, strict=True):
+        name, units = joint["name"], COORDINATE_UNITS[joint["type"]]
+        poses[name] = list(islice(coordinates, len(units)))
+        for start, value, unit in zip(given.get(name, ()), poses[name], units, strict=False):
             if abs(value - start) > SMALLEST_MOVE[unit]:
-                yield f"{joint['name']} from {start:.6g} to {value:.6g} {unit}"
+                far.append(f"{name} by {_turn(value - start, unit)}")
+    if far:
+        yield (
+            f"warning: the loops do not close at the given start; assembly moved {', '.join(far)}. "
+            f"Given: {_pose(given)}. Assembled: {_pose({name: poses[name] for name in given})}"
+        )
+
+
+def _turn(change: float, unit: str) -> str:
+    return f"{np.degrees(change):.3g} degrees" if unit == "rad" else f"{1e3 * change:.3g} mm"
+
+
+def _pose(coordinates: Mapping[str, Sequence[float]]) -> str:
+    """As `linkage.start` is written."""
+    values = {name: [f"{v:.6g}" for v in value] for name, value in coordinates.items()}
+    texts = (v[0] if len(v) == 1 else f"[{', '.join(v)}]" for v in values.values())
+    pairs = zip(values, texts, strict=True)
+    return f"linkage.start = {{ {', '.join(f'{name} = {text}' for name, text in pairs)} }}"
 
 
 SMALLEST_MOVE = {"rad": 0.1, "m": 0.01}

@@ -100,6 +100,15 @@ class StateVector:
         for (name, hold), kept in zip(self._holds.items(), template.holds, strict=True):
             vars(hold).update(_mapped(kept, name, _copied))
 
+    def ages(self, of: Callable[[dict[str, Any]], Any]) -> tuple[Any, ...]:
+        """What `of` tells of each hold as it is."""
+        return tuple(of(vars(hold)) for hold in self._holds.values())
+
+    def sizes(self) -> dict[str, int]:
+        """How many numbers each owner has now."""
+        template = self.save()
+        return dict(zip(self.owners, map(len, self.parts(template)), strict=True))
+
     def numbers(self, template: Template) -> Vector:
         """The numbers of a saved state, in the order of `coordinates`."""
         return np.concatenate(self.parts(template))

@@ -28,6 +28,7 @@ GAMMA = 1 - 1 / math.sqrt(2)
 class LinearlyImplicit(Integrator):
     order = 2
     l_stable = True
+    bounded_by = frozenset({"sticking"})
 
     def step(self, ode: Ode, x: ca.SX, u: ca.SX, p: ca.SX, t: ca.SX, h: ca.SX) -> ca.SX:
         """x(t + h). Raises ValueError for more positions than velocities."""

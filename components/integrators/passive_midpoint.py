@@ -47,6 +47,7 @@ STOPS = "steps whose energy balance left only to stop the mechanism: the step is
 
 class PassiveMidpoint(Integrator):
     order = 2
+    bounded_by = frozenset()
     counters = MappingProxyType({"stops": STOPS})
 
     def misfit(self, *, baumgarte: bool, held: bool) -> str:

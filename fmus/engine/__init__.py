@@ -53,7 +53,7 @@ def entries(
     linkage, contacts = settings["linkage"], settings.get("contacts")
     mechanism = settings.get("mechanism")
     sync = None if mechanism else settings["graphics"].sync
-    integrator = INTEGRATORS[mechanism.integrator] if mechanism else "implicitfast"
+    integrator = INTEGRATORS[mechanism.integrator] if mechanism else "Euler"
     reduced = _reduced(component)
     about = {
         "block": component.name,
@@ -76,12 +76,15 @@ def entries(
         "outputs": _sizes(reduced.outputs),
     }
     functions = {
-        "resources/model.xml": mjcf(linkage, contacts, integrator).encode(),
+        "resources/model.xml": mjcf(
+            linkage, contacts, integrator, pulled=sync == "operational"
+        ).encode(),
         "resources/engine.json": json.dumps(about).encode(),
     }
     module = Path(__file__).with_name("mujoco_functions.py").read_bytes()
-    told = {"engine": True, "n_shared": 0}
-    return packed(reduced, functions, told, stop_time=stop_time, step_size=step_size, engine=module)
+    return packed(
+        reduced, functions, {"n_shared": 0}, stop_time=stop_time, step_size=step_size, engine=module
+    )
 
 
 def _misfits(component: Component, settings: Mapping[str, Any]) -> Iterator[str]:
@@ -98,6 +101,15 @@ def _misfits(component: Component, settings: Mapping[str, Any]) -> Iterator[str]
         yield f"integrator {mechanism.integrator!r} is not MuJoCo's: take one of {[*INTEGRATORS]}"
     if graphics and graphics.sync == "joint":
         yield 'sync = "joint" is not passed on: take graphics.sync = "exact" or "operational"'
+    if graphics and graphics.sync == "operational":
+        for key, (along_x, along_y, _) in (
+            ("stiffness", graphics.stiffness),
+            ("damping", graphics.damping),
+        ):
+            if along_x != along_y:
+                yield f"graphics.{key} differs along x and y: give one value for both"
+        if not all(graphics.stiffness):
+            yield "graphics.stiffness holds a 0, and the pull is a spring: give it stiffness"
     if any(j.limits and j.limits.restitution is not None for j in settings["linkage"].joint):
         yield "restitution of joint limits is not passed on: give their damping"
 

@@ -33,9 +33,16 @@ HAND = "hand"
 FREE = ("x", "y", "theta")
 
 
-def mjcf(linkage: Linkage, contacts: Contacts | None, integrator: str = "Euler") -> str:
-    """The model's text; a run sets its time step. Raises FmuError, with the remedy, for what has no
-    counterpart in MuJoCo."""
+def mjcf(
+    linkage: Linkage,
+    contacts: Contacts | None = None,
+    integrator: str = "Euler",
+    *,
+    pulled: bool = False,
+) -> str:
+    """The model's text; a run sets its time step. pulled: the operational point is drawn to a
+    reference by two soft equalities, of its place and of its angle, whose targets and gains a run
+    sets. Raises FmuError, with the remedy, for what has no counterpart in MuJoCo."""
     for why in _misfits(linkage):
         raise FmuError(f"engine = 'mujoco': {why}")
     root = ET.Element("mujoco", model="linkage")
@@ -51,7 +58,7 @@ def mjcf(linkage: Linkage, contacts: Contacts | None, integrator: str = "Euler")
         cone="elliptic",
         jacobian="dense",
     )
-    ET.SubElement(option, "flag", warmstart="disable")
+    ET.SubElement(option, "flag", warmstart="disable", autoreset="disable")
     assets = ET.SubElement(root, "asset")
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "site", name="world")
@@ -60,7 +67,14 @@ def mjcf(linkage: Linkage, contacts: Contacts | None, integrator: str = "Euler")
     if contacts:
         shapes.obstacles(world, contacts)
     _bodies(world, "ground", linkage, shapes)
-    _closures(ET.SubElement(root, "equality"), linkage)
+    equality = ET.SubElement(root, "equality")
+    _closures(equality, linkage)
+    if pulled:
+        reference = ET.SubElement(world, "body", name="reference", mocap="true")
+        ET.SubElement(reference, "site", name="reference")
+        ends = {"site1": HAND, "site2": "reference"}
+        ET.SubElement(equality, "connect", {"name": "pull.place"} | ends)
+        ET.SubElement(equality, "tendon", name="pull.angle", tendon1=f"{HAND}.angle")
     tendons, actuators = ET.SubElement(root, "tendon"), ET.SubElement(root, "actuator")
     for name, body, _ in points(linkage):
         _handle(tendons, actuators, name, chain(linkage, body))
@@ -202,17 +216,16 @@ def _closures(equality: ET.Element, linkage: Linkage) -> None:
 
 
 def _handle(tendons: ET.Element, actuators: ET.Element, name: str, hinges: list[str]) -> None:
-    """The actuators of an operational point: force = ctrl, until a run gives them gains."""
-    plain = {"biastype": "affine", "gainprm": "1", "biasprm": "0 0 0"}
+    """The actuators of an operational point: force = ctrl."""
     for axis, gear in (("x", "1 0 0 0 0 0"), ("y", "0 1 0 0 0 0")):
         place = {"name": f"{name}.{axis}", "site": name, "refsite": "world", "gear": gear}
-        ET.SubElement(actuators, "general", place | plain)
+        ET.SubElement(actuators, "motor", place)
     if hinges:
         angle = ET.SubElement(tendons, "fixed", name=f"{name}.angle")
         for hinge in hinges:
             ET.SubElement(angle, "joint", joint=hinge, coef="1")
         place = {"name": f"{name}.theta", "tendon": f"{name}.angle"}
-        ET.SubElement(actuators, "general", place | plain)
+        ET.SubElement(actuators, "motor", place)
 
 
 def _spring(tendons: ET.Element, actuators: ET.Element, name: str, spring: Spring) -> None:

@@ -28,6 +28,13 @@ LOCKED, RANK = 1e-10, 1e-6
 """As in `constrained_directions.py` and `equivalent_wrench.py`."""
 SINGULAR = 1e-12
 """Share of the largest eigenvalue of W M^-1 W' below which a closure is redundant."""
+BAD = {
+    mujoco.mjtWarning.mjWARN_BADQPOS: "coordinate",
+    mujoco.mjtWarning.mjWARN_BADQVEL: "rate",
+    mujoco.mjtWarning.mjWARN_BADQACC: "acceleration",
+    mujoco.mjtWarning.mjWARN_BADCTRL: "wrench",
+}
+mujoco.set_mju_user_warning(lambda text: None)  # else it writes a file in the current folder
 PUSHING = (
     mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT,
     mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS,
@@ -83,7 +90,8 @@ class Engine:
         m, (k, b) = self._m, self._about["contact"]
         for i in range(m.npair):
             bodies = (m.geom_bodyid[geom] for geom in (m.pair_geom1[i], m.pair_geom2[i]))
-            mass = 1 / sum(m.body_invweight0[body][0] for body in bodies)
+            # MuJoCo takes the mean over three axes, along one of which nothing moves here.
+            mass = 1 / sum(1.5 * m.body_invweight0[body][0] for body in bodies)
             m.pair_solref[i] = _solref(k, b, mass)
         for name, k, b in self._about["limits"]:
             joint = m.joint(name)
@@ -168,13 +176,34 @@ class Engine:
         else:
             self._pull(inputs, named)
         mujoco.mj_step(self._m, self._d)
+        if bad := [BAD[kind] for kind in BAD if self._d.warning[kind].number]:
+            mujoco.mj_resetData(self._m, self._d)
+            raise ValueError(f"MuJoCo finds a huge or undefined {bad[0]}: take a smaller step")
 
     def _pull(self, inputs: dict, named: dict) -> None:
-        """The graphics controller K_g (x_ref - x) + B_g (v_ref - v) at the operational point."""
-        for i, actuator in enumerate(self._points[0].actuators):
-            k, b = named["K_g"][i], named["B_g"][i]
-            self._m.actuator_biasprm[actuator, 1:3] = -k, -b
-            self._d.ctrl[actuator] = k * inputs["x_ref"][i] + b * inputs["v_ref"][i]
+        """The graphics controller K_g (x_ref - x) + B_g (v_ref - v) at the operational point, with
+        x and v at the end of the step: soft equalities with the regularisation
+
+            R = 1 / (h (B_g + h K_g)),   a_ref = -R (K_g (x - x_ref - B_g/K_g v_ref)) - v/h
+
+        An explicit force would need a step below twice the inertia by B_g."""
+        m, d, h = self._m, self._d, self._m.opt.timestep
+        K, B = named["K_g"], named["B_g"]
+        target = inputs["x_ref"] + B / K * inputs["v_ref"]
+        d.mocap_pos[0, :2] = target[:2]
+        mujoco.mj_fwdPosition(m, d)
+        for name, i in (("pull.place", 0), ("pull.angle", 2)):
+            pull = m.equality(name).id
+            row = np.flatnonzero((d.efc_id == pull) & (d.efc_type == 0))[0]
+            had = d.efc_KBIP[row, 2]
+            mobility = d.efc_R[row] * had / (1 - had)  # by which MuJoCo scales the impedance
+            R = 1 / (h * (B[i] + h * K[i]))
+            impedance = 1 / (1 + R / mobility)
+            impedance = min(max(impedance, 1e-4), 1 - 1e-4)  # MuJoCo's own bounds
+            m.eq_solimp[pull] = impedance, impedance, 1.0, 0.5, 2.0
+            m.eq_solref[pull] = -K[i] * R * impedance, -impedance / h
+            if name == "pull.angle":
+                m.eq_data[pull, 0] = target[2]
 
     def _push(self, inputs: dict) -> None:
         for point in self._points:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import signal
 import subprocess
 import sys
 from collections import Counter
@@ -80,6 +81,12 @@ COMMIT = _commit()
 """When the attack began: its processes read what stands on the disk."""
 
 
+def hear_interrupts() -> None:
+    """Processes that this one starts hear SIGINT, which a shell ignores in the background."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def command(
     name: str,
     about: str,
@@ -94,6 +101,7 @@ def command(
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=FOLDER / f"{name}.csv")
     given = parser.parse_args()
+    hear_interrupts()
     counts = counted(attack(given.cases, given.seed))
     write(given.out, counts, given.seed, outcomes)
     print(given.out)

@@ -30,6 +30,9 @@ WITH_EXAMPLES = [p for p in PAGES if name(p) not in ELSEWHERE and [*blocks(p, "s
 SHORTER = {"hapticlink sweep": 0.02} | {f"hapticlink run {name}": 0.2 for name in hl.shipped()}
 """Duration (s) of commands that take longer than their page needs."""
 NOT_RUN = {
+    "hapticlink sweep closed-loop --set controller.bias=full --vary graphics.rate=10..60..5 "
+    "--vary hold=zoh,lead,foh":
+        "33 runs; docs/rates.md has a sweep that is run",
     "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,foh":
         "many runs; docs/rates.md has a sweep that is run",
     "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh":

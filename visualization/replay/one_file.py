@@ -92,9 +92,9 @@ def _text(name: str) -> str:
     return (PAGE / name).read_text(encoding="utf-8")
 
 
-def _style(found: re.Match[str]) -> str:
-    return f"<style>\n{_text(found[1])}</style>"
+def _style(match: re.Match[str]) -> str:
+    return f"<style>\n{_text(match[1])}</style>"
 
 
-def _icon(found: re.Match[str]) -> str:
-    return f'<link rel="icon" href="data:image/svg+xml,{quote(_text(found[1]))}">'
+def _icon(match: re.Match[str]) -> str:
+    return f'<link rel="icon" href="data:image/svg+xml,{quote(_text(match[1]))}">'

@@ -22,6 +22,8 @@ from hapticlink.visualization.compare import numbers, overlay, page, settings
 from hapticlink.visualization.figures.run_figures import figures as run_figures
 from tests.shared_fixtures import status
 
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
+
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
