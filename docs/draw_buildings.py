@@ -42,7 +42,7 @@ BUILDINGS = {
         ".",
     ),
     "programs": (".",),
-    "analysis": ("findings", "stability", "sweep", "maps", "tune"),
+    "analysis": ("findings", "stability", "sweep", "maps", "tune", "transparency", "advise"),
     "visualization": (".", "mechanism", "figures", "live", "replay", "standalone", "compare"),
     "api": (".",),
     "commands": (".",),

@@ -15,6 +15,8 @@ from hapticlink.analysis.stability.workspace_stability import stability as stabi
 from hapticlink.analysis.stability.workspace_verdict import (
     WorkspaceStability as WorkspaceStability,
 )
+from hapticlink.analysis.transparency import Transparency as Transparency
+from hapticlink.analysis.transparency import transparency as transparency
 from hapticlink.analysis.tune import Tuned as Tuned
 from hapticlink.analysis.tune import tune as tune
 from hapticlink.api.compare import Comparison as Comparison

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hapticlink.analysis.findings.summary import stopped_by
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import shortened
 from hapticlink.orchestrator.results.numbers import last_time, short
@@ -67,6 +68,9 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     reason = results.record.end.reason
     if reason != "duration":
         why = _ENDS.get(reason, "a fault ended the run")
+        said = stopped_by(results.record.stop_when)
+        if reason == "stop_when" and said.startswith("the device"):
+            why = said
         title += f", until {why} at {short(last_time(results))} s"
     figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
     framed(figure)

@@ -116,6 +116,16 @@ class LinkCounts:
 
 
 @dataclass(frozen=True)
+class Premises:
+    """Of a hold that bounds energy: its steps by entry, those outside the premises of its theorem,
+    and the energy (J) `at_stake` in these, which the theorem does not cover."""
+
+    steps: int
+    outside: int
+    at_stake: float
+
+
+@dataclass(frozen=True)
 class Timings:
     """Wall times (s) of building the scene, of the loop, of writing its tables as CSV, and of
     doStep by FMU."""
@@ -181,6 +191,11 @@ class RunEnding:
     causal: bool = True
     """Whether no FMU reads a sample that is stamped later than the start of its step."""
     links: dict[str, LinkCounts] = field(default_factory=dict)
+    premises: dict[str, Premises] = field(default_factory=dict)
+    """Of the connections with `passive` or `nepce`."""
+    overdrawn: dict[str, float] = field(default_factory=dict)
+    """By set position, the energy (J) that its tank was short of at most: what the coupling gave
+    beyond all that it was given."""
     isolated: dict[str, str] = field(default_factory=dict)
     """Why an FMU ran in a process of its own."""
     held_outputs: dict[str, int] = field(default_factory=dict)
@@ -242,10 +257,10 @@ class RunRecord(RunEnding, RunSetup):
 
 def content(section: RunSetup | RunEnding | PortEnergy) -> dict[str, Any]:
     """A section as run.json has it, in the same order; its end without what is not known."""
-    found = asdict(section)
-    if "end" in found:
-        found["end"] = {k: v for k, v in found["end"].items() if v not in (None, "")}
-    return found
+    values = asdict(section)
+    if "end" in values:
+        values["end"] = {k: v for k, v in values["end"].items() if v not in (None, "")}
+    return values
 
 
 def read(run: Mapping[str, Any], folder: Path | None) -> RunRecord:

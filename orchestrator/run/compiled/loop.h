@@ -118,6 +118,7 @@ typedef struct {
     double period, available, needed, credited;
     double *newest /* [2 * n] */, *modulated /* [2 * n] */;
     double *x /* [n] */, *moved /* [n] */, *force /* [n] */, *withheld /* [n] */;
+    double *least /* [1] */;              /* least energy available so far, at most 0 */
 } Tank;
 
 /* factor board[where] + offset; factor is NULL where it is 1 and offset 0. */
@@ -135,15 +136,16 @@ typedef struct {
 
 /* Of a hold that observes its energy: energy_account.py. `passive` or `nepce`. path: of the target,
  * until: samples and until when they were held, fresh: samples that are not accounted for; each has
- * `room`. vectors: (18, n). velocity has n = 0 where the target does not have it. */
+ * `room`. vectors: (19, n). velocity has n = 0 where the target does not have it. */
 typedef struct {
     int64_t n, passive, tick, stamp, steps, delayed, room;
     Reader displacement, velocity;
-    double *vectors /* [18 * n] */;
+    double *vectors /* [19 * n] */;
     Queue path, until, fresh;
     Tank *tank;                           /* of a spring on whose far side it is, or NULL */
     double promised, promise;
     int64_t since;                        /* of the promise */
+    double *premises /* [3] */;           /* steps of entries, those outside, energy at stake */
 } Account;
 
 /* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is

@@ -217,6 +217,18 @@ def test_it_warns_of_motors_at_their_limit() -> None:
     assert not warned("closed-loop", weak | {"controller.passivity": False}, "passivity")
 
 
+@pytest.mark.parametrize("rate", [10, 30])
+def test_a_run_warns_where_steps_outside_the_premises_matter(rate: int) -> None:
+    """`passive` generates more than the hand puts in at 10 Hz, and next to nothing at 30."""
+    options = {"hold": "passive", "graphics.rate": rate}
+    run = hl.run("closed-loop-direct", options, figures=False).record
+    (name,) = (n for n in run.premises if n.startswith("controller.F_drift"))
+    counted, said = run.premises[name], f"warning: passive of {name} generated"
+    assert any(line.startswith(said) for line in run.warnings or ()) == (rate == 10)
+    assert counted.at_stake > run.across[name].peak
+    assert (counted.outside > 0.2 * counted.steps) == (rate == 10)
+
+
 def test_it_warns_where_it_damps_counts_of_the_encoders() -> None:
     """The motors give the true handle nothing, and yet it acts, until `noise` is what the warning
     says: the energy of one count."""
