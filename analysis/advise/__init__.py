@@ -58,7 +58,7 @@ class Method:
         return (*HOLDS[self.hold], *GAINS.get(self.gains, ()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measured:
     """A method on the draws, of which `within` keep the limits: largest distances of handle and
     operational point (mm), and energies at the user's port as shares of what is allowed."""
