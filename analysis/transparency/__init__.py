@@ -196,7 +196,8 @@ def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Tr
     moves = values > CONSTRAINED * values[-1]
     E, P = vectors[:, moves], vectors[:, ~moves].T
     X = S @ X @ S
-    M: Complex = -np.linalg.inv(E.T @ X @ E) / (w * w)[:, None, None]
+    solved = np.linalg.inv(E.T @ X @ E)
+    M = np.asarray(-solved / (w * w)[:, None, None], np.complex128)
     free = [
         _direction(E[:, i], M[:, :, i], i, 1.0 / value) for i, value in enumerate(values[moves])
     ]
