@@ -30,7 +30,11 @@ class Run(Results):
 
     `tables` are the Tables by rate, `run` is the content of run.json (the scene, versions, holds,
     energies, ages of samples, timings), `folder` is the result folder, None for a run in memory.
+    `numbers` are the lines that the terminal shows of it beside `run["warnings"]`, empty of one
+    that was loaded.
     """
+
+    numbers: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Any:
         """The Table of a rate, or a signal of any rate. Raises KeyError with a hint for an unknown

@@ -82,7 +82,7 @@ def run(
     if result.fault:
         say(f"hapticlink: {result.fault}", file=sys.stderr)
     warnings = result.run.get("warnings")
-    if warnings is None:  # no row is in the folder, or too many to be read back
+    if warnings is None:  # no row is in the folder
         warnings = list(summary.lines(result))
     if quiet or json:
         for line in warnings:
@@ -97,7 +97,7 @@ def _lines(result: Run, warnings: Sequence[str], name: str, folder: Path) -> Ite
     from hapticlink.orchestrator.results.tables import TABLES
 
     yield f"{name}: {summary.ending(result)}"
-    for line in (*summary.numbers(result), *warnings):
+    for line in (*result.numbers, *warnings):
         yield f"  {line}"
     wall_time = result.run["timings"]["run"]
     if wall_time:  # none where a signal came before the first event

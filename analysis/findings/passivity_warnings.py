@@ -7,7 +7,8 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import groupby
 from typing import Any
 
-from hapticlink.analysis.findings.episodes import Episode, saturations
+from hapticlink.analysis.findings.episodes import Episode
+from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.control import Passivity
 from hapticlink.orchestrator.base.loop_names import (
@@ -20,10 +21,10 @@ from hapticlink.orchestrator.base.loop_names import (
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.scene_part import all_devices
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.tables import Results, Table
 
 
-def lines(results: Results) -> Iterator[str]:
+def lines(results: Results, measures: Measures) -> Iterator[str]:
     """A line for each late force and pose of a passivity controller or of `pspm`, for motors at
     their limit beside a passivity controller, and for one that damps counts of encoders."""
     record = results.record
@@ -42,7 +43,7 @@ def lines(results: Results) -> Iterator[str]:
                 "its force with the motion of that time, and does not bound its energy"
             )
     driven = [name for name in guarded if user_of_block(name, CONTROLLER) is not None]
-    for name, spans in groupby(saturations(results) if driven else (), key=_controller):
+    for name, spans in groupby(measures.saturations if driven else (), key=_controller):
         if name in driven:
             seconds = sum(span.end - span.begin for span in spans)
             yield (
@@ -78,13 +79,15 @@ def _counts(results: Results) -> Iterator[str]:
     from hapticlink.components.device.encoder_count import count_energies  # casadi
 
     record, devices = results.record, all_devices(results)
+    first = next(results.windows())
     for user, law in _laws(record.scene).items():
         handle = signal_of_user(MEASURED_HANDLE_POSE, user)
-        table, device = of_block(results, handle, 3), devices.get(user)
+        table, device = of_block(first, handle, 3), devices.get(user)
         if table is None or device is None or not len(table["time"]):
             continue
-        acted = of_block(results, damping := signal_of_user(PASSIVITY_DAMPING, user))
-        if acted and not acted[damping].any():
+        damping = signal_of_user(PASSIVITY_DAMPING, user)
+        acted = (t is None or t[damping].any() for t in _tables(results, damping))
+        if not any(acted):
             continue
         period = record.clocks[record.fmus[handle.partition(".")[0]].rate].longest
         count = float(count_energies(device, table[handle][0], period).max())
@@ -95,6 +98,10 @@ def _counts(results: Results) -> Iterator[str]:
                 f"in a period {short(count)} J: the passivity controller damps counts, which give "
                 f"no energy; take {key}.passivity.noise={1.1 * count:.2g}"
             )
+
+
+def _tables(results: Results, signal: str) -> Iterator[Table | None]:
+    return (of_block(window, signal) for window in results.windows())
 
 
 def _controller(saturated: Episode) -> str:

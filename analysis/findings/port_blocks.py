@@ -20,9 +20,9 @@ a mobility or directions that are held or differ, velocity terms left out, satur
 
 Works on the handle and the mechanism are those of the energy meters, of the wrenches as they act:
 a sample that comes late, by a latency or in the order of Jacobi, or is lost is paired with the
-displacement over which it acts (`arrivals.py`). Where a hold gives other values than samples, the
-work is known at the meter's last sample alone, and reached there in proportion to that of the
-samples.
+displacement over which it acts (`sample_arrivals.py`). Where a hold gives other values than
+samples, the work is known at the meter's last sample alone, and reached there in proportion to that
+of the samples.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.sample_arrivals import known_from
 from hapticlink.analysis.findings.tracking import of_block, poses, table_of
+from hapticlink.analysis.findings.works import Works
 from hapticlink.orchestrator.base.loop_names import (
     DRIFT_WRENCH,
     ENVIRONMENT_WRENCH,
@@ -42,7 +42,7 @@ from hapticlink.orchestrator.base.loop_names import (
     TOPOLOGY_WRENCH,
     signal_of_user,
 )
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.tables import Results, Vector
 
 
 class User(NamedTuple):
@@ -81,11 +81,11 @@ def needed(results: Results, users: Iterable[str]) -> set[str]:
 
 
 def by_block(
-    results: Results, time: Vector, stored: Vector, put_in: Mapping[str, Vector]
+    results: Results, works: Works, time: Vector, stored: Vector, put_in: Mapping[str, Vector]
 ) -> dict[str, Vector]:
-    """The energy (J) that each block has generated at the times (s), those of all users' blocks
-    added up. stored: E - E(0) less the work of hands without a device; put_in: the work of each
-    user's hand on the handle, by the user's name."""
+    """The energy (J) that each block has generated at the times (s) of a window, those of all
+    users' blocks added up. stored: E - E(0) less the work of hands without a device; put_in: the
+    work of each user's hand on the handle, by the user's name."""
     blocks: dict[str, Vector] = {}
     shaping, mechanism = np.zeros(len(time)), stored.copy()
 
@@ -95,7 +95,7 @@ def by_block(
     def on(signal: str, position: str) -> tuple[Vector, Vector] | None:
         if of_block(results, signal, 3) is None or of_block(results, position, 3) is None:
             return None
-        return works(results, signal, position, time)
+        return works.of(results, signal, position, time)
 
     for each, done in ((user(name), done) for name, done in put_in.items()):
         shaping = shaping - done
@@ -110,7 +110,7 @@ def by_block(
         if contact := on(each.contact, each.point):
             add("environment", -contact[1])
             shaping = shaping + contact[1]
-        for name, (held, source) in _into_mechanism(results, each, time).items():
+        for name, (held, source) in _into_mechanism(results, works, each, time).items():
             mechanism = mechanism - held
             if name == each.drift:
                 add("drift", source)
@@ -120,7 +120,9 @@ def by_block(
     return {"shaping": shaping, **blocks, "mechanism": mechanism}
 
 
-def _into_mechanism(results: Results, each: User, time: Vector) -> dict[str, tuple[Vector, Vector]]:
+def _into_mechanism(
+    results: Results, works: Works, each: User, time: Vector
+) -> dict[str, tuple[Vector, Vector]]:
     """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
     from, by that signal."""
     found = {}
@@ -128,7 +130,7 @@ def _into_mechanism(results: Results, each: User, time: Vector) -> dict[str, tup
         if table_of(results, source) and of_block(results, each.point, 3):
             sign = -1.0 if target.endswith("F_drift") else 1.0
             name = f"{source} -> {target}"
-            found[source] = works(results, source, each.point, time, sign, name)
+            found[source] = works.of(results, source, each.point, time, sign, name)
     return found
 
 
@@ -138,71 +140,3 @@ def _sources(results: Results, each: User) -> Iterator[tuple[str, str]]:
         source, _, target = name.partition(" -> ")
         if target in (f"{each.inputs}F_hand", f"{each.inputs}F_drift"):
             yield source, target
-
-
-def works(
-    results: Results,
-    signal: str,
-    position: str,
-    at: Vector,
-    sign: float = 1.0,
-    connection: str | None = None,
-) -> tuple[Vector, Vector]:
-    """The work (J) of a wrench at a position until the times `at`: as it acts, and that of its
-    source. `connection` is that with which it acts; by default one from the signal to the FMU of
-    the position, without which the newest sample acts."""
-    table, moved = table_of(results, signal), table_of(results, position)
-    if not (table and moved):
-        raise KeyError(f"work needs the signals {signal} and {position}")
-    force, stamps, booked = sign * table[signal], table["time"], results.record.meters
-    start = f"{signal} -> {position.partition('.')[0]}."
-    name = connection or next((n for n in booked if n.startswith(start)), None)
-    if name is None:
-        return (
-            work(force, stamps, moved, position, at),
-            ideal(force, stamps, moved, position, at),
-        )
-    known = known_from(results, name, stamps, table is moved)
-    meter = booked[name]
-    until = meter.until
-    to = np.union1d(at, until)  # where the meter stops may be beside or after the times
-    acts, source = (
-        _passing(series, to, until, energy)[np.searchsorted(to, at)]
-        for energy, series in (
-            (meter.held, work(force, known, moved, position, to)),
-            (meter.ideal, ideal(force, stamps, moved, position, to)),
-        )
-    )
-    return acts, source
-
-
-def _passing(series: Vector, at: Vector, until: float, value: float) -> Vector:
-    """`series` at the times `at`, changed in proportion to its own path so that it passes `value`
-    at the time `until`."""
-    path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
-    to, reached = (float(np.interp(until, at, y)) for y in (path, series))
-    if not to:
-        path, to = at - at[0], max(until - float(at[0]), 1e-300)
-    changed: Vector = series + (value - reached) * path / to
-    return changed
-
-
-def work(force: Vector, known: Vector, moved: Table, position: str, at: Vector) -> Vector:
-    """The work (J) of the newest of the forces (n, 3), known from the times `known` on, over the
-    steps of a position until the times `at`. A force that comes after a newer one does not act."""
-    x, time = moved[position], moved["time"]
-    order = np.argsort(known, kind="stable")
-    newest = np.maximum.accumulate(order)
-    rows = np.searchsorted(known[order], time[:-1] + 1e-12, "right") - 1
-    held = force[newest[np.maximum(rows, 0)]]
-    done = np.concatenate([[0.0], (held * np.diff(x, axis=0)).sum(axis=1).cumsum()])
-    return np.interp(at, time, done)
-
-
-def ideal(force: Vector, stamps: Vector, moved: Table, position: str, at: Vector) -> Vector:
-    """The work (J) of forces (n, 3) that are linear in the displacement between their stamps."""
-    x, time = moved[position], moved["time"]
-    at_stamps = np.stack([np.interp(stamps, time, column) for column in x.T], axis=1)
-    mean = (force[:-1] + force[1:]) / 2
-    done = np.concatenate([[0.0], (mean * np.diff(at_stamps, axis=0)).sum(axis=1).cumsum()])
-    return np.interp(at, stamps, done)

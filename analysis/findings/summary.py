@@ -12,7 +12,7 @@ from hapticlink.analysis.findings import friction_speed
 from hapticlink.analysis.findings.deadlines import finding
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
-from hapticlink.analysis.findings.tracking import folded, of_block
+from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.analysis.findings.user_port import pushed_by_others
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.base.loop_names import (
@@ -55,20 +55,19 @@ def ending(results: Results) -> str:
     return f"{how.get(end.reason, end.reason)} at {end.time:.6g} s"
 
 
-def numbers(results: Results) -> Iterator[str]:
+def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]:
     """What one would open the figures for: tracking error, largest forces, energies, closure of the
-    loops."""
-    measures = Measures(results)
+    loops. measures: those of the results, if they are there."""
+    measures = measures or Measures(results)
     for user, error in measures.tracking.items():
         yield _tracking(user, error)
-        margin = signal_of_user(WORKSPACE_MARGIN, user)
-        if user and (table := of_block(results, margin)) and table[margin].min() < 0:
+        if user and _left(results, signal_of_user(WORKSPACE_MARGIN, user)):
             yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
     if measures.forces:
         peaks = (f"{name} {short(force)} N" for name, force in measures.forces.items())
         yield f"largest forces: {'; '.join(peaks)}"
-        yield from _saturated(results)
-    if port := results.record.user_port:
+        yield from _saturated(measures)
+    if port := measures.port:
         yield (
             f"energy at the user's port beyond what the hand put in: at most "
             f"{short(1e3 * port.peak)} mJ at {port.time_of_peak:.3g} s, "
@@ -84,6 +83,11 @@ def numbers(results: Results) -> Iterator[str]:
         yield f"loops close within {measures.closure_m:.2g} m"
 
 
+def _left(results: Results, margin: str) -> bool:
+    tables = (of_block(window, margin) for window in results.windows())
+    return any(bool((table[margin] < 0).any()) for table in tables if table)
+
+
 def _tracking(user: str, error: TrackingError) -> str:
     if user:
         return (
@@ -96,22 +100,20 @@ def _tracking(user: str, error: TrackingError) -> str:
     )
 
 
-def _saturated(results: Results) -> Iterator[str]:
+def _saturated(measures: Measures) -> Iterator[str]:
     """A line for each user whose motors were at their torque limit, and for how long."""
-    from hapticlink.analysis.findings.episodes import saturations
-
-    for said, spans in groupby(saturations(results), key=lambda episode: episode.said):
+    for said, spans in groupby(measures.saturations, key=lambda episode: episode.said):
         seconds = sum(span.end - span.begin for span in spans)
         yield f"{said} for {short(seconds)} s: the hand felt less than the controller asked for"
 
 
-def lines(results: Results) -> Iterator[str]:
+def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     """One line for each warning, which begins so, and for each note: start poses, folded copy,
     signals that are not recorded, held outputs, repeated steps, contacts, convergence, lost
     samples, stability, and holds that did not fit."""
-    record = results.record
+    record, measures = results.record, measures or Measures(results)
     yield from _start(results)
-    off, frames = folded(results)
+    off, frames = measures.folded
     if off:
         yield (
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
@@ -128,7 +130,7 @@ def lines(results: Results) -> Iterator[str]:
         yield f"no energy at the user's port: {name} is not the force of the handle's own hand"
     yield from _steps(record)
     yield from friction_speed.coarse(results)
-    yield from _passivity(results)
+    yield from _passivity(results, measures)
     yield from _stopped(results)
     yield from _contacts(results)
     for name, link in record.links.items():
@@ -168,17 +170,18 @@ def _refused_holds(record: RunRecord) -> Iterator[str]:
         yield f"zoh instead of the default hold {hold} for {targets}: {'; '.join(reasons)}"
 
 
-def _passivity(results: Results) -> Iterator[str]:
+def _passivity(results: Results, measures: Measures) -> Iterator[str]:
     # casadi, for the torques of motors, which most of the terminal's lines can do without
     from hapticlink.analysis.findings import passivity_warnings
 
-    yield from passivity_warnings.lines(results)
+    yield from passivity_warnings.lines(results, measures)
 
 
 def _stopped(results: Results) -> Iterator[str]:
     """A line if the passive midpoint method had to stop the mechanism, and one if contacts change
     its energy between steps."""
-    table = of_block(results, MECHANISM_STOPS)
+    *_, last = results.windows()
+    table = of_block(last, MECHANISM_STOPS)
     if table and (results.record.scene["contacts"] or {}).get("detection") == "graphics":
         yield (
             "passive-midpoint makes no energy within a step, but each new frame of contacts may "
@@ -284,7 +287,8 @@ def replaced(replacements: Mapping[str, Replacement]) -> Iterator[str]:
             yield f"{name}: inputs that nothing feeds: {', '.join(unfed)}"
 
 
-def _start(results: Results) -> Iterator[str]:
+def _start(run: Results) -> Iterator[str]:
+    results = next(run.windows())
     device = of_block(results, WORKSPACE_MARGIN)
     if (
         device

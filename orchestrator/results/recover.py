@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folder_lock, json_file, rows
-from hapticlink.orchestrator.results.files import make_csv, write_json
+from hapticlink.orchestrator.results.files import make_csv, remove_rows, write_json
 from hapticlink.orchestrator.results.run_folder import RUN
 from hapticlink.orchestrator.results.tables import load
 
@@ -49,6 +49,7 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
             lost = rows.torn(source)
             _, kept = rows.read(source)
             found[name] = Recovered(make_csv(table), float(kept[-1, 0]), lost)
+            remove_rows(table)
     told: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in found.items()}}
     if "process" in end:
         last = next((r.time for r in found.values()), 0.0)

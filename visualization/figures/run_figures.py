@@ -5,7 +5,7 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -14,18 +14,17 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
 from hapticlink.analysis.findings.tracking import (
     constrained,
+    constraint_counts,
     further_users,
     of_block,
     pose_error,
-    tracking,
 )
-from hapticlink.analysis.findings.user_port import UserPort, user_port
+from hapticlink.analysis.findings.user_port import UserPort
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
@@ -38,9 +37,10 @@ from hapticlink.orchestrator.base.loop_names import (
 )
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.scene_part import all_devices, scene_part
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.figure_axes import framed, plain, png, titled
+from hapticlink.visualization.figures.curves import Curve, curve, port_curve
 from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
 from hapticlink.visualization.mechanism import drawing, marks
@@ -68,35 +68,44 @@ def figures(results: Results) -> dict[str, Figure]:
 def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     """By name, what draws each figure of a run."""
     found: dict[str, Callable[[], Figure]] = {}
-    with_rows = {name: table for name, table in results.tables.items() if len(table["time"])}
-    results = replace(results, tables=with_rows)
     if not last_time(results):
         return found
+    first = next(results.windows())
+    with_rows = {name: table for name, table in first.tables.items() if len(table["time"])}
+    first = replace(first, tables=with_rows)
     linkage = scene_part(
         results, "linkage", Linkage
     )  # an SSP has the block, but not its description
     size = len(coordinate_units(linkage)) if linkage else 0
-    if linkage and (coordinates := of_block(results, JOINT_COORDINATES, size)):
-        q = coordinates[JOINT_COORDINATES]
-        if len(q := q[np.isfinite(q).all(axis=1)]):
-            found["mechanism"] = partial(_mechanism, results, linkage, q)
-    if of_block(results, POINT_POSE, 3):
+    if linkage and of_block(first, JOINT_COORDINATES, size):
+        ends = [q for window in results.windows() for q in _finite(window, size)]
+        if ends:
+            found["mechanism"] = partial(_mechanism, results, linkage, ends)
+    if of_block(first, POINT_POSE, 3):
         found["trajectories"] = partial(_trajectories, results)
-        if of_block(results, HANDLE_POSE, 3):
+        if of_block(first, HANDLE_POSE, 3):
             found["distance"] = partial(_distance, results)
-    if wrenches(results):
+    if wrenches(first):
         found["forces"] = partial(forces, results, all_devices(results))
-    if contact := touching(results):
-        found["contact"] = partial(_contact, results, *contact)
-    if counted := constrained(results):
-        found["constraints"] = partial(_constraints, results, *counted)
-    if port := user_port(results):
+    if touching(first):
+        found["contact"] = partial(_contact, results)
+    if constrained(first):
+        found["constraints"] = partial(_constraints, results)
+    if port := port_curve(results):
         found["user_port"] = partial(_port, results, port)
     if generated := _generated(results):
         found["energies"] = partial(_energies, results, generated)
     if (paced := results.record.real_time) and paced["ticks"]:
         found["real_time"] = partial(real_time, results)
     return found
+
+
+def _finite(window: Results, size: int) -> Vector:
+    """The first and the last joint coordinates of a window that are finite."""
+    table = of_block(window, JOINT_COORDINATES, size)
+    q = table[JOINT_COORDINATES] if table else np.zeros((0, size))
+    q = q[np.isfinite(q).all(axis=1)]
+    return q[[0, -1]] if len(q) else q
 
 
 def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
@@ -110,7 +119,7 @@ def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
     return figure_axes.write(((name, png(figure)) for name, figure in figures.items()), folder)
 
 
-def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
+def _mechanism(results: Results, linkage: Linkage, q: Sequence[Vector]) -> Figure:
     title = f"{results.run['scene']['title']} at the start and at {short(last_time(results))} s"
     figure, axes = titled(results, title, "x (mm)", "y (mm)")
     contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
@@ -125,9 +134,9 @@ def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
 
 def _mark(results: Results, axes: Axes) -> None:
     """The episodes of a run, along the path of the operational point."""
-    if (table := of_block(results, POINT_POSE, 3)) is None:
+    if of_block(next(results.windows()), POINT_POSE, 3) is None:
         return
-    time, path = table["time"], table[POINT_POSE][:, :2] * 1e3
+    time, path = curve(results, partial(_place, signal=POINT_POSE))
     marked = [*episodes(results)]
     for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
         color, label = marks.KINDS[kind]
@@ -140,6 +149,14 @@ def _mark(results: Results, axes: Axes) -> None:
         )  # fmt: skip
 
 
+def _place(window: Results, signal: str) -> Curve:
+    """Times (s) and places (mm) of a pose."""
+    table = of_block(window, signal, 3)
+    assert table is not None
+    rows = window.within(table["time"])
+    return table["time"][rows], table[signal][rows, :2] * 1e3
+
+
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
     """Label, line style and path (mm) of operational point, handle and further points."""
     linkage = results.record.scene["linkage"] or {}
@@ -147,21 +164,22 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
         (signal_of_user(POINT_POSE, point["name"]), f"point {point['name']}", "-.")
         for point in linkage.get("point", ())
     ]
+    first = next(results.windows())
     return [
-        (label, style, table[signal][:, :2] * 1e3)
+        (label, style, curve(results, partial(_place, signal=signal))[1])
         for signal, label, style in (
             (POINT_POSE, "operational point x_S", "-"),
             (HANDLE_POSE, "handle x_D", "--"),
             *further,
         )
-        if (table := of_block(results, signal, 3))
+        if of_block(first, signal, 3)
     ]
 
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if of_block(results, HANDLE_POSE, 3):
-        apart = short(tracking(results)[1].max())
+    if of_block(next(results.windows()), HANDLE_POSE, 3):
+        apart = short(curve(results, pose_error)[1].max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:
         reach = np.linalg.norm(paths[0][2] - paths[0][2][0], axis=1).max()
@@ -178,10 +196,11 @@ def _trajectories(results: Results) -> Figure:
 
 
 def _distance(results: Results) -> Figure:
-    users = {user: pose_error(results, user) for user in ("", *further_users(results))}
-    largest, (time, gap, _) = max(
-        users.items(), key=lambda each: each[1].distance_mm.max(initial=0)
-    )
+    users = {
+        user: curve(results, partial(pose_error, user=user))
+        for user in ("", *further_users(results))
+    }
+    largest, (time, gap, _) = max(users.items(), key=lambda each: each[1][1].max(initial=0))
     at = int(gap.argmax())
     title = (
         f"Distance of handle to {_point(largest)}: at most {short(gap[at])} mm, "
@@ -189,7 +208,7 @@ def _distance(results: Results) -> Figure:
     )
     figure, axes = titled(results, title, "time (s)", "distance |x_S - x_D| (mm)")
     for (user, error), style in zip(users.items(), cycle(STYLES)):
-        axes.plot(error.time_s, error.distance_mm, style, label=plain(_point(user)))
+        axes.plot(*error[:2], style, label=plain(_point(user)))
     if len(users) > 1:
         axes.legend(fontsize="small")
     return figure
@@ -199,11 +218,10 @@ def _point(user: str) -> str:
     return f"point {user}" if user else "operational point"
 
 
-def _contact(results: Results, time: Vector, pushing: NDArray[np.bool_]) -> Figure:
-    table = of_block(results, ENVIRONMENT_WRENCH, 3)
-    assert table is not None  # it tells when contacts push
-    force = np.linalg.norm(table[ENVIRONMENT_WRENCH][:, :2], axis=1)
-    share = 100 * float(pushing.mean())
+def _contact(results: Results) -> Figure:
+    time, force, pushing = curve(results, _pushing)
+    pushes = [touched[1] for window in results.windows() if (touched := touching(window))]
+    share = 100 * float(np.concatenate(pushes).mean())
     most = short(force[pushing].max(initial=0.0))
     title = f"Contacts push in {short(share)} % of the samples, with |F_env| of at most {most} N"
     figure, axes = titled(
@@ -213,10 +231,29 @@ def _contact(results: Results, time: Vector, pushing: NDArray[np.bool_]) -> Figu
     return figure
 
 
-def _constraints(results: Results, table: Table, name: str) -> Figure:
-    count, time = table[name], table["time"]
-    most = int(count.max())
-    share = 100 * float((count == most).mean())
+def _pushing(window: Results) -> Curve:
+    """Times (s), |F_env| (N), and whether contacts push."""
+    table, touched = of_block(window, ENVIRONMENT_WRENCH, 3), touching(window)
+    assert table is not None
+    assert touched is not None
+    time, pushing = touched
+    force = table[ENVIRONMENT_WRENCH][window.within(table["time"]), :2]
+    return time, np.linalg.norm(force, axis=1), pushing
+
+
+def _counts(window: Results) -> Curve:
+    """Times (s) and numbers of constrained directions."""
+    counted = constrained(window)
+    assert counted is not None
+    table, name = counted
+    rows = window.within(table["time"])
+    return table["time"][rows], table[name][rows]
+
+
+def _constraints(results: Results) -> Figure:
+    time, count = curve(results, _counts)
+    most, samples = int(count.max()), constraint_counts(results.windows())
+    share = 100 * (samples[max(samples)] / sum(samples.values()))
     title = f"{most} constrained directions in {share:.3g} % of the samples"
     figure, axes = titled(results, title, "time (s)", "constrained directions")
     axes.step(time, count, where="post")
