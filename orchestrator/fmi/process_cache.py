@@ -3,7 +3,6 @@ instances of a file. Those of others are unpacked for each, which may write besi
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ from threading import Lock
 
 from fmpy import extract, platform
 
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.description import Description, describe
 
 MAX_UNPACKED = 32
@@ -68,28 +68,34 @@ def unpacked_once() -> Iterator[None]:
 
 
 def unpack(description: Description, folder: str) -> str:
-    """Unpacks an FMU into `folder`, which is empty; or, one of this project that is unpacked
-    already, removes that and returns its folder.
+    """The folder in which an FMU is unpacked: `folder`, which is empty, a new one if that is "", or
+    that of one of this project that is unpacked already.
 
     So all its instances have one library: of each its own the code of 64 would fill the caches.
     FMUs of others have a folder and a library each. What they keep in static variables would be
     common to their instances, in silence, and that they may be instantiated several times in a
     process (`canBeInstantiatedOnlyOncePerProcess`) is what they say where they say nothing.
     """
-    if description.block is None:
-        extract(description.path, folder)
-        return folder
+    own = description.block is not None
+    if folder or not own:
+        return _extracted(description.path, folder, own)
     with _lock:
         file = _file(description.path)
-        unpacked = _unpacked.pop(file, None)
-        if unpacked is None:
-            extract(description.path, folder, _is_needed)
-            unpacked = Unpacked(folder)
-        else:
-            os.rmdir(folder)
+        if (unpacked := _unpacked.pop(file, None)) is None:
+            unpacked = Unpacked(_extracted(description.path, "", own))
         unpacked.instances += 1
         _unpacked[file] = unpacked  # the newest
         return unpacked.folder
+
+
+def _extracted(path: Path, folder: str, own: bool) -> str:
+    folder = folder or temporary_folders.new()
+    try:
+        extract(path, folder, _is_needed if own else None)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return folder
 
 
 def _is_needed(entry: str) -> bool:
