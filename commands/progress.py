@@ -23,6 +23,14 @@ def counted(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], N
 
 
 @contextmanager
+def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int], None]]:
+    """Gives a function to be called with what is done, and the numbers of finished and of all
+    steps."""
+    with _bar(title, hidden) as show:
+        yield lambda what, done, of: show(done, of, what) if show else None
+
+
+@contextmanager
 def progress(
     title: str, duration: float, hidden: bool = False
 ) -> Iterator[Callable[[float], None] | None]:

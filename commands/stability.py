@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from hapticlink.commands.options import (
     Json,
+    Map,
     Out,
     Quiet,
     Scene,
@@ -17,12 +18,29 @@ from hapticlink.commands.options import (
     Swap,
     default_folder,
     options,
-    tell,
 )
-from hapticlink.commands.progress import counted, timed, waiting
+from hapticlink.commands.options import (
+    tell as tell_result,
+)
+from hapticlink.commands.progress import counted, steps, timed, waiting
 from hapticlink.commands.sweep import Jobs, Vary
 
-At = Annotated[float, Parameter(help="Time (s) from which on no target, drive or wrench changes.")]
+At = Annotated[
+    float,
+    Parameter(
+        help="Time (s) from which on no target, drive or wrench changes, for what is judged there: "
+        "EQUILIBRIUM, PORT, GROWTH."
+    ),
+]
+Equilibrium = Annotated[
+    bool, Parameter(negative="", help="Judge the equilibrium of the scene in its own hand alone.")
+]
+Figure = Annotated[bool, Parameter(negative="", help="Draw the verdict: stability.png in OUT.")]
+Poses = Annotated[int, Parameter(help="Poses of the scene's run that are judged.")]
+Drift = Annotated[
+    tuple[float, float],
+    Parameter(help="Frequency (Hz) and growth rate (1/s) below which a growing mode is a drift."),
+]
 Growth = Annotated[
     float | None,
     Parameter(
@@ -47,6 +65,11 @@ def stability(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
+    map: Map = None,
+    poses: Poses = 4,
+    drift: Drift = (1.0, 0.2),
+    figure: Figure = False,
+    equilibrium: Equilibrium = False,
     at: At = 0.0,
     port: UserPort = False,
     growth: Growth = None,
@@ -57,11 +80,10 @@ def stability(
     quiet: Quiet = False,
     json: Json = False,
 ) -> int:
-    """Analyse whether small motions of a scene about an equilibrium decay, how fast, and which
-    parts take part.
+    """Analyse whether a scene shakes: in poses that it visits, in hands from soft to firm.
 
-    The scene needs a hand that holds the mechanism and does not move, such as an arm. Prints the
-    result, which docs/stability.md explains line by line, and writes stability.json to OUT
+    Prints the verdict, the worst pose of each hand, how far the worst case is from the limit, and
+    what makes it stable; docs/stability.md explains it line by line. Writes stability.json to OUT
     (default `runs/SCENE`, with options `runs/SCENE,key=value,...`).
 
     With --vary, a map over one or two numeric keys and others, refined at the boundary: map.csv
@@ -69,43 +91,62 @@ def stability(
 
     For example:
 
+        hapticlink stability closed-loop
         hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
         hapticlink stability virtual-wall --port
         hapticlink stability virtual-wall --vary fmu.wall.start.stiffness=2000..8000:4 --check 2
     """
-    chosen = (*(set or ()), *(swap or ()))
+    chosen = (*(set or ()), *(swap or ()), *(map or ()))
     name = default_folder("runs", scene).name
     if vary:
         folder = out or default_folder("maps", scene, chosen)
-        points, record = _map(scene, folder, options(set, swap), vary, check, seed, jobs, quiet)
-        tell((f"{name}: {next(points)}", *points), record, quiet, json)
+        points, record = _map(
+            scene, folder, options(set, swap, map), vary, check, seed, jobs, quiet
+        )
+        tell_result((f"{name}: {next(points)}", *points), record, quiet, json)
         return 0
     import hapticlink as hl
+    from hapticlink.analysis.stability.kinds import Bounds
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 
-    given = options(set, swap)
+    given = options(set, swap, map)
     if growth is not None:
         rate = hl.finite_time_growth(scene, given, at=at, seconds=growth)
         growth_lines = (
             f"{name}: over {growth:g} s from {at:g} s on, the worst",
             f"  perturbation grows at {rate:.5g} 1/s: no verdict on stability",
         )
-        tell(growth_lines, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json)
+        tell_result(
+            growth_lines, {"finite_time_growth": rate, "from": at, "over": growth}, quiet, json
+        )
         return 0
-    with waiting(f"{name}: equilibrium and linearisation, which can take a minute", quiet):
-        passivity = hl.passivity(scene, given, at=at) if port else None
-        result = hl.stability(scene, given, at=at)
-    folder = folders.ensure(out or default_folder("runs", scene, chosen))
-    record = result.record() | ({"port": passivity.record()} if passivity else {})
-    write_json(folder / "stability.json", record)
-    report = [
-        *result.lines(),
-        *(passivity.lines() if passivity else ()),
-        f"{folder}/stability.json",
-    ]
-    tell((f"{name}: {result.verdict}", *(f"  {line}" for line in report)), record, quiet, json)
+    folder = out or default_folder("runs", scene, chosen)
+    record: dict[str, Any]
+    if equilibrium or port or at:
+        with waiting(f"{name}: equilibrium and linearisation, which can take a minute", quiet):
+            passivity = hl.passivity(scene, given, at=at) if port else None
+            result = hl.equilibrium_stability(scene, given, at=at)
+        record = result.record() | ({"port": passivity.record()} if passivity else {})
+        first, lines = result.verdict, [*result.lines(), *(passivity.lines() if passivity else ())]
+    else:
+        with steps(f"{name}: stability", hidden=quiet) as tell:
+            found = hl.stability(scene, given, poses=poses, bounds=Bounds(*drift), tell=tell)
+        record, first, lines = found.record(), found.finding, [*found.lines()]
+        if figure:
+            _draw(found, folder)
+    write_json(folders.ensure(folder) / "stability.json", record)
+    report = (*lines, f"{folder}/stability.json")
+    tell_result((f"{name}: {first}", *(f"  {line}" for line in report)), record, quiet, json)
     return 0
+
+
+def _draw(found: Any, folder: Path) -> None:
+    from hapticlink.orchestrator.results import folders
+    from hapticlink.visualization.figure_axes import png, write
+    from hapticlink.visualization.figures import stability_figure
+
+    write([("stability", png(stability_figure.draw(found)))], folders.ensure(folder))
 
 
 def _map(

@@ -3,16 +3,18 @@ rendered."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import of_block
-from hapticlink.components.contact.broad_phase import Pair, near
+from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.contact.depth import depths, middle, overlaps
 from hapticlink.components.contact.stiffness import STABLE, poles, sticking_poles
-from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.integrators import METHODS
+from hapticlink.components.integrators.base import ContactState, Integrator
+from hapticlink.components.specs.contacts import Contacts, Pair
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 from hapticlink.orchestrator.base.loop_names import (
     CONTACT_GAP,
@@ -41,11 +43,11 @@ def lines(results: Results) -> Iterator[str]:
     if JOINT_COORDINATES in table:  # both are recorded
         yield from _deep(results, linkage, contacts)
     mechanism = scene_part(results, "mechanism", Mechanism)
-    if mechanism.integrator != "passive-midpoint" and len(table["time"]) > 1:
+    method = METHODS.get(mechanism.integrator, Integrator)  # a plugin's may not be loaded
+    if method.bounded_by and len(table["time"]) > 1:
         rate = record.fmus[CONTACT_GAP.partition(".")[0]].rate
         step_s = record.clocks[rate].longest / mechanism.substeps
-        implicit = mechanism.integrator == "linearly-implicit"
-        yield from _stiff(linkage, contacts, step_s, implicit)
+        yield from _stiff(linkage, contacts, step_s, method.bounded_by)
 
 
 def _tables(results: Results) -> Iterator[tuple[Vector, Table]]:
@@ -106,16 +108,19 @@ def _beyond(item: tuple[Pair, Vector, Vector], most: Mapping[Pair, float]) -> fl
     return float(depth.max()) - most[pair]
 
 
-def _stiff(linkage: Linkage, contacts: Contacts, step_s: float, implicit: bool) -> Iterator[str]:
-    pushing = () if implicit else poles(linkage, contacts)
-    sticking = sticking_poles(linkage, contacts, step_s)
-    kinds = (
-        (pushing, "", "damping or stiffness", "linearly-implicit"),
-        (sticking, " that stick", "stiffness", "passive-midpoint"),
+def _stiff(
+    linkage: Linkage, contacts: Contacts, step_s: float, bounded_by: Collection[ContactState]
+) -> Iterator[str]:
+    pushing = poles(linkage, contacts) if "pushing" in bounded_by else ()
+    sticking = sticking_poles(linkage, contacts, step_s) if "sticking" in bounded_by else ()
+    states: tuple[tuple[ContactState, Iterable[tuple[Pair, float]], str, str], ...] = (
+        ("pushing", pushing, "", "damping or stiffness"),
+        ("sticking", sticking, " that stick", "stiffness"),
     )
-    for found, which, less, method in kinds:
-        pair, pole = max(found, key=lambda item: item[1], default=(None, 0.0))
+    for state, pair_poles, which, less in states:
+        pair, pole = max(pair_poles, key=lambda item: item[1], default=(None, 0.0))
         if pair and pole * step_s > STABLE:
+            method = next(n for n, each in METHODS.items() if state not in each.bounded_by)
             yield (
                 f"warning: contacts of {pair.body} with {pair.obstacle}{which} have a pole at "
                 f"{pole:.3g} 1/s, too fast for steps of {step_s:.3g} s: take a smaller "

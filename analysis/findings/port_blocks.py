@@ -74,10 +74,13 @@ def user(name: str = "") -> User:
 
 def needed(results: Results, users: Iterable[str]) -> set[str]:
     """The signals from which the blocks of these users are found, as far as a run has them."""
-    found: set[str] = set()
-    for each in map(user, users):
-        found |= {*each[:-1], *(source for source, _ in _sources(results, each))}
-    return found
+    signals: set[str] = set()
+    for signals_of_user in map(user, users):
+        signals |= {
+            *signals_of_user[:-1],
+            *(source for source, _ in _sources(results, signals_of_user)),
+        }
+    return signals
 
 
 def by_block(
@@ -97,22 +100,26 @@ def by_block(
             return None
         return works.of(results, signal, position, time)
 
-    for each, done in ((user(name), done) for name, done in put_in.items()):
+    for of_user, done in ((user(name), done) for name, done in put_in.items()):
         shaping = shaping - done
-        wrenches = {"drift": each.drift, "topology": each.topology, "environment": each.contact}
+        wrenches = {
+            "drift": of_user.drift,
+            "topology": of_user.topology,
+            "environment": of_user.contact,
+        }
         for name, signal in wrenches.items():
-            if found := on(signal, each.handle):
-                add(name, found[1])
-                shaping = shaping - found[1]
-        if motors := on(each.motors, each.handle):
-            add(f"hold of {each.motors}", motors[0] - motors[1])
+            if wrench := on(signal, of_user.handle):
+                add(name, wrench[1])
+                shaping = shaping - wrench[1]
+        if motors := on(of_user.motors, of_user.handle):
+            add(f"hold of {of_user.motors}", motors[0] - motors[1])
             shaping = shaping - (motors[0] - motors[1])
-        if contact := on(each.contact, each.point):
+        if contact := on(of_user.contact, of_user.point):
             add("environment", -contact[1])
             shaping = shaping + contact[1]
-        for name, (held, source) in _into_mechanism(results, works, each, time).items():
+        for name, (held, source) in _into_mechanism(results, works, of_user, time).items():
             mechanism = mechanism - held
-            if name == each.drift:
+            if name == of_user.drift:
                 add("drift", source)
                 add(f"hold of {name} on the mechanism", held - source)
             else:
@@ -121,22 +128,22 @@ def by_block(
 
 
 def _into_mechanism(
-    results: Results, works: Works, each: User, time: Vector
+    results: Results, works: Works, of_user: User, time: Vector
 ) -> dict[str, tuple[Vector, Vector]]:
     """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
     from, by that signal."""
-    found = {}
-    for source, target in _sources(results, each):
-        if table_of(results, source) and of_block(results, each.point, 3):
+    ports = {}
+    for source, target in _sources(results, of_user):
+        if table_of(results, source) and of_block(results, of_user.point, 3):
             sign = -1.0 if target.endswith("F_drift") else 1.0
             name = f"{source} -> {target}"
-            found[source] = works.of(results, source, each.point, time, sign, name)
-    return found
+            ports[source] = works.of(results, source, of_user.point, time, sign, name)
+    return ports
 
 
-def _sources(results: Results, each: User) -> Iterator[tuple[str, str]]:
+def _sources(results: Results, of_user: User) -> Iterator[tuple[str, str]]:
     """Where F_hand and F_drift of the mechanism come from, and that input."""
     for name in results.record.meters:
         source, _, target = name.partition(" -> ")
-        if target in (f"{each.inputs}F_hand", f"{each.inputs}F_drift"):
+        if target in (f"{of_user.inputs}F_hand", f"{of_user.inputs}F_drift"):
             yield source, target

@@ -54,10 +54,12 @@ from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 
 class UserPort(NamedTuple):
-    """Energy generated (J) at times (s), the mechanism's samples; that of each block, of which it
-    is the sum; and the works of single wrenches at the last of them (J), by name."""
+    """Work of the hands and energy generated (J) at times (s), the mechanism's samples; that of
+    each block, of which the latter is the sum; and the works of single wrenches at the last of them
+    (J), by name."""
 
     time_s: Vector
+    put_in_J: Vector
     generated_J: Vector
     blocks_J: dict[str, Vector]
     works: dict[str, float]
@@ -86,6 +88,7 @@ def user_port(results: Results) -> UserPort | None:
     *_, last = found
     return UserPort(
         np.concatenate([port.time_s for port in found]),
+        np.concatenate([port.put_in_J for port in found]),
         np.concatenate([port.generated_J for port in found]),
         {name: np.concatenate([p.blocks_J[name] for p in found]) for name in last.blocks_J},
         last.works,
@@ -169,7 +172,8 @@ def _port(window: Results, works: Works, start: float) -> UserPort | None:
     generated = stored - further - sum(put_in.values())
     lacks = needed(window, put_in) & {*window.record.not_recorded}
     blocks = {} if lacks else by_block(window, works, time, stored - further, put_in)
-    return UserPort(time, generated, blocks, _works(window, works, device, time))
+    hands = further + sum(put_in.values())
+    return UserPort(time, hands, generated, blocks, _works(window, works, device, time))
 
 
 def pushed_by_others(results: Results) -> list[str]:
@@ -193,10 +197,10 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
         "F_env": ENVIRONMENT_WRENCH,
     }
     found = {
-        f"{user}: {name}" if user else name: _last(works.of(results, at, handle, time)[0])
+        f"{user}: {name}" if user else name: _last(works.of(results, signal_name, handle, time)[0])
         for user in ("", *further_users(results))
         for name, signal in signals.items()
-        if of_block(results, at := signal_of_user(signal, user), 3)
+        if of_block(results, signal_name := signal_of_user(signal, user), 3)
         and of_block(results, handle := signal_of_user(HANDLE_POSE, user), 3)
     }
     if contact := of_block(results, ENVIRONMENT_WRENCH, 3):

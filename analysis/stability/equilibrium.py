@@ -64,7 +64,7 @@ def equilibrium(map_: LiftedMap, run: Trajectory) -> Linearisation:
                 break
         elif rests(linear):
             swings = True
-        elif nearest is None or _unrest(linear).max() < _unrest(nearest).max():
+        elif nearest is None or unrest(linear).max() < unrest(nearest).max():
             nearest = linear
     if not equilibria:
         raise InputFault(_why_none(map_, nearest, run, swings))
@@ -93,10 +93,10 @@ def _leaves(linear: Linearisation, period: float) -> bool:
 
 def rests(linear: Linearisation) -> bool:
     """Whether the state is the same after a period."""
-    return bool((_unrest(linear) <= TOLERANCE).all())
+    return bool((unrest(linear) <= TOLERANCE).all())
 
 
-def _unrest(linear: Linearisation) -> Vector:
+def unrest(linear: Linearisation) -> Vector:
     """Along each direction, the change over a period, relative."""
     return relative(linear.change, linear.V.T @ linear.point)
 
@@ -115,7 +115,7 @@ def _newton(map_: LiftedMap, state: Vector) -> Linearisation:
     """
     linear, least, idle = linearised(map_, state, COARSE), np.inf, 0
     for _ in range(ITERATIONS):
-        left = _unrest(linear).max()
+        left = unrest(linear).max()
         idle = idle + 1 if left > least / 2 else 0
         if left <= TOLERANCE or idle == PATIENCE:
             break
@@ -132,7 +132,7 @@ def _nearer(map_: LiftedMap, linear: Linearisation, step: Vector) -> Vector:
     """The end of a step, or of the part of it that changes less over a period than where it begins:
     a step that begins off a contact would end deep in it, where there may be a rest of another
     kind."""
-    least = _unrest(linear).max()
+    least = unrest(linear).max()
     for part in 0.5 ** np.arange(HALVINGS):
         there = linear.moved(part * step)
         try:
@@ -159,7 +159,7 @@ def _why_none(map_: LiftedMap, nearest: Linearisation | None, run: Trajectory, s
     if nearest is None:
         ended = f" before the run ends ({run.ended})" if run.ended else ""
         return f"no equilibrium found{ended}; {remedy}"
-    along = nearest.V[:, int(np.argmax(_unrest(nearest)))]
+    along = nearest.V[:, int(np.argmax(unrest(nearest)))]
     j = int(np.argmax(np.abs(along)))
     change = nearest.image[j] - nearest.point[j]
     return (

@@ -85,6 +85,21 @@ class Slopes:
     apart: frozenset[str] | None
 
 
+@dataclass(frozen=True, eq=False)
+class Applied:
+    """What an operation at rest does: J and E of the numbers of `owners`, as many as are counted
+    `before` and `after` it, followed by the signals that it reads and writes."""
+
+    operation: Instruction
+    owners: tuple[str, ...]
+    before: tuple[int, ...]
+    after: tuple[int, ...]
+    reads: NDArray[np.intp]
+    writes: NDArray[np.intp]
+    J: Matrix
+    E: Matrix
+
+
 class ForwardSensitivity:
     """The slopes of the operations of a simulation; `closures` are those of its mechanism."""
 
@@ -95,6 +110,7 @@ class ForwardSensitivity:
         self._apart: dict[str, frozenset[str] | None] = {}
         self._graphs: dict[str, GraphSlopes | None] = {}
         self._named: dict[Any, list[Coordinate]] = {}
+        self._applied: dict[Any, Applied] = {}
 
     def forget(self, fmus: Container[str]) -> None:
         """Slopes of these FMUs hold no longer, since parameters of theirs were changed."""
@@ -105,6 +121,7 @@ class ForwardSensitivity:
     def begin(self) -> None:
         """A period begins, of which `ways` tells."""
         self._apart.clear()
+        self._applied.clear()
 
     def ways(self) -> dict[str, str]:
         """By FMU, how its slopes were found since `begin`."""
@@ -116,6 +133,43 @@ class ForwardSensitivity:
                 others = ", ".join(sorted(apart))
                 found[fmu.name] = f"graph; by differences: {others}" if others else "graph"
         return found
+
+    def applied(self, tick: int, operation: Instruction, call: Call) -> Applied | None:
+        """Carries out an operation of a co-simulation at rest, in which its slopes depend on the
+        ages of samples alone."""
+        if isinstance(operation, Finish):
+            return None
+        call = self._alone(operation, call)
+        reach = self._of(operation)
+        if reach is None:
+            call(tick)
+            return None
+        key = operation, reach.state.ages(lambda kept: _ages(kept, tick))
+        if key in self._applied:
+            if not isinstance(operation, Get | Set | Step):  # at rest those change nothing
+                call(tick)
+            return self._applied[key]
+        owners = tuple(o for o in reach.state.owners if o != SIGNALS)
+        before = reach.state.sizes()
+        found, after = self._slopes(tick, operation, call, reach, SAME)
+        self._tell(operation, reach, found)
+        counts = tuple(n for o, n in before.items() if o != SIGNALS)
+        self._applied[key] = made = Applied(
+            operation, owners, counts, tuple(after), reach.reads, reach.writes, found.J, found.E
+        )
+        return made
+
+    def _alone(self, operation: Instruction, call: Call) -> Call:
+        """The call of an operation that can be repeated from a state that was restored."""
+        if isinstance(operation, Step) and operation.fmu in self._simulation.isolated:
+            return self._awaited(operation.fmu, call)
+        return self._from_here(operation, call) if isinstance(operation, Repeat) else call
+
+    def _tell(self, operation: Instruction, reach: Reach, found: Slopes) -> None:
+        for fmu in reach.state.owners if isinstance(operation, Step | Get | Repeat) else ():
+            apart = self._apart.get(fmu, frozenset())
+            if apart is not None:
+                self._apart[fmu] = None if found.apart is None else apart | found.apart
 
     def carry(
         self,
@@ -130,19 +184,13 @@ class ForwardSensitivity:
         by up to `same` max(1, |z|)."""
         if isinstance(operation, Finish):
             return
-        if isinstance(operation, Step) and operation.fmu in self._simulation.isolated:
-            call = self._awaited(operation.fmu, call)
-        if isinstance(operation, Repeat):
-            call = self._from_here(operation, call)
+        call = self._alone(operation, call)
         reach = self._of(operation)
         if reach is None:
             call(tick)
             return
         found, sizes = self._slopes(tick, operation, call, reach, same)
-        for fmu in reach.state.owners if isinstance(operation, Step | Get | Repeat) else ():
-            apart = self._apart.get(fmu, frozenset())
-            if apart is not None:
-                self._apart[fmu] = None if found.apart is None else apart | found.apart
+        self._tell(operation, reach, found)
         J, E = found.J, found.E
         owners = [o for o in reach.state.owners if o != SIGNALS]
         before = [np.vstack([*(X[o] for o in owners), X[SIGNALS][reach.reads]]) for X in (M, D)]

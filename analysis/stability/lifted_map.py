@@ -8,13 +8,16 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import cached_property
 from itertools import takewhile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.forward_sensitivity import (
     SAME,
+    Applied,
     Columns,
     ForwardSensitivity,
     Instruction,
@@ -37,6 +40,8 @@ from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
 
 Watch = Callable[[Vector], None]
+PINNED = 8
+"""Events after which FMUs at rest are put back to it."""
 CONVERGED = 1e-12
 """Tolerance of iterations: far below the differences by which slopes are found."""
 
@@ -76,6 +81,7 @@ class LiftedMap:
         at: float,
         sensitivity: ForwardSensitivity,
         window: tuple[int, int] | None = None,
+        pinned: bool = False,
     ) -> None:
         self._simulation, time = simulation, plan.system.timeline
         self._bound: dict[Event, Bound] = {}
@@ -89,9 +95,11 @@ class LiftedMap:
         self._begin, self.begin = self._state.save(), time.seconds(first)
         self.initial = np.concatenate(self._state.parts(self._begin)[: len(simulation.instances)])
         moments = list(takewhile(lambda moment: moment.tick < first + 2 * length, plan))
-        for tick, event in moments:
-            if tick < first:
-                self._run(tick, event)
+        rest = None
+        for k, (tick, event) in enumerate(moment for moment in moments if moment.tick < first):
+            self._run(tick, event)
+            if pinned and k % PINNED == 0:
+                rest = self._pin(rest)
         self._moments = [m for m in moments if first <= m.tick < first + length]
         self._later = [m for m in moments if m.tick >= first + length]
         self.events = len(self._moments)
@@ -151,6 +159,49 @@ class LiftedMap:
             found.append(np.zeros((len(image), V.shape[1])))
             found[-1][:, alive] = np.vstack([Y[owner] for owner in state.owners])
         return image, found[0], found[1]
+
+    def recorded(self, point: Vector) -> tuple[float, list[list[Applied]]]:
+        """What each event of the period does to perturbations of a state at rest, and the largest
+        change of a state or input of an FMU within PINNED events, relative to max(1, |z|). The FMUs
+        are put back to rest after these, so that nothing grows meanwhile."""
+        self._state.restore(self._state.put(self._template, point))
+        self._sensitivity.begin()
+        moving, moved = self.moving, 0.0
+        events = []
+        for k, (tick, event) in enumerate(self._moments):
+            each = (self._sensitivity.applied(tick, *both) for both in self._instructions(event))
+            events.append([applied for applied in each if applied])
+            if k % PINNED == PINNED - 1 or k == self.events - 1:
+                numbers = self._state.numbers(self._state.save())
+                change = np.abs(numbers[moving] - point[moving])
+                moved = max(moved, (change / np.maximum(1.0, np.abs(point[moving]))).max(initial=0))
+                self._pin(point)
+        interrupt.check()
+        return float(moved), events
+
+    def _pin(self, rest: Vector | None) -> Vector:
+        """Puts FMUs and signals, not holds, back to what they are in `rest`, a state, and gives it;
+        without one they stay."""
+        template = self._state.save()
+        numbers = self._state.numbers(template)
+        if rest is None:
+            return numbers
+        fmus = len(self._state.parts(template)) - len(template.holds)
+        fixed = sum(map(len, self._state.parts(template)[:fmus]))
+        numbers[:fixed] = rest[:fixed]
+        self._state.restore(self._state.put(template, numbers))
+        return rest
+
+    @cached_property
+    def moving(self) -> NDArray[np.intp]:
+        """The states and inputs of FMUs, but for switches."""
+        own = [c.kind == "fmu" and not c.inert and not discrete(c) for c in self.coordinates]
+        return np.flatnonzero(own)
+
+    def sizes(self) -> dict[str, int]:
+        """How many numbers each owner has in the state."""
+        parts = self._state.parts(self._template)
+        return dict(zip(self._state.owners, map(len, parts), strict=True))
 
     def ways(self) -> dict[str, str]:
         """By FMU, how the slopes of the last linearisation were found."""
@@ -239,9 +290,12 @@ def long_enough(scene: Scene, system: System, at: float = 0.0) -> System:
 
 
 @contextmanager
-def lifted_map(system: System, at: float = 0.0, scene: Scene | None = None) -> Iterator[LiftedMap]:
+def lifted_map(
+    system: System, at: float = 0.0, scene: Scene | None = None, pinned: bool = False
+) -> Iterator[LiftedMap]:
     """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; the state is
-    perturbed within the loop closures of `scene`.
+    perturbed within the loop closures of `scene`. pinned: until then the FMUs are put back to where
+    they start, again and again, so that `start` is near a rest however unstable the system is.
 
     Raises InputFault where there is none: rates and latencies that vary, an
     FMU whose state cannot be read.
@@ -266,4 +320,5 @@ def lifted_map(system: System, at: float = 0.0, scene: Scene | None = None) -> I
         simulation.start()
         without_friction(simulation.holds.values())
         closures = Closures(scene) if scene else None
-        yield LiftedMap(Plan(system), simulation, at, ForwardSensitivity(simulation, closures))
+        sensitivity = ForwardSensitivity(simulation, closures)
+        yield LiftedMap(Plan(system), simulation, at, sensitivity, pinned=pinned)

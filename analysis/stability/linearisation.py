@@ -72,11 +72,11 @@ def linearised(map_: LiftedMap, point: Vector, same: float = SAME) -> Linearisat
         raise AssertionError("a map without a state")
     V, M, D = V[:, taken], M[:, taken], D[:, taken]
     A, E = V.T @ M, V.T @ D
-    kept = ~_constant(A, V.T @ (image - point) == 0.0)
+    kept = ~constant(A, V.T @ (image - point) == 0.0)
     return Linearisation(point, image, V[:, kept], A[kept][:, kept], E[kept][:, kept])
 
 
-def _constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which coordinates nothing changes, not even in turn the others."""
     n = len(A)
     own = np.abs(np.diag(A) - 1.0) < ONE

@@ -17,7 +17,7 @@ from hapticlink.analysis.stability.forward_sensitivity import STEP
 from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.modes import Mode
-from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.arrays import Complex, Vector
 
 
 def traced(map_: LiftedMap, linear: Linearisation, mode: Mode) -> Mode:
@@ -29,17 +29,21 @@ def traced(map_: LiftedMap, linear: Linearisation, mode: Mode) -> Mode:
     v = mode.vector * (STEP / np.max(np.abs(mode.vector) / np.maximum(1.0, np.abs(linear.point))))
     unmoved = _followed(map_, linear.point, j)
     paths = [_followed(map_, linear.point + part, j) - unmoved for part in (v.real, v.imag)]
-    path = np.array([v[j], *(paths[0] + 1j * paths[1])])
+    return with_turns(mode, np.array([v[j], *(paths[0] + 1j * paths[1])]), map_.period)
+
+
+def with_turns(mode: Mode, path: Complex, period: float) -> Mode:
+    """The mode with the frequency of a number that moves along `path` in a period (s)."""
     path = path[np.abs(path) > 0]
     if len(path) < 2:
         return mode
     if mode.z.imag == 0.0:  # a real mode changes its sign at half turns
         turns = np.count_nonzero(np.diff(np.sign(path.real))) / 2
-        return replace(mode, omega=2 * np.pi * turns / map_.period)
+        return replace(mode, omega=2 * np.pi * turns / period)
     whole = np.unwrap(np.angle(path))[-1] - np.angle(path[0])
     argument = np.angle(mode.z)
     turns = np.round((whole - argument) / (2 * np.pi))
-    return replace(mode, omega=abs(argument + 2 * np.pi * turns) / map_.period)
+    return replace(mode, omega=abs(argument + 2 * np.pi * turns) / period)
 
 
 def _followed(map_: LiftedMap, point: Vector, j: int) -> Vector:

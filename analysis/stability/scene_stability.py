@@ -129,7 +129,7 @@ class Stability:
             yield f"their mean, in: {', '.join(self.kinks)}"
 
 
-def stability(
+def equilibrium_stability(
     scene: str | Path | Scene, options: Options = (), *, at: float = 0.0
 ) -> Stability | VaryingStability:
     """The stability of a scene, changed by `options` (see `scene`), around its equilibrium.

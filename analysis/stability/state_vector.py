@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Container, Iterator
 from copy import copy, deepcopy
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.holds import Hold
+from hapticlink.orchestrator.holds.energy_tank import NearEnd
 from hapticlink.orchestrator.holds.history import History
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.latency import Link
@@ -97,6 +99,15 @@ class StateVector:
         simulation.signals.values[:] = template.signals
         for (name, hold), kept in zip(self._holds.items(), template.holds, strict=True):
             vars(hold).update(_mapped(kept, name, _copied))
+
+    def ages(self, of: Callable[[dict[str, Any]], Any]) -> tuple[Any, ...]:
+        """What `of` tells of each hold as it is."""
+        return tuple(of(vars(hold)) for hold in self._holds.values())
+
+    def sizes(self) -> dict[str, int]:
+        """How many numbers each owner has now."""
+        template = self.save()
+        return dict(zip(self.owners, map(len, self.parts(template)), strict=True))
 
     def numbers(self, template: Template) -> Vector:
         """The numbers of a saved state, in the order of `coordinates`."""
@@ -217,7 +228,9 @@ def _copied(path: str, value: Vector) -> Vector:
 
 def _mapped(value: Any, path: str, visit: Visit) -> Any:
     """A copy of nested containers and of the parts of holds, with `visit` applied to every number
-    that is a float; functions and shared tanks stay as they are."""
+    that is a float; what cannot change, functions and shared tanks stay as they are."""
+    if isinstance(value, int | str | NoneType | NearEnd):
+        return value
     match value:
         case np.ndarray() if value.dtype.kind == "f":
             return visit(path, value)

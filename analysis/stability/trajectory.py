@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.stability.frozen_nonlinearities import discrete
 from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
@@ -72,7 +71,7 @@ def trajectory(map_: LiftedMap, seconds: float) -> Trajectory:
 
     Raises InputFault where a target, wrench or drive changes with time, and as `image` does.
     """
-    moving = _moving(map_)
+    moving = map_.moving
     with suppress(FmuFault):  # the run tells of it
         require_constant(map_, map_.start, moving)
     periods = int(seconds / map_.period)
@@ -110,17 +109,11 @@ def trajectory(map_: LiftedMap, seconds: float) -> Trajectory:
     return Trajectory(np.array(times), np.array(states), np.array(unrest), moving, ended)
 
 
-def _moving(map_: LiftedMap) -> NDArray[np.intp]:
-    """The coordinates that count."""
-    own = [c.kind == "fmu" and not c.inert and not discrete(c) for c in map_.coordinates]
-    return np.flatnonzero(own)
-
-
 def still(map_: LiftedMap, state: Vector) -> bool:
     """Whether a state with F(z) = z is at rest within the period, too: an oscillation whose period
     divides that of the map repeats as well, such as a limit cycle of motors that saturate, at half
     the haptic rate."""
-    taken, moved = _moving(map_), 0.0
+    taken, moved = map_.moving, 0.0
     z = state[taken]
 
     def watch(numbers: Vector) -> None:

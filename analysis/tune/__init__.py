@@ -23,13 +23,14 @@ from pathlib import Path
 
 import numpy as np
 
+from hapticlink.analysis.stability.held_equilibria import Held
+from hapticlink.analysis.stability.poses import Pose, at_equilibrium, evenly_spaced, simulated
+from hapticlink.analysis.stability.rates import whole_frames
 from hapticlink.analysis.tune.felt_stiffness import Feel
-from hapticlink.analysis.tune.held_equilibria import Held
-from hapticlink.analysis.tune.poses import Pose, at_equilibrium, poses
-from hapticlink.analysis.tune.run_measures import RunLimit, motion, simulated
+from hapticlink.analysis.tune.run_measures import RunLimit, motion
 from hapticlink.analysis.tune.search import COARSE, search
 from hapticlink.analysis.tune.stability_limits import FINE, Judge
-from hapticlink.analysis.tune.tunable_scene import near_rates, required, whole_frames
+from hapticlink.analysis.tune.tunable_scene import near_rates, required
 from hapticlink.analysis.tune.tuning_result import Tuned as Tuned
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
@@ -99,10 +100,10 @@ class _Tuning:
         quick = whole_frames(self._read, self._given)
         self._tell("the scene's own run, for its poses")
         run = simulated(self._scene, self._given)
-        moments = poses(run, self._linkage, POSES)
+        moments = evenly_spaced(run, self._linkage, POSES)
         with at_equilibrium(self._scene, quick, moments, self._tell) as (resting, held):
-            pressed = [pose for pose in resting if any(pose.press)]
-            if any(any(pose.press) for pose in moments) and not pressed:
+            pressed = [pose for pose in resting if pose.touches]
+            if any(pose.touches for pose in moments) and not pressed:
                 raise InputFault(
                     f"the run touches, but no pose in contact has an equilibrium; {STEADY}"
                 )

@@ -12,10 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.optimize import brentq
 
-from hapticlink.analysis.tune.gains import Scales
-from hapticlink.analysis.tune.held_equilibria import Held
-from hapticlink.analysis.tune.largest_scale import DOUBLINGS
-from hapticlink.analysis.tune.spring_hand import FIRM
+from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.stability.held_equilibria import Held
+from hapticlink.analysis.stability.largest_scale import DOUBLINGS
 from hapticlink.analysis.tune.stability_limits import FINE
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
@@ -58,13 +57,13 @@ class Feel:
         if not found:
             raise InputFault(
                 "no direction of the handle is constrained, and nothing touches: no stiffness to "
-                "tune"
+                "tune; take a linkage with loops or fewer joints, or [contacts]"
             )
         return cls(place, found)
 
     def compliance(self, scales: Scales) -> Complex:
         """That of the handle, (3, 3), in a firm grip."""
-        return self._place.compliance(scales, FIRM, HERTZ)
+        return self._place.compliance(scales, HERTZ)
 
     def felt(self, X: Complex) -> dict[str, float]:
         """The felt stiffness (N/m) along each wrench; infinite where nothing gives way."""

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from hapticlink.analysis.stability.largest_scale import DOUBLINGS, largest
 from hapticlink.analysis.tune.felt_stiffness import Feel
-from hapticlink.analysis.tune.largest_scale import DOUBLINGS, largest
 from hapticlink.orchestrator.base.faults import InputFault
 
 COARSE = 0.05

@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from hapticlink.analysis.tune.gains import Scales
-from hapticlink.analysis.tune.held_equilibria import Held
-from hapticlink.analysis.tune.largest_scale import largest
-from hapticlink.analysis.tune.spring_hand import HANDS
+from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.stability.hands import SPRINGS
+from hapticlink.analysis.stability.held_equilibria import Held
+from hapticlink.analysis.stability.largest_scale import largest
 from hapticlink.orchestrator.base.faults import InputFault
 
 FINE = 0.01
@@ -25,7 +25,7 @@ class Judge:
         self.laws = next(iter(at.values())).gains.laws
         if not self.laws:
             raise InputFault("no virtual coupling and no topology controller: no gains to tune")
-        self._order = [(pose, hand) for hand in HANDS[::-1] for pose in at]
+        self._order = [(pose, hand) for hand in SPRINGS[::-1] for pose in at]
 
     def unstable(self, scales: Scales, factor: float) -> str | None:
         """The pose and hand in which all gains times a factor are unstable, None where they are
@@ -49,5 +49,10 @@ class Judge:
                 try:
                     found = largest(partial(self._stable, place, scales), fine)
                 except InputFault:
-                    raise InputFault(f"unstable with any gains in the pose at {place[0]}") from None
+                    raise InputFault(
+                        f"unstable with any gains in the pose at {place[0]}, in a hand of "
+                        f"{place[1]:g} N/m: take a higher graphics.rate or haptics.rate, more "
+                        "damping of the controller, or a shorter duration, which does not come "
+                        "there"
+                    ) from None
         return found

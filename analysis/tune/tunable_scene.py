@@ -30,21 +30,6 @@ def required(read: Scene) -> Linkage:
     return read.linkage
 
 
-def whole_frames(read: Scene, given: tuple[str, ...]) -> tuple[str, ...]:
-    """The options with the graphics rate next to that of a scene whose frames are whole haptic
-    periods. Raises InputFault for one that varies."""
-    if read.graphics is None:
-        return given
-    if not isinstance(read.graphics.rate, int | float | str):
-        raise InputFault(
-            "graphics.rate varies, so that there is no map of a period: take a fixed rate, such as "
-            "--set graphics.rate=30"
-        )
-    haptic = exact(read.haptics.rate)
-    count = max(1, round(haptic / exact(read.graphics.rate)))
-    return (*given, f'graphics.rate="{haptic / count}"')
-
-
 def near_rates(read: Scene) -> Iterator[str]:
     """Options with a neighbouring rate each."""
     for key, factors in NEAR.items():

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from hapticlink.analysis.stability.hands import SPRINGS
+from hapticlink.analysis.stability.poses import Pose
 from hapticlink.analysis.tune.felt_stiffness import HERTZ
-from hapticlink.analysis.tune.poses import Pose
-from hapticlink.analysis.tune.spring_hand import HANDS
 from hapticlink.orchestrator.base.arrays import Complex, Vector
 from hapticlink.orchestrator.results.scene_file import scene_file
 from hapticlink.orchestrator.results.tables import Results
@@ -70,7 +70,7 @@ class Tuned:
             "compliance": None if X is None else np.stack([X.real, X.imag], axis=-1).tolist(),
             "motion": self.motion,
             "poses": [asdict(pose) for pose in self.poses],
-            "hands": list(HANDS),
+            "hands": list(SPRINGS),
         }
 
     def scene(self) -> str:

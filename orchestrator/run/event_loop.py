@@ -185,6 +185,8 @@ def _details(
         delays=ages,
         causal=causal(ages),
         links=simulation.links(),
+        premises=simulation.premises(),
+        overdrawn=simulation.overdrawn(),
         isolated=simulation.isolated,
         held_outputs={name: i.held for name, i in instances.items() if i.held},
         smaller_steps={name: i.smaller_steps for name, i in instances.items() if i.smaller_steps},

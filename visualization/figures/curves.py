@@ -30,15 +30,15 @@ def port_curve(results: Results) -> UserPort | None:
         return None
     *_, last = parts
     blocks = {name: np.concatenate([p.blocks_J[name] for p in parts]) for name in last.blocks_J}
-    time, generated = (np.concatenate([port[i] for port in parts]) for i in range(2))
-    return UserPort(time, generated, blocks, last.works)
+    time, hands, generated = (np.concatenate([port[i] for port in parts]) for i in range(3))
+    return UserPort(time, hands, generated, blocks, last.works)
 
 
 def _thinned_port(port: UserPort, windows: int) -> UserPort:
-    time, generated, *blocks = _thinned(
-        (port.time_s, port.generated_J, *port.blocks_J.values()), windows
-    )
-    return UserPort(time, generated, dict(zip(port.blocks_J, blocks, strict=True)), port.works)
+    curves = *port[:3], *port.blocks_J.values()
+    time, hands, generated, *blocks = _thinned(curves, windows)
+    by_name = dict(zip(port.blocks_J, blocks, strict=True))
+    return UserPort(time, hands, generated, by_name, port.works)
 
 
 def _thinned(curve: Curve, windows: int) -> Curve:

@@ -15,9 +15,9 @@ from hapticlink.analysis.stability.state_vector import size
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.base.loop_names import DEVICE
-from hapticlink.orchestrator.real_time_session import held_by
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.changes import held_by
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live.controls import Settings

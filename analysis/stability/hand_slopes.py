@@ -1,0 +1,55 @@
+"""The matrices of a hand: what its doStep and its get do to perturbations of its ports and states.
+
+Every hand of a scene is linear in the pose and velocity of the handle, at any of its targets and
+wrenches, so that its matrices are those of its component at 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from hapticlink.analysis.stability.graph_slopes import GraphSlopes
+from hapticlink.components.blocks.hand import hand
+from hapticlink.components.specs.hand import Hand
+from hapticlink.fmus.fmu_functions import one_pass
+from hapticlink.orchestrator.base.arrays import Matrix
+
+INPUTS, OUTPUT = ("x", "v"), "F"
+PORTS = 9
+"""Numbers of the ports of a hand that reads pose and velocity: x, v, F."""
+
+
+@dataclass(frozen=True, eq=False)
+class HandSlopes:
+    """step: the slopes (n, n) of ports x, v, F and states by themselves; get: those of (ports,
+    states, and the signals of F) by (ports, states)."""
+
+    step: Matrix
+    get: Matrix
+
+    @property
+    def states(self) -> int:
+        return len(self.step) - PORTS
+
+
+@lru_cache(64)
+def hand_slopes(spec: Hand, T: float) -> HandSlopes:
+    """Of a hand that is stepped by T (s)."""
+    made = hand(spec)
+    functions = {f.name(): f for f in one_pass(made).functions}
+    graph = GraphSlopes(functions, made.timing == "sampled", made.substeps)
+    own = [3 * (*INPUTS, OUTPUT).index(v.name) + i for v in made.inputs for i in range(3)]
+    n_y, n_x = 3, sum(v.size for v in made.states)
+    places = [*own, *range(6, PORTS + n_x)]
+    p = np.concatenate([np.ravel(v.start).astype(float) for v in made.parameters])
+    rest = np.concatenate([np.zeros(len(own)), p, np.zeros(n_y + n_x)])
+    before, after = (np.concatenate([[t], rest]) for t in (0.0, T))
+    size = PORTS + n_x
+    step, got = np.eye(size), np.eye(size)
+    step[6:] = got[6:] = 0.0
+    for J, slopes in ((step, graph.step(before, after)), (got, graph.get(after))):
+        J[np.ix_(places, places)] = slopes
+    return HandSlopes(step, np.vstack([got, got[6:PORTS]]))

@@ -1,0 +1,92 @@
+"""The hands in which a scene is judged, from soft to firm.
+
+A grip is soft or firm by how the fingers are squeezed: their stiffness and damping grow with the
+force, while their mass stays (Hajian, Howe, J. Biomechanical Engineering 119 (1997), 109: a finger
+of some 6 g with 2 to 7 N.s/m and 200 to 1000 N/m); a spring and damper without a mass is the limit
+that moves with the handle. An arm adds its mass behind the grip, the five parameters of Speich,
+Shao, Goldfarb (Mechatronics 15 (2005), 1127): that at rest of Yokokohji, Yoshikawa (IEEE Trans.
+Robotics and Automation 10 (1994), 605), 2 kg with 2 N.s/m and 10 N/m, and one that keeps its
+posture, with the hundreds of N/m of Mussa-Ivaldi, Hogan, Bizzi (J. Neuroscience 5 (1985), 2732).
+Rotational values are assumed: LEVER times those of translation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, ProfileHand, SpringHand
+
+SPRINGS = (100.0, 1000.0)
+"""Stiffnesses (N/m): a light touch and a firm grip."""
+FIRM = SPRINGS[-1]
+LEVER = 1 / 300
+"""Rotational stiffness (N.m/rad) over that of translations (N/m)."""
+DAMPING = (5.0, 5.0, 0.01)
+"""(N.s/m, N.m.s/rad)."""
+STILL = ((0.0, 0.0, 0.0, 0.0),)
+OWN = "the scene's own hand"
+FREE = "free"
+OWN_FREE = "the scene's own damper"
+
+
+def spring_hand(stiffness: float) -> SpringHand:
+    """A massless hand of a stiffness (N/m)."""
+    stiff = (stiffness, stiffness, stiffness * LEVER)
+    return SpringHand(stiffness=stiff, damping=DAMPING, target=STILL)
+
+
+def arm(mass: float, stiffness: float, damping: float, grip: float, grip_damping: float) -> ArmHand:
+    """An arm (kg, N/m, N.s/m) behind a grip (N/m, N.s/m)."""
+
+    def turned(value: float) -> tuple[float, float, float]:
+        return value, value, value * LEVER
+
+    return ArmHand(
+        mass=(mass, mass, mass * 0.002),
+        stiffness=turned(stiffness),
+        damping=turned(damping),
+        grip_stiffness=turned(grip),
+        grip_damping=turned(grip_damping),
+        target=STILL,
+    )
+
+
+HANDS: dict[str, Hand] = {
+    "light touch": spring_hand(SPRINGS[0]),
+    "firm grip": spring_hand(FIRM),
+    "arm at rest, soft grip": arm(2.0, 10.0, 2.0, 300.0, 5.0),
+    "arm at rest, firm grip": arm(2.0, 10.0, 2.0, 2000.0, 20.0),
+    "arm in posture, firm grip": arm(1.0, 300.0, 10.0, 2000.0, 20.0),
+    "stiff arm, firm grip": arm(1.5, 1000.0, 30.0, 4000.0, 30.0),
+}
+"""By name."""
+
+
+def free(damping: float = 0.0, turning: float = 0.0) -> ConstantHand:
+    """No hand but a damper to ground (N.s/m, N.m.s/rad)."""
+    return ConstantHand(wrench=(0.0, 0.0, 0.0), damping=(damping, damping, turning))
+
+
+def own_hand(hand: Hand) -> Hand:
+    """A hand of a scene with what its linearisation needs: it stands still, sampled."""
+    if isinstance(hand, ConstantHand | ProfileHand):
+        return ConstantHand(wrench=(0.0, 0.0, 0.0), damping=hand.damping)
+    return replace(hand, target=STILL, timing="sampled")
+
+
+def holds(hand: Hand) -> bool:
+    """Whether a hand has a stiffness."""
+    return isinstance(hand, ArmHand | SpringHand)
+
+
+def spring(pose: Sequence[float], wrench: Sequence[float], stiffness: float) -> dict[str, object]:
+    """The [hand] table of a spring that presses with `wrench` on a handle at `pose`."""
+    stiff = [stiffness, stiffness, stiffness * LEVER]
+    target = [float(x + F / k) for x, F, k in zip(pose, wrench, stiff, strict=True)]
+    return {
+        "type": "spring",
+        "stiffness": stiff,
+        "damping": list(DAMPING),
+        "target": [[0.0, *target]],
+    }

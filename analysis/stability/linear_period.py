@@ -1,0 +1,247 @@
+"""The lifted map at rest as the product of its operations, with other hands in place of its own.
+
+At an equilibrium an operation meets the same numbers whenever it occurs, with samples of the same
+ages, so that it has the same slopes J and errors E: each is differentiated once. Events with the
+same operations are one matrix, and the period is their product
+
+    A = C_m ... C_1,   D = sum over i of C_m ... C_{i+1} E_i C_{i-1} ... C_1
+
+over those coordinates alone that are read before they are overwritten, in this period or a later
+one. What a hand is, linear and with a wrench that the equilibrium needs, changes nothing but the
+matrices of its own doStep and get: one recorded period serves every hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.analysis.stability.forward_sensitivity import Applied
+from hapticlink.analysis.stability.hand_slopes import PORTS, HandSlopes
+from hapticlink.analysis.stability.lifted_map import LiftedMap
+from hapticlink.analysis.stability.linearisation import Linearisation, constant
+from hapticlink.analysis.stability.mode_frequency import with_turns
+from hapticlink.analysis.stability.modes import Mode
+from hapticlink.analysis.stability.state_vector import SIGNALS
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.plan.operations import Get, Set, Step
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Act:
+    """An operation on perturbations: the rows `into` become J times the rows `of`."""
+
+    into: Rows
+    of: Rows
+    J: Matrix
+    E: Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """An event: C and E of the rows that are read later by those `before` it."""
+
+    before: Rows
+    C: Matrix
+    E: Matrix
+
+
+@dataclass(frozen=True)
+class LinearPeriod:
+    """The period of a map that rests at `point`: the acts of each event, on `rows` numbers."""
+
+    map_: LiftedMap
+    point: Vector
+    moved: float
+    """The largest change of a state or input within a few events, relative to max(1, |z|)."""
+    events: tuple[tuple[Act, ...], ...]
+    rows: int
+    sources: Mapping[Act, tuple[type, str]]
+    """Of the acts of FMUs: doStep, get or set, and the FMU."""
+    first: Mapping[str, int]
+    """The first row of an FMU, and of the signals."""
+    order: Rows
+    """The row of each coordinate of the map."""
+
+    def held(self, hands: Mapping[str, HandSlopes]) -> LinearPeriod:
+        """The same period with other hands, by the FMUs in whose place they are."""
+        made: dict[Act, Act] = {}
+        rows = self.rows
+        for fmu, hand in hands.items():
+            own = range(self.first[fmu], self.first[fmu] + PORTS)
+            further = range(rows, rows + hand.states)
+            rows += hand.states
+            mine = np.array([*own, *further], dtype=np.intp)
+            for act, (kind, owner) in self.sources.items():
+                if owner != fmu or kind is Set:
+                    continue
+                written = act.into[act.into >= self.first[SIGNALS]]
+                into = mine if kind is Step else np.concatenate([mine, written])
+                J = hand.step if kind is Step else hand.get
+                made[act] = Act(into, mine, J, np.zeros_like(J))
+        return self._with(made, rows)
+
+    def delayed(self, fmu: str, ticks: int) -> LinearPeriod:
+        """The same period in which all that an FMU reads comes as many of its steps later."""
+        made: dict[Act, Act] = {}
+        late = self.rows
+        rows = self.rows
+        for act, (kind, owner) in self.sources.items():
+            if kind is not Set or owner != fmu:
+                continue
+            n = len(act.into)  # its own numbers, the first of what it reads
+            sent = np.flatnonzero((act.J[:, n:] != 0.0).any(axis=1))
+            m = len(sent)
+            kept = np.arange(late, late + m * ticks, dtype=np.intp)
+            rows = max(rows, late + len(kept))
+            J, E = np.zeros((2, n + len(kept), len(act.of) + len(kept)))
+            J[:n, :n], E[:n, :n] = act.J[:, :n], act.E[:, :n]
+            J[sent, -m + np.arange(m)] = 1.0
+            J[n : n + m, n : len(act.of)] = act.J[sent, n:]
+            E[n : n + m, n : len(act.of)] = act.E[sent, n:]
+            shift = np.arange(m * (ticks - 1))
+            J[n + m + shift, len(act.of) + shift] = 1.0
+            made[act] = Act(np.append(act.into, kept), np.append(act.of, kept), J, E)
+        return self._with(made, rows)
+
+    def _with(self, made: Mapping[Act, Act], rows: int) -> LinearPeriod:
+        events = tuple(tuple(made.get(act, act) for act in event) for event in self.events)
+        sources = {made.get(act, act): source for act, source in self.sources.items()}
+        return replace(self, events=events, rows=rows, sources=sources)
+
+    @cached_property
+    def linear(self) -> Linearisation:
+        """The linearisation over the coordinates that act on themselves."""
+        taken = self._steps[0].before
+        A, D = np.eye(len(taken)), np.zeros((len(taken), len(taken)))
+        for step in self._steps:
+            A, D = step.C @ A, step.C @ D + step.E @ A
+        kept = ~constant(A, np.ones(len(A), dtype=bool))
+        V = np.zeros((self.rows, np.count_nonzero(kept)))
+        V[taken[kept], np.arange(V.shape[1])] = 1.0
+        A, D = A[np.ix_(kept, kept)], D[np.ix_(kept, kept)]
+        point = np.zeros(len(V))
+        point[self.order] = self.point
+        return Linearisation(point, point, V, A, D)
+
+    def traced(self, mode: Mode) -> Mode:
+        """A mode with its frequency beyond the argument of its eigenvalue, from the phase of the
+        number with the largest share of those that act all through the period."""
+        always = set(self._steps[0].before.tolist())
+        for step in self._steps:
+            always &= set(step.before.tolist())
+        share = dict(zip(self.linear.taken.tolist(), mode.participation.tolist(), strict=True))
+        row = max(always & share.keys(), key=lambda i: share[i], default=None)
+        if row is None or self.map_.events == 1:
+            return mode
+        x, path = mode.vector[self._steps[0].before], [mode.vector[row]]
+        for step, after in pairwise([*self._steps, self._steps[0]]):
+            x = step.C @ x
+            path.append(x[int(np.searchsorted(after.before, row))])
+        return with_turns(mode, np.array(path), self.map_.period)
+
+    @property
+    def in_map(self) -> Linearisation:
+        """`linear` along the coordinates of the map, with the hand that it has."""
+        return replace(self.linear, point=self.point, image=self.point, V=self.linear.V[self.order])
+
+    def names(self) -> list[str]:
+        """Those of the coordinates of `linear`."""
+        named = {int(row): str(c) for row, c in zip(self.order, self.map_.coordinates, strict=True)}
+        return [named.get(int(row), "hand.arm") for row in self.linear.taken]
+
+    @cached_property
+    def _steps(self) -> list[_Step]:
+        """The events, between the coordinates that are read later."""
+        live = [np.flatnonzero(rows) for rows in self._live()]
+        known: dict[tuple[tuple[int, ...], bytes, bytes], _Step] = {}
+        steps = []
+        for event, start, end in zip(self.events, live[:-1], live[1:], strict=True):
+            key = tuple(map(id, event)), start.tobytes(), end.tobytes()
+            if key not in known:
+                known[key] = self._product(event, start, end)
+            steps.append(known[key])
+        return steps
+
+    def _product(self, event: Sequence[Act], start: Rows, end: Rows) -> _Step:
+        X, D = np.zeros((2, self.rows, len(start)))
+        X[start, np.arange(len(start))] = 1.0
+        for act in event:
+            x, d = X[act.of], D[act.of]
+            X[act.into], D[act.into] = act.J @ x, act.J @ d + act.E @ x
+        return _Step(start, X[end], D[end])
+
+    def _live(self) -> list[NDArray[np.bool_]]:
+        """Which rows are read before they are overwritten, from the start of each event on, and
+        behind the last one."""
+        known: dict[tuple[tuple[int, ...], bytes], NDArray[np.bool_]] = {}
+        live = np.ones(self.rows, dtype=bool)
+        while True:
+            starts = [live]
+            for event in reversed(self.events):
+                key = tuple(map(id, event)), starts[-1].tobytes()
+                if key not in known:
+                    known[key] = _before(event, starts[-1])
+                starts.append(known[key])
+            if (starts[-1] == live).all():
+                return starts[::-1]
+            live = starts[-1] & live
+
+
+def _before(event: Sequence[Act], live: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    live = live.copy()
+    for act in reversed(event):
+        wanted = live[act.into]
+        read = (act.J[wanted] != 0.0).any(axis=0) | (act.E[wanted] != 0.0).any(axis=0)
+        live[act.into] = False
+        live[act.of] |= read
+    return live
+
+
+def linear_period(map_: LiftedMap, point: Vector) -> LinearPeriod:
+    """The period of the map from a `point` on at which it rests."""
+    moved, events = map_.recorded(point)
+    sizes: dict[str, int] = dict(map_.sizes())
+    for applied in (a for event in events for a in event):
+        for owner, *both in zip(applied.owners, applied.before, applied.after, strict=True):
+            sizes[owner] = max(sizes[owner], *both)
+    places = np.concatenate([[0], np.cumsum(list(sizes.values()))])
+    first = dict(zip(sizes, places.tolist(), strict=False))
+    made: dict[int, Act] = {}
+    sources: dict[Act, tuple[type, str]] = {}
+
+    def act(applied: Applied) -> Act:
+        if id(applied) not in made:
+            into, of = (
+                _rows(applied, first, counts, signals)
+                for counts, signals in (
+                    (applied.after, applied.writes),
+                    (applied.before, applied.reads),
+                )
+            )
+            made[id(applied)] = new = Act(into, of, applied.J, applied.E)
+            if isinstance(applied.operation, Step | Get | Set):
+                sources[new] = type(applied.operation), applied.operation.fmu
+        return made[id(applied)]
+
+    acts = tuple(tuple(map(act, event)) for event in events)
+    order = np.concatenate(
+        [np.arange(first[owner], first[owner] + n) for owner, n in map_.sizes().items()]
+    ).astype(np.intp)
+    return LinearPeriod(map_, point, moved, acts, int(places[-1]), sources, first, order)
+
+
+def _rows(applied: Applied, first: Mapping[str, int], counts: Sequence[int], signals: Rows) -> Rows:
+    def each() -> Iterator[Rows]:
+        for owner, count in zip(applied.owners, counts, strict=True):
+            yield np.arange(first[owner], first[owner] + count)
+        yield signals + first[SIGNALS]
+
+    return np.concatenate(list(each())).astype(np.intp)

@@ -1,0 +1,184 @@
+"""The modes of a scene in poses and hands: in each pose it is linearised once, at rest in a firm
+spring hand that stands still there, and held by every hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.stability.hand_slopes import hand_slopes
+from hapticlink.analysis.stability.hands import FREE, OWN_FREE, free, holds
+from hapticlink.analysis.stability.held_equilibria import Held, held
+from hapticlink.analysis.stability.kinds import Bounds, kind
+from hapticlink.analysis.stability.linear_period import LinearPeriod
+from hapticlink.analysis.stability.modes import Mode, counted, leading, modes
+from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.verdict import verdict
+from hapticlink.components.specs.hand import Hand
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, user_of_block
+from hapticlink.orchestrator.scene.scene import Scene
+
+SHARES = 3
+DAMPINGS = 2.0 ** np.arange(-4, 7)
+"""Of a free handle (N.s/m), that are tried."""
+CALMED = 0.1
+"""The rate (1/s) at which a free handle that is damped enough at least comes to rest: large motions
+around a pose where the constrained directions change grow where small ones decay slower."""
+TURNING = 1e-3
+"""Their rotational damping (N.m.s/rad) over that of translations (N.s/m)."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A hand in a pose: growth rate and its uncertainty (1/s), frequency (Hz) and participation of
+    the leading mode, neutral ones aside; verdict: stable, unstable or marginal; kind: what grows,
+    or would."""
+
+    pose: str
+    hand: str
+    growth: float
+    uncertainty: float
+    hertz: float
+    kind: str
+    verdict: str
+    who: tuple[tuple[str, float], ...]
+    damping: float | None = None
+    """Of a free handle that grows: the damping to ground (N.s/m) that ends it; infinite where none
+    of DAMPINGS does."""
+
+    @property
+    def free(self) -> bool:
+        return self.hand in (FREE, OWN_FREE)
+
+    @property
+    def drifts(self) -> bool:
+        return self.verdict == "unstable" and self.kind == "drift"
+
+    @property
+    def severity(self) -> tuple[bool, bool, float]:
+        """What is worse is larger: in a hand rather than free, fast rather than drifting."""
+        return self.verdict == "unstable" and not self.drifts, not self.free, self.growth
+
+    def record(self) -> dict[str, Any]:
+        return {
+            "pose": self.pose,
+            "hand": self.hand,
+            "growth_rate": self.growth,
+            "uncertainty": self.uncertainty,
+            "frequency": self.hertz,
+            "kind": self.kind,
+            "verdict": self.verdict,
+            "participation": dict(self.who),
+            "damping_needed": self.damping,
+        }
+
+
+class AtRest:
+    """A scene at rest in a pose, with gains scaled by `scales`, and all that the controller reads
+    `late` steps of it later. Raises InputFault or FmuFault where it has no equilibrium."""
+
+    def __init__(self, place: Held, scales: Scales | None = None, late: int = 0) -> None:
+        period = place.period(scales or {})
+        self._period = period.delayed(CONTROLLER, late) if late else period
+        self._T, self._seconds = place.T, place.map.period
+        names = (f.name for f in place.map.system.fmus)
+        self._users = [name for name in names if user_of_block(name, HAND) is not None]
+
+    def worst(self, hands: Mapping[str, Hand], bounds: Bounds) -> float:
+        """The largest growth rate (1/s) in all hands, 0 where one is marginal, or the first one
+        that is positive; drifts do not count."""
+        largest = -np.inf
+        for hand in hands.values():
+            mode, period = self._leading(hand)
+            growth = mode.growth
+            said = verdict(abs(mode.z), mode.uncertainty)
+            if said == "unstable":
+                hertz = period.traced(mode).omega / (2 * np.pi)
+                if kind(growth, hertz, bounds) != "drift":
+                    return growth
+            elif growth > largest:
+                largest = 0.0 if said == "marginal" else growth
+        return largest
+
+    def cases(self, pose: str, hands: Mapping[str, Hand], bounds: Bounds) -> list[Case]:
+        """The case of each hand."""
+        return [self._case(pose, name, hand, bounds) for name, hand in hands.items()]
+
+    def _case(self, pose: str, name: str, hand: Hand, bounds: Bounds) -> Case:
+        mode, period = self._leading(hand)
+        said = verdict(abs(mode.z), mode.uncertainty)
+        mode = period.traced(mode)
+        hertz = mode.omega / (2 * np.pi)
+        uncertainty = float(min(mode.uncertainty, 1.0)) / self._seconds
+        who = tuple(leading(mode, period.names(), SHARES))
+        what = kind(mode.growth, hertz, bounds)
+        made = Case(pose, name, mode.growth, uncertainty, hertz, what, said, who)
+        if made.free and said == "unstable":
+            return replace(made, damping=self._damping())
+        return made
+
+    def _leading(self, hand: Hand) -> tuple[Mode, LinearPeriod]:
+        period = self._period.held(dict.fromkeys(self._users, hand_slopes(hand, self._T)))
+        return counted(modes(period.linear, self._seconds))[0], period
+
+    def _damping(self) -> float:
+        """The least damping of a free handle with which it comes to rest."""
+        for b in DAMPINGS:
+            if self._leading(free(b, TURNING * b))[0].growth < -CALMED:
+                return float(b)
+        return float(np.inf)
+
+
+def in_poses(
+    scene: str | Path | Scene,
+    given: Sequence[str],
+    poses: Sequence[Pose],
+    hands: Mapping[str, Hand],
+    bounds: Bounds,
+    tell: Callable[[int, int], object] = lambda done, of: None,
+) -> tuple[list[Case], dict[str, str]]:
+    """The cases in all poses, and by pose why it has none."""
+    found: list[Case] = []
+    without: dict[str, str] = {}
+    for i, pose in enumerate(poses):
+        if any(case.pose == pose.name for case in found):
+            continue
+        try:
+            with at_pose(scene, given, pose) as place:
+                # A constant wrench slides off what it presses on, whatever the loop does.
+                lasting = {n: h for n, h in hands.items() if holds(h) or not pose.touches}
+                found += AtRest(place).cases(pose.name, lasting, bounds)
+        except (InputFault, FmuFault) as fault:
+            without[pose.name] = str(fault)
+        else:
+            without.pop(pose.name, None)
+        tell(i + 1, len(poses))
+    return found, without
+
+
+@contextmanager
+def at_pose(
+    scene: str | Path | Scene,
+    given: Sequence[str],
+    pose: Pose,
+) -> Iterator[Held]:
+    """The scene at rest in a pose. A hand that slides off what it
+    touches presses lightly. Raises InputFault or FmuFault where there is no equilibrium."""
+    with ExitStack() as stack:
+        try:
+            place = stack.enter_context(held(scene, pose.options(given)))
+            if pose.touches and not place.touches:
+                raise InputFault("it comes off what it touches")
+        except (InputFault, FmuFault):
+            if not pose.touches:
+                raise
+            options = pose.lighter.options(given)
+            place = stack.enter_context(held(scene, options))
+        yield place
