@@ -64,7 +64,7 @@ def stability(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
-    poses: Poses = 4,
+    poses: Poses = 3,
     drift: Drift = (1.0, 0.2),
     figure: Figure = False,
     equilibrium: Equilibrium = False,

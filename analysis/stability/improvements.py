@@ -32,7 +32,7 @@ FINE = 0.1
 """Of the logarithm of the factor on all stiffnesses."""
 FINEST = 2
 """Of a count, the part to which it is found."""
-LATEST, SLOWEST = 16, 32
+LATEST, SLOWEST = 8, 32
 """Haptic periods up to which a further delay, and a frame, are tried."""
 HOLDS = ("zoh", "foh", "lead", "mean")
 """That are tried as a remedy."""
@@ -42,7 +42,7 @@ DAMPINGS = (0.5, 2.0)
 """Factors on the damping of the coupling that are tried."""
 FASTER = (2, 4)
 """Factors on rates that are tried."""
-TRIED = 4
+TRIED = 2
 """Remedies that are judged in all poses."""
 
 

@@ -53,7 +53,9 @@ def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
         told, handle = window.get("view.map.why"), window.get("view.frame.handle")
         assert window.faults == []
     held = {"hand.stiffness": [100.0, 100.0, 0.0], "hand.target": [[0.0, *handle]]}
-    found = hl.stability(viewed(SCENE, OPTIONS), held | {"hold": "foh", "duration": 3.0})
+    found = hl.equilibrium_stability(
+        viewed(SCENE, OPTIONS), held | {"hold": "foh", "duration": 3.0}
+    )
     assert isinstance(found, hl.Stability)
     growth = float(told.partition("growth rate ")[2].partition(" ")[0])
     assert found.verdict == "unstable"
