@@ -213,10 +213,8 @@ class _Search:
 
 
 def _worst(found: Sequence[Case]) -> float:
-    """The largest growth rate of the cases that do not only drift; marginal ones count as 0."""
-    rates = [
-        0.0 if case.verdict == "marginal" else case.growth for case in found if not case.drifts
-    ]
+    """The largest growth rate of the cases that do not only drift, and are not marginal."""
+    rates = [case.growth for case in found if case.verdict != "marginal" and not case.drifts]
     return max(rates, default=-float("inf"))
 
 
