@@ -37,7 +37,7 @@ def page(tmp_path: Path) -> Iterator[Served]:
 
 def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
     """At 12.8 Hz the mouse holds a stable loop with zero-order holds, and an unstable one with
-    first-order ones, by the growth of the equilibrium in its spring. Time stands still meanwhile."""
+    first-order ones, by the growth of its equilibrium. Time stands still meanwhile."""
     with chromium() as browser:
         window = Page(browser, page.url)
         window.page.click("#pause")
