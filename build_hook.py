@@ -1,5 +1,8 @@
 """Build hook: compiles the event loop, and links what editable installs import.
 
+A wheel is for this machine, or for the platform that the environment variable HAPTICLINK_WHEEL
+names by its tag (WHEELS in orchestrator/run/compiled/build.py).
+
 Wheels map the top-level folders through `sources` in pyproject.toml. For an editable install
 `.editable/hapticlink/` gets links to them, and to the package's own files, which are in
 `package_root/`.
@@ -34,23 +37,26 @@ class Build(BuildHookInterface):
             self._link()
             return
         self._room = tempfile.TemporaryDirectory()  # `finalize` removes it: nothing is left here
-        if library := self._compiled(Path(self._room.name)):
+        tag = os.environ.get("HAPTICLINK_WHEEL")
+        if library := self._compiled(Path(self._room.name), tag):
             build_data["force_include"][str(library)] = str(Path("hapticlink", LOOP, library.name))
             build_data["pure_python"] = False
-            platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
-            build_data["tag"] = f"py3-none-{platform}"
+            here = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+            build_data["tag"] = f"py3-none-{tag or self._build['this_machine']() or here}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         if self.target_name == "wheel" and version != "editable":
             self._room.cleanup()
 
-    def _compiled(self, folder: Path) -> Path | None:
+    def _compiled(self, folder: Path, tag: str | None = None) -> Path | None:
         """The compiled loop, in `folder`; None where it cannot be compiled here. It is then
-        compiled at its first use, or runs in Python."""
-        build = runpy.run_path(str(Path(self.root, LOOP, "build.py")))
-        library = folder / build["name"]()
+        compiled at its first use, or runs in Python. Raises ValueError for an unknown `tag`."""
+        self._build = build = runpy.run_path(str(Path(self.root, LOOP, "build.py")))
+        if tag and tag not in build["WHEELS"]:
+            raise ValueError(f"HAPTICLINK_WHEEL={tag}: there are {', '.join(build['WHEELS'])}")
+        library = folder / build["name"](tag)
         try:
-            build["compile_loop"](library, build["zig"]())
+            build["compile_loop"](library, build["zig"](tag))
         except (subprocess.CalledProcessError, OSError) as error:
             message = getattr(error, "stderr", None) or str(error).encode()
             self.app.display_warning(f"no compiled loop: {message.decode(errors='replace')}")

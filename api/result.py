@@ -28,8 +28,10 @@ class Run(Results):
     (k,) of a scalar, (k, n) of a vector, (k, n, m) of a matrix, in the units of its FMU. Rates
     differ, so that each signal has its own k times: `r.time("virtual_mechanism.x")`, in s.
 
-    `tables` are the Tables by rate, `run` is the content of run.json (the scene, versions, holds,
-    energies, ages of samples, timings), `folder` is the result folder, None for a run in memory.
+    `print(r)` gives the lines of `hapticlink run`; in a notebook a run shows them with its
+    mechanism. `tables` are the Tables by rate, `run` is the content of run.json (the scene,
+    versions, holds, energies, ages of samples, timings), `folder` is the result folder, None for a
+    run in memory.
     """
 
     def __getitem__(self, name: str) -> Any:
@@ -77,8 +79,9 @@ class Run(Results):
         return pose_error(self)
 
     def figures(self) -> dict[str, Figure]:
-        """Matplotlib figures by name, as far as the scene has the signals: `mechanism`,
-        `trajectories`, `distance`, `forces`, `contact`, `constraints`, `energies`, `real_time`."""
+        """Matplotlib figures by name, as far as the scene has the signals: `mechanism`, or
+        `trajectories` without a linkage, `distance`, `forces`, `contact`, `constraints`,
+        `user_port`, `energies`, `real_time`."""
         from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
 
         return run_figures.figures(self)
@@ -89,6 +92,15 @@ class Run(Results):
             signals = [s for table in self.tables.values() for s in table.signals if s != "time"]
             raise KeyError(unknown("rate or signal", name, [*self.tables, *signals]))
         return found
+
+    def __str__(self) -> str:
+        ending, *lines = summary.told(self, self.run["scene"]["title"])
+        return "\n".join([ending, *([f"  {self.fault}"] if self.fault else []), *lines])
+
+    def _repr_html_(self) -> str:
+        from hapticlink.visualization.compare import page  # with Matplotlib, slow to load
+
+        return page.opening({self.run["scene"]["title"]: self}, "h3")
 
     def __repr__(self) -> str:
         lines = [f"{self.run['scene']['title']}: {summary.ending(self)}"]

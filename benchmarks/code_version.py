@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import subprocess
+from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
 
 import benchmarks
+import hapticlink.analysis
 import hapticlink.components
+import hapticlink.fmus
 import hapticlink.fmus.native
+import hapticlink.orchestrator
+import hapticlink.programs
 from hapticlink.fmus.cache import sources
 
 PACKAGES = (
@@ -40,3 +46,43 @@ def begin(out: Path, rows: tuple[str, ...], *further: ModuleType) -> None:
             (out / name).unlink(missing_ok=True)
         out.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(now, indent=1) + "\n")
+
+
+MEASURED = (
+    hapticlink.components, hapticlink.fmus, hapticlink.orchestrator, hapticlink.programs,
+    hapticlink.analysis, benchmarks,
+)  # fmt: skip
+MADE_FROM = "made_from.json"
+"""In results/: of each benchmark the commit of its tables, and the hashes of its packages."""
+
+
+def sign(results: Path, what: str, page: Path) -> None:
+    """Record what code the tables of a benchmark were just made from, and say it on their page."""
+    commit = subprocess.run(
+        ("git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"),
+        capture_output=True, text=True, check=False,
+    ).stdout.strip()  # fmt: skip
+    path = results / MADE_FROM
+    record = json.loads(path.read_text()) if path.exists() else {}
+    record[what] = {"commit": commit, "sources": _hashes()}
+    path.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
+    with page.open("a", encoding="utf-8") as file:
+        file.write(f"\nMade from commit {commit}.\n")
+
+
+def status(results: Path, benchmarks: Sequence[str]) -> Iterator[str]:
+    """A line for each benchmark: whether its tables are those of the code that is there."""
+    path, now = results / MADE_FROM, _hashes()
+    record = json.loads(path.read_text()) if path.exists() else {}
+    for what in benchmarks:
+        if what not in record:
+            yield f"{what}: made from a commit that is not recorded"
+            continue
+        made = record[what]
+        changed = [name for name, sha in now.items() if made["sources"].get(name) != sha]
+        since = f", since when {', '.join(changed)} changed" if changed else ": current"
+        yield f"{what}: made from {made['commit']}{since}"
+
+
+def _hashes() -> dict[str, str]:
+    return {package.__name__.rpartition(".")[2]: sources(package)[:16] for package in MEASURED}

@@ -102,26 +102,32 @@ class Ours:
 
     def advance(self, folder: Path) -> Callable[..., np.ndarray]:
         """(state, steps, h) -> state, compiled; overwrites the state given."""
-        step = self.component.step
-        call = ctypes.CDLL(str(_compiled(step, folder))).run
-        double = ctypes.POINTER(ctypes.c_double)
-        iw, w = np.zeros(step.sz_iw() + 1, dtype=np.int64), np.zeros(step.sz_w() + 1)
-        y = np.zeros_like(self.start)
-
-        def run(x: np.ndarray, steps: int, h: float = self.h) -> np.ndarray:
-            size = np.array([h])
-            pointers = [a.ctypes.data_as(double) for a in (x, y, self.u, self.p, size)]
-            work = iw.ctypes.data_as(ctypes.c_void_p), w.ctypes.data_as(double)
-            call(ctypes.c_long(steps), *pointers, *work)
-            return (y if steps % 2 else x).copy()
-
-        return run
+        return compiled(self.component.step, self.u, self.p, self.h, folder)
 
     def _tip(self, x: np.ndarray) -> tuple[float, float]:
         if not np.isfinite(x).all():
             return np.nan, np.nan
         found = self.outputs(x)["x"]
         return float(found[0]), float(found[1])
+
+
+def compiled(
+    step: ca.Function, u: Vector, p: Vector, h: float, folder: Path
+) -> Callable[..., np.ndarray]:
+    """(state, steps, h) -> state: a loop in C over `step` (x, u, p, t, h); overwrites the state."""
+    call = ctypes.CDLL(str(_compiled(step, folder))).run
+    double = ctypes.POINTER(ctypes.c_double)
+    iw, w = np.zeros(step.sz_iw() + 1, dtype=np.int64), np.zeros(step.sz_w() + 1)
+    y = np.zeros(step.size1_in(0))
+
+    def run(x: np.ndarray, steps: int, h: float = h) -> np.ndarray:
+        size = np.array([h])
+        pointers = [a.ctypes.data_as(double) for a in (x, y, u, p, size)]
+        work = iw.ctypes.data_as(ctypes.c_void_p), w.ctypes.data_as(double)
+        call(ctypes.c_long(steps), *pointers, *work)
+        return (y if steps % 2 else x).copy()
+
+    return run
 
 
 def in_place(

@@ -76,16 +76,16 @@ def bench(folder: Path, quick: bool, told: Callable[[str, int, int], None], comm
             lambda time: told(SCENE, int(time), seconds),
             real_time=RealTimeRun(empty.start),
         ).results
-    assert results.run["fault"] is None, results.run["fault"]
+    report = results.record.real_time
+    assert report, results.record.fault
+    assert not results.record.fault, results.record.fault
     beside = empty.report()
     folder.mkdir(parents=True, exist_ok=True)
     curves = {"lateness of an empty loop": beside["histograms"]["lateness"]}
     figure = real_time(results, curves, f"an empty loop beside it misses {missed(beside)}")
     assert figure
     figure.savefig(folder / "real_time.png", dpi=150)
-    (folder / "README.md").write_text(
-        page(results.run["real_time"], beside, seconds, load_average, command)
-    )
+    (folder / "README.md").write_text(page(report, beside, seconds, load_average, command))
 
 
 def missed(report: Report) -> str:

@@ -92,16 +92,16 @@ def make(case: Case) -> Made:
         return Made(
             outcome="refused", status=fault.exit_status, end=str(fault), rise=0, map=verdict
         )
-    rise, end = risen(run), run.run["end"]
-    said = [run.run["fault"]["message"]] if run.fault else run.run["warnings"]
-    outcome: Outcome = "stable" if rise <= case.energy else "warned" if said else "grew"
+    rise, record = risen(run), run.record
+    messages = [record.fault.message] if record.fault else record.warnings or []
+    outcome: Outcome = "stable" if rise <= case.energy else "warned" if messages else "grew"
     if run.fault:
         outcome = "ended"
-    elif end["reason"] != "duration":
+    elif record.end.reason != "duration":
         outcome = "stopped"
-    told = "; ".join([f"{end['reason']} at {end['time']:.4g} s", *said])
+    end = "; ".join([f"{record.end.reason} at {record.end.time:.4g} s", *messages])
     status = Fault.exit_status if run.fault else 0
-    return Made(outcome=outcome, status=status, end=told, rise=rise, map=verdict)
+    return Made(outcome=outcome, status=status, end=end, rise=rise, map=verdict)
 
 
 def risen(run: hl.Run) -> float:

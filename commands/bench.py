@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from cyclopts import Parameter
 
@@ -14,6 +14,7 @@ from hapticlink.orchestrator.base import interrupt
 Benchmark = Literal[
     "mechanism",
     "singular",
+    "formulations",
     "local-model",
     "master",
     "cosimulation",
@@ -22,6 +23,8 @@ Benchmark = Literal[
     "stress",
     "view",
     "one",
+    "standalone",
+    "engine",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores."""
 FOLDERS = {"stress": "stability"}
@@ -29,16 +32,18 @@ FOLDERS = {"stress": "stability"}
 
 
 def bench(
-    what: Benchmark,
+    what: Benchmark | None = None,
     /,
     *,
     out: Out = None,
     quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
 ) -> int:
-    """Measure run time, error and limits; WHAT is one of
+    """Measure run time, error and limits. Without WHAT, list which tables in results/ were made
+    from the code that is there. WHAT is one of
 
     - mechanism: run time against error, beside the multibody codes that are installed
     - singular: errors over many rates on motions through singular poses
+    - formulations: multipliers, coordinate partitioning and symbolic embedding of a closed loop
     - local-model: cost and error of the local model
     - master: the event loop, beside the masters that are installed
     - cosimulation: run time against error of whole co-simulations
@@ -47,6 +52,8 @@ def bench(
     - stress: hard scenes at the edge of stability and beyond, each with the outcome it has to have
     - view: deadlines missed and latencies while a browser drags
     - one: a scene as one FMU, beside its run through FMUs
+    - standalone: a scene as a page in one file: size, and speed in a browser
+    - engine: MuJoCo in the place of the graphics copy and of the mechanism
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
@@ -54,8 +61,13 @@ def bench(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+    results = checkout.folder("bench") / "results"
+    if what is None:
+        status = checkout.function("bench", "benchmarks.code_version:status")
+        print(*status(results, get_args(Benchmark)), sep="\n")
+        return 0
     make = checkout.function("bench", f"benchmarks.{what.replace('-', '_')}:bench")
-    folder = out or checkout.folder("bench") / "results" / FOLDERS.get(what, what)
+    folder = out or results / FOLDERS.get(what, what)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     command = f"hapticlink bench {what}{' --quick' * quick}"
     with timed(command), Progress(*columns, console=Console(stderr=True)) as bar:
@@ -65,6 +77,8 @@ def bench(
             interrupt.check()
             bar.update(task, description=text, completed=done, total=total)
 
-        page = make(folder, quick, report, command)
-    print(page or folder / "README.md")
+        page = make(folder, quick, report, command) or folder / "README.md"
+    if out is None and not quick:
+        checkout.function("bench", "benchmarks.code_version:sign")(results, what, page)
+    print(page)
     return 0

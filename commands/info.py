@@ -10,7 +10,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from hapticlink.analysis.findings.summary import MECHANISM
-from hapticlink.commands.options import Out, Scene, Set, Swap, default_folder, options
+from hapticlink.commands.options import Map, Out, Scene, Set, Swap, default_folder, options
 from hapticlink.orchestrator.base.terminal_output import say
 from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.system.system import System
@@ -35,6 +35,7 @@ def info(
     *,
     set: Set = None,
     swap: Swap = None,
+    map: Map = None,
     draw: Draw = False,
     out: Out = None,
 ) -> int:
@@ -57,7 +58,7 @@ def info(
         for name, title in hl.shipped().items():
             say(f"{name}: {title}")
         return 0
-    read = hl.scene(scene, options(set, swap))
+    read = hl.scene(scene, options(set, swap, map))
     with built(read) as made:
         time = made.timeline
         start = at_start(made) if read.linkage else {}
@@ -120,10 +121,10 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
 def _needs(scene: Any, time: Timeline) -> None:
     from hapticlink.analysis.findings import block_costs, requirements
 
-    found = list(requirements.needs(scene))
+    parts = list(requirements.needs(scene))
     for title, needed in (("needed", True), ("left out", False)):
         say(f"\n{title}")
-        for need in found:
+        for need in parts:
             if need.needed == needed:
                 say(f"  {need.part}: {need.why}")
     say("\noperations of a step and its outputs, signals in and out")

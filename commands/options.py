@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -38,7 +38,18 @@ Swap = Annotated[
         name="--swap",
         consume_multiple=False,
         negative="",
-        help="block=file.fmu, an FMU that replaces a block of the haptic loop; repeatable.",
+        help="block=file.fmu, an FMU that replaces a block of the haptic loop, or block=mujoco; "
+        "repeatable.",
+    ),
+]
+Map = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--map",
+        consume_multiple=False,
+        negative="",
+        help="port=variable,... of an FMU of --swap whose variables have other names; with several "
+        "FMUs block.port=...; repeatable.",
     ),
 ]
 Out = Annotated[Path | None, Parameter(help="Folder to write to.")]
@@ -53,13 +64,20 @@ Json = Annotated[
 ]
 
 
-def options(set: Iterable[str] | None, swap: Iterable[str] | None) -> tuple[str, ...]:
-    """The options of a scene: an [[fmu]] with `replaces` for each --swap, then those of --set,
-    which may change it (`--set fmu.controller.start.k=2`).
+def options(
+    set: Iterable[str] | None, swap: Iterable[str] | None, map: Iterable[str] | None = None
+) -> tuple[str, ...]:
+    """The options of a scene: an [[fmu]] with `replaces` for each --swap, what --map says of them,
+    then those of --set, which may change them.
 
-    Raises InputFault for a swap that is not block=file.
+    Raises InputFault for a swap that is not block=file, and a map that is not port=names.
     """
-    return (*map(_swap, swap or ()), *(set or ()))
+    swaps = tuple(swap or ())
+    return (
+        *(_swap(each) for each in swaps),
+        *(_map(each, swaps) for each in map or ()),
+        *(set or ()),
+    )
 
 
 def _swap(given: str) -> str:
@@ -68,9 +86,25 @@ def _swap(given: str) -> str:
     block, equals, file = given.partition("=")
     if not (block and equals and file):
         raise InputFault(f"--swap {given}: write block=file.fmu, e.g. --swap controller=my.fmu")
-    return (
-        f"fmu.+={overrides.text({'replaces': block, 'path': str(Path(file).resolve())}, '--swap')}"
-    )
+    by = {"engine": file} if file == "mujoco" else {"path": str(Path(file).resolve())}
+    return f"fmu.+={overrides.text({'replaces': block} | by, '--swap')}"
+
+
+def _map(given: str, swaps: Sequence[str]) -> str:
+    from hapticlink.orchestrator.scene import overrides  # with all of a scene, slow to load
+
+    port, equals, names = given.partition("=")
+    blocks = [swap.partition("=")[0] for swap in swaps]
+    block, dot, _ = port.partition(".")
+    if not (dot and block in blocks) and len(blocks) == 1:
+        (block,), port = blocks, f"{blocks[0]}.{port}"
+    if not (port and equals and names) or block not in blocks:
+        example = f"{blocks[0] if blocks else 'hand'}.F=force0,force1,force2"
+        raise InputFault(
+            f"--map {given}: write port=variable,... of a --swap, e.g. --map {example}"
+        )
+    variables = overrides.text([name.strip() for name in names.split(",")], "--map")
+    return f'fmu.{block}.map."{port.removeprefix(f"{block}.")}"={variables}'
 
 
 def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from hapticlink.commands.options import (
     Json,
+    Map,
     Out,
     Quiet,
     Scene,
@@ -23,9 +22,6 @@ from hapticlink.commands.options import (
 from hapticlink.commands.progress import progress
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.base.terminal_output import say
-
-if TYPE_CHECKING:
-    from hapticlink.api.result import Run
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 Explain = Annotated[
@@ -47,6 +43,7 @@ def run(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
+    map: Map = None,
     figures: Figures = True,
     explain: Explain = False,
     real_time: RealTime = False,
@@ -68,11 +65,11 @@ def run(
     import hapticlink as hl
     from hapticlink.analysis.findings import summary
 
-    overrides = options(set, swap)
+    overrides = options(set, swap, map)
     if explain:
         say(*hl.explain(scene, overrides), sep="\n")
         return 0
-    folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ())))
+    folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ()), *(map or ())))
     try:
         read = hl.scene(scene, overrides)
         with progress(read.title, read.duration, hidden=quiet) as report:
@@ -81,30 +78,11 @@ def run(
         result = ended.run
     if result.fault:
         say(f"hapticlink: {result.fault}", file=sys.stderr)
-    warnings = result.run.get("warnings")
-    if warnings is None:  # no row is in the folder, or too many to be read back
-        warnings = list(summary.lines(result))
+    lines = [*summary.told(result, default_folder("runs", scene).name)]
     if quiet or json:
-        for line in warnings:
+        for line in summary.warnings(result):
             say(f"hapticlink: {line}", file=sys.stderr)
-    name = default_folder("runs", scene).name
-    tell(_lines(result, warnings, name, folder), result.run, quiet, json)
+    if not result.folder:
+        lines.append(f"  {folder}/: nothing written, the run failed before the first sample")
+    tell(lines, result.run, quiet, json)
     return Fault.exit_status if result.fault else 0
-
-
-def _lines(result: Run, warnings: Sequence[str], name: str, folder: Path) -> Iterator[str]:
-    from hapticlink.analysis.findings import summary
-    from hapticlink.orchestrator.results.tables import TABLES
-
-    yield f"{name}: {summary.ending(result)}"
-    for line in (*summary.numbers(result), *warnings):
-        yield f"  {line}"
-    wall_time = result.run["timings"]["run"]
-    if wall_time:  # none where a signal came before the first event
-        speed = result.run["end"]["time"] / wall_time
-        yield f"  {wall_time:.2f} s of run time, {speed:.1f} times real time"
-    if result.folder:
-        names = sorted(result.run["files"], key=lambda name: not name.endswith(TABLES))
-        yield f"  {folder}/: {', '.join(names)}"
-    else:
-        yield f"  {folder}/: nothing written, the run failed before the first sample"

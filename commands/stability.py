@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from hapticlink.commands.options import (
     Json,
+    Map,
     Out,
     Quiet,
     Scene,
@@ -64,6 +65,7 @@ def stability(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
+    map: Map = None,
     poses: Poses = 3,
     drift: Drift = (1.0, 0.2),
     figure: Figure = False,
@@ -94,11 +96,13 @@ def stability(
         hapticlink stability virtual-wall --port
         hapticlink stability virtual-wall --vary fmu.wall.start.stiffness=2000..8000:4 --check 2
     """
-    chosen = (*(set or ()), *(swap or ()))
+    chosen = (*(set or ()), *(swap or ()), *(map or ()))
     name = default_folder("runs", scene).name
     if vary:
         folder = out or default_folder("maps", scene, chosen)
-        points, record = _map(scene, folder, options(set, swap), vary, check, seed, jobs, quiet)
+        points, record = _map(
+            scene, folder, options(set, swap, map), vary, check, seed, jobs, quiet
+        )
         tell_result((f"{name}: {next(points)}", *points), record, quiet, json)
         return 0
     import hapticlink as hl
@@ -106,7 +110,7 @@ def stability(
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 
-    given = options(set, swap)
+    given = options(set, swap, map)
     if growth is not None:
         rate = hl.finite_time_growth(scene, given, at=at, seconds=growth)
         growth_lines = (

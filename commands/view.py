@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter, validators
 
 from hapticlink.commands import completion
-from hapticlink.commands.options import Out, Set, Swap, default_folder, options
+from hapticlink.commands.options import Map, Out, Set, Swap, default_folder, options
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
 
 if TYPE_CHECKING:
+    from hapticlink.orchestrator.scene.scene import Scene
     from hapticlink.visualization.live.server_pipe import Link
 
 Host = Annotated[
@@ -44,6 +45,12 @@ Export = Annotated[
         "of the drawing, .gif, .webp or .png."
     ),
 ]
+Standalone = Annotated[
+    Path | None,
+    Parameter(
+        help="Write the page with the scene in it to this .html file, which needs no server."
+    ),
+]
 PORT = 8512
 WAIT = 0.1
 """Time (s) between two looks for Ctrl-C."""
@@ -63,10 +70,12 @@ def view(
     out: Out = None,
     set: Set = None,
     swap: Swap = None,
+    map: Map = None,
     host: Host = "127.0.0.1",
     port: Port = None,
     browser: Browser = True,
     export: Export = None,
+    standalone: Standalone = None,
 ) -> int:
     """Show a scene that runs in real time on a page, where the mouse is the hand; Ctrl-C ends it.
     Recordings are written to OUT-1, OUT-2, ... (default runs/SCENE-view).
@@ -76,14 +85,17 @@ def view(
     For example:
 
         hapticlink view closed-loop
+        hapticlink view closed-loop --standalone demo.html
         hapticlink view runs/closed-loop
         hapticlink view runs/on runs/off --export on-and-off.gif
     """
     if Path(scene).is_dir() and (second or export or not _is_scene(scene)):
-        if set or swap or out:
+        if set or swap or map or out:
             raise InputFault(
                 f"{scene} is the folder of a run: --set, --swap and --out apply to scenes only"
             )
+        if standalone:
+            raise InputFault(f"--standalone: {scene} is the folder of a run; give a scene")
         return _replayed([scene, *([second] if second else [])], host, port, browser, export)
     if second or export:
         given = second or f"--export {export}"
@@ -95,7 +107,9 @@ def view(
     from hapticlink.visualization.live.mouse_hand import viewed
     from hapticlink.visualization.live.session import Session
 
-    read = viewed(scene, options(set, swap))
+    read = viewed(scene, options(set, swap, map))
+    if standalone:
+        return _written(read, scene, standalone)
     default = default_folder("runs", scene)
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
@@ -107,6 +121,17 @@ def view(
             session.run()
     for folder in session.recordings:
         say(f"  {folder}/")
+    return 0
+
+
+def _written(scene: Scene, name: str, path: Path) -> int:
+    """Write the page of a scene that needs no server."""
+    from hapticlink.visualization.standalone import page
+
+    if path.suffix.lower() != ".html":
+        raise InputFault(f"--standalone {path}: name a file that ends in .html")
+    page.write(scene, default_folder("", name).name, path)
+    say(f"{path}: {path.stat().st_size / 1e3:.0f} kB; open it in a browser and drag")
     return 0
 
 

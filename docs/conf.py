@@ -10,6 +10,7 @@ anything from the network. Equations become MathML, which browsers show by thems
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,19 @@ def _front_page(app: Sphinx, error: Exception | None) -> None:
         (Path(app.outdir) / "index.html").write_text(text, encoding="utf-8")
 
 
+def _dragged(app: Sphinx, error: Exception | None) -> None:
+    """The start page has the page itself in place of its picture."""
+    path = Path(app.outdir) / "docs" / "index.html"
+    if error is None and path.exists():
+        frame = r'<iframe src="\1" title="Drag the handle" class="page-within"></iframe>'
+        text = re.sub(
+            r'<a class="[^"]*" download="" href="([^"]*closed_loop\.html)">\s*<img [^>]*>\s*</a>',
+            frame, path.read_text(encoding="utf-8"),
+        )  # fmt: skip
+        path.write_text(text, encoding="utf-8")
+
+
 def setup(app: Sphinx) -> None:
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.connect("build-finished", _front_page)
+    app.connect("build-finished", _dragged)

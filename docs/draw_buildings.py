@@ -28,7 +28,7 @@ BUILDINGS = {
         "device",
         "blocks",
     ),
-    "fmus": (".", "native"),
+    "fmus": (".", "native", "engine"),
     "orchestrator": (
         "base",
         "fmi",
@@ -42,8 +42,8 @@ BUILDINGS = {
         ".",
     ),
     "programs": (".",),
-    "analysis": ("findings", "stability", "sweep", "maps", "tune"),
-    "visualization": (".", "mechanism", "figures", "live", "replay", "compare"),
+    "analysis": ("findings", "stability", "sweep", "maps", "tune", "transparency", "advise"),
+    "visualization": (".", "mechanism", "figures", "live", "replay", "standalone", "compare"),
     "api": (".",),
     "commands": (".",),
 }

@@ -1,4 +1,4 @@
-"""Draws the start of each shipped scene and of the examples in own-linkage.md to
+"""Draws the start of each shipped scene and of the linkages in own-linkage.md and scenes.md to
 docs/pictures/<scene>.png, and block diagrams to docs/figures/:
 
 python docs/draw_scenes.py
@@ -17,15 +17,16 @@ from hapticlink.orchestrator.system.build_system import built
 from hapticlink.visualization.figures import block_diagram
 from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
-PAGE = Path(__file__).with_name("own-linkage.md")
+PAGES = [Path(__file__).with_name(name) for name in ("own-linkage.md", "scenes.md")]
 PICTURES, FIGURES = (Path(__file__).with_name(name) for name in ("pictures", "figures"))
 DPI = 80
 SAME = {"metadata": {"Software": None}}  # the same bytes every time
 
 
 def examples(folder: Path) -> Iterator[Path]:
-    """The scene files of the page, written to `folder`."""
-    for name, text in re.findall(r'```toml title="(.+?)"\n(.*?)```', PAGE.read_text(), re.DOTALL):
+    """The scene files of the pages, written to `folder`."""
+    pages = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    for name, text in re.findall(r'```toml title="(.+?)"\n(.*?)```', pages, re.DOTALL):
         path = folder / name
         path.write_text(text, encoding="utf-8")
         yield path

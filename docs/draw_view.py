@@ -27,6 +27,11 @@ SHOTS: dict[str, tuple[str, tuple[int, int], tuple[tuple[float, float], ...]]] =
 OTHERS = {"two_users": ("left", ((0.012, -0.012),))}
 """By file, the point of the user who drags in a second window, and that one's path (m)."""
 
+ONE_FILE = "closed_loop.html"
+"""`hapticlink view closed-loop --standalone results/view/closed_loop.html` writes it."""
+OF_FILE = {"a_and_b": ("graphics.rate=10&b.controller.topology=false", (1360, 820))}
+"""By file, the settings in the link to the page in one file, and the window (px)."""
+
 
 def dragged(page: Any, path: tuple[tuple[float, float], ...], user: str = "") -> None:
     """Drag along a path, and stay at its end for a while with the button down."""
@@ -45,13 +50,27 @@ def dragged(page: Any, path: tuple[tuple[float, float], ...], user: str = "") ->
         page.wait_for_timeout(1500)
 
 
+def of_file(browser: Any, name: str) -> None:
+    """The page in one file, dragged."""
+    settings, (width, height) = OF_FILE[name]
+    page = browser.new_page(viewport={"width": width, "height": height})
+    page.goto(f"file://{OUT / ONE_FILE}#{settings}")
+    page.wait_for_function("() => view.frame?.b")
+    dragged(page, ((0.03, 0.03),))
+    page.screenshot(path=OUT / f"{name}.png")
+    page.close()
+
+
 def main(names: Collection[str]) -> None:
     OUT.mkdir(exist_ok=True)
     with sync_playwright() as started, tempfile.TemporaryDirectory() as folder:
         browser = started.chromium.launch(
             executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
         )
-        for name in names or SHOTS:
+        for name in names or (*SHOTS, *OF_FILE):
+            if name in OF_FILE:
+                of_file(browser, name)
+                continue
             scene, (width, height), path = SHOTS[name]
             command = [sys.executable, "-m", "hapticlink", "view", scene]
             served = subprocess.Popen(

@@ -12,13 +12,14 @@ hl.shipped()
 
 # %% [markdown]
 # A scene runs by its name or path. Options are its keys; here the graphics rate (Hz) and the
-# duration (s). The result says how the run ended and what was recorded at each rate.
+# duration (s). `print` gives the lines of the command; as the value of a cell a run shows itself.
 
 # %%
 r = hl.run("closed-loop-direct", {"graphics.rate": 30, "duration": 1.0})
 if r.fault:
     raise SystemExit(r.fault)
 print(r)
+r
 
 # %% [markdown]
 # Signals are NumPy arrays by name. Rates differ, so that each signal has its own times.
@@ -35,8 +36,7 @@ print(P_c.shape, r.time("virtual_mechanism.P_c").shape)
 # %%
 time, distance, angle = r.tracking()
 print(f"at 30 Hz at most {distance.max():.3g} mm apart, at {time[distance.argmax()]:.3g} s")
-figures = r.figures()
-figures["distance"]
+r.figures()["distance"]
 
 # %% [markdown]
 # A scene can be read once and run with further options. It stays as it is.
@@ -45,6 +45,19 @@ figures["distance"]
 scene = hl.scene("closed-loop-direct", {"duration": 1.0})
 slow = hl.run(scene, {"graphics.rate": 10})
 print(f"at 10 Hz at most {slow.tracking().distance_mm.max():.3g} mm apart")
+
+# %% [markdown]
+# Four holds, compared and drawn.
+
+# %%
+runs = {hold: hl.run(scene, {"hold": hold}) for hold in ("zoh", "lead", "foh", "passive")}
+hl.compare(runs)
+
+# %% [markdown]
+# A replay, with a time slider.
+
+# %%
+hl.view(runs["zoh"], runs["passive"])
 
 # %% [markdown]
 # Invalid keys and values are refused before anything runs, all of them at once.

@@ -42,7 +42,12 @@ from {}_slave import HapticlinkSlave
 ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
 """
 """The module that pythonfmu executes again for each instance: a class that it defined would be
-another one each time, which is never released (60 kB)."""
+another one each time, which is never released (60 kB; what is left is in `python_slave.Short`)."""
+_ENGINE = """
+from {}_engine import functions
+
+HapticlinkSlave.made_by = staticmethod(functions)
+"""
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
@@ -62,16 +67,35 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
     variables do not fit."""
     check_functions(component)
 
+    parts = one_pass(component)
+    texts = {f.name(): f.serialize() for f in parts.functions}
+    functions = {
+        "resources/functions.casadi.json": json.dumps(texts).encode(),
+        "resources/functions.txt": program(parts.functions, component.look_ups).encode(),
+    }
+    about = {"n_shared": parts.n_shared}
+    return packed(component, functions, about, stop_time=stop_time, step_size=step_size)
+
+
+def packed(
+    component: Component,
+    functions: Mapping[str, bytes],
+    about: Mapping[str, object],
+    *,
+    stop_time: float,
+    step_size: float,
+    engine: bytes = b"",
+) -> dict[str, bytes]:
+    """As `entries`, with the files that hold the functions, and what the slave is told of them.
+    engine: the text of a module whose functions replace these."""
+
     def describe(guid: str) -> bytes:
         return model_description(component, guid, stop_time=stop_time, step_size=step_size)
 
-    parts = one_pass(component)
-    texts = {f.name(): f.serialize() for f in parts.functions}
     files = {
         "documentation/index.html": documentation(component),
         "model.png": icon(component.timing),
-        "resources/functions.casadi.json": json.dumps(texts).encode(),
-        "resources/functions.txt": program(parts.functions, component.look_ups).encode(),
+        **functions,
     }
     for path in sorted(PYTHONFMU.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
@@ -79,11 +103,13 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
         files[f"binaries/{path.parent.name}/{component.name}{path.suffix}"] = path.read_bytes()
 
     slave = Path(__file__).with_name("python_slave.py").read_bytes()
-    about = _about(component) | {"n_shared": parts.n_shared}
+    about = _about(component) | dict(about)
+    module_text = _MODULE + _ENGINE * bool(engine)
     content = {
         **files,
         "slave": slave,
-        "module": _MODULE.encode(),
+        "engine": engine,
+        "module": module_text.encode(),
         "about": json.dumps(about).encode(),
         "xml": describe(""),
     }
@@ -92,11 +118,11 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
     files |= {
         "modelDescription.xml": describe(guid),
         "resources/component.json": json.dumps(about | {"digest": whole, "guid": guid}).encode(),
-        f"resources/{module}.py": _MODULE.format(module).encode(),
+        f"resources/{module}.py": module_text.replace("{}", module).encode(),
         f"resources/{module}_slave.py": slave,
         "resources/slavemodule.txt": f"{module}\n".encode(),
     }
-    return files
+    return files | ({f"resources/{module}_engine.py": engine} if engine else {})
 
 
 def icon(timing: str) -> bytes:

@@ -45,21 +45,24 @@ def build_block(
     packaging: Packaging = "python",
     platforms: Sequence[str] = (),
     starts: Starts = MappingProxyType({}),
+    engine: str | None = None,
     poll: Callable[[], object] = lambda: None,
 ) -> Path:
     """The path of the block's FMU: in the cache, or built in `build_folder` where the cache is off.
 
     settings: the block's own, by name; starts: start values that replace those of its parameters.
     experiment: stop_time and step_size (s) of the default experiment. platforms: those of a native
-    FMU, by default this machine's. poll: called while another process builds it. Raises FmuError if
-    the settings give no
-    FMU, CompilerError if it cannot be compiled.
+    FMU, by default this machine's. engine: the physics engine by which it is made. poll: called
+    while another process builds it. Raises FmuError if the settings give no FMU, CompilerError if
+    it cannot be compiled.
     """
 
     def make(folder: Path) -> Path:
-        from hapticlink.fmus.build import build, build_native
+        from hapticlink.fmus.build import build, build_engine, build_native
 
         block = component(name, settings, starts)
+        if engine:
+            return build_engine(block, settings, folder, **experiment)
         if packaging == "python":
             return build(block, folder, **experiment)
         return build_native(block, folder, platforms=platforms, **experiment)
@@ -69,9 +72,11 @@ def build_block(
         "settings": {k: asdict(v) if is_dataclass(v) else v for k, v in settings.items()},  # type: ignore[arg-type]
         **experiment,
     }
+    if engine:
+        material["engine"] = engine
     if starts:
         material["starts"] = dict(starts)
-    if packaging == "native":
+    if packaging == "native" and not engine:
         from hapticlink.fmus.native.compiler import compiler_version, host_platform
 
         material["compiler"] = compiler_version()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from fmpy import read_model_description
 from fmpy.model_description import ValidationError
@@ -31,6 +32,23 @@ def build(
     """
     require_platform()
     return _publish(component, entries(component, stop_time=stop_time, step_size=step_size), folder)
+
+
+def build_engine(
+    component: Component,
+    settings: Mapping[str, Any],
+    folder: Path | str,
+    *,
+    stop_time: float = 1.0,
+    step_size: float = 1 / 512,
+) -> Path:
+    """As `build`, with the component's ports by a physics engine (`hapticlink.fmus.engine`);
+    `settings` are those of its block."""
+    from hapticlink.fmus import engine
+
+    require_platform()
+    files = engine.entries(component, settings, stop_time=stop_time, step_size=step_size)
+    return _publish(component, files, folder)
 
 
 def build_native(

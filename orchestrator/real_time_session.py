@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from contextlib import suppress
-from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -20,7 +18,6 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.faults import InputFault, shortened, unknown
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
@@ -30,12 +27,10 @@ from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
-from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system import held_polynomials
-from hapticlink.orchestrator.system.assign_holds import misfit
+from hapticlink.orchestrator.system.changes import changed, choices, require_other_rate
 from hapticlink.orchestrator.system.ports import names
-from hapticlink.orchestrator.system.springs import limited_fmus, limited_gains
+from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import Connection, System
 
 Result = TypeVar("Result")
@@ -130,7 +125,7 @@ class LiveRun:
             raise InputFault(
                 f"{name} = {shortened(repr(value))}: give {len(scalars)} finite numbers"
             )
-        self._simulation.instances[fmu].before_step(lambda: set_from(values))
+        self._simulation.instances[fmu].before_step(lambda time: set_from(values))
 
     def hold(self, name: str, hold: str | None = None, delay: float | None = None) -> None:
         """Give connections another hold, or another constant latency `delay` (s); they are named
@@ -147,30 +142,22 @@ class LiveRun:
         if not found:
             every = [key for c in system.connections if c.hold for key in names(c)]
             raise InputFault(unknown("connection with a hold", name, every))
-        changed = [self._with(self._connections.get(c.name, c), hold, delay) for c in found]
-        for connection in changed:
+        new = [changed(system, self._connections.get(c.name, c), hold, delay) for c in found]
+        for connection in new:
             made = make_hold(connection, system, self._simulation.signals, {})
             self._loop.change_hold(connection.name, made)
             self._connections[connection.name] = connection
             sample = self._simulation.signals.values[self._simulation.signals.sources(connection)]
             stamp = self._loop.events.previous(system.fmu[connection.source].clock)
             self._simulation.holds[connection.name].push(stamp, sample, stamp)
-        self._note(f"hold of {name}: {changed[0].hold}, delay {delay or 0.0:g} s")
+        self._note(f"hold of {name}: {new[0].hold}, delay {delay or 0.0:g} s")
 
     def holds(self) -> dict[str, list[str]]:
         """By connection that has a hold, the holds that `hold` can give it, its present one
         first."""
         self._require_running()
-        found: dict[str, list[str]] = {}
-        for c in self.system.connections:
-            if c.hold:
-                present = self._connections.get(c.name, c)
-                found[c.name] = [present.hold or ""]
-                for hold in HOLDS:
-                    with suppress(InputFault):
-                        self._with(present, hold, None)
-                        found[c.name] += [hold] if hold != present.hold else []
-        return found
+        held = [self._connections.get(c.name, c) for c in self.system.connections if c.hold]
+        return {c.name: choices(self.system, c) for c in held}
 
     def rate(self, clock: str, rate: float, jitter: float = 0.0, seed: int = 0) -> None:
         """Change the rate (Hz) of a clock other than the haptic one, such as `graphics`, from the
@@ -184,15 +171,7 @@ class LiveRun:
         haptics, *others = timeline.clocks
         if clock not in [c.name for c in others]:
             raise InputFault(unknown("clock", clock, [c.name for c in others]))
-        fixed = [f.name for f in self._simulation.system.fmus if f.clock == clock]
-        fixed = [f for f in fixed if not varies_step(self._simulation.system.fmu[f].description)]
-        if fixed:
-            raise InputFault(f"rate of {clock}: {fixed[0]} takes steps of one size only")
-        if limited := [f for f in limited_fmus(self.system) if self.system.fmu[f].clock == clock]:
-            raise InputFault(
-                f"rate of {clock}: `pspm` limits the energy of a spring of {limited[0]} over the "
-                "steps of the start: change the scene, with `reset`"
-            )
+        require_other_rate(self.system, clock)
         rate = require(f"rate of {clock}", rate, Annotated[float, Quantity("Hz", gt=0)])
         jitter = require(f"jitter of {clock}", jitter, Annotated[float, Quantity("1", ge=0)])
         seed = int(require("seed", seed, Seed))
@@ -292,30 +271,5 @@ class LiveRun:
                 "of the start: change the scene, with `reset`"
             )
 
-    def _with(self, c: Connection, hold: str | None, delay: float | None) -> Connection:
-        """The connection with another hold or latency."""
-        system = self._simulation.system
-        new = held_by(c, hold, delay)
-        why = misfit(new.hold or "", new, system.fmu, system.energy.power, False)
-        if system.coupling.scheme == "iterated":
-            why = "steps are repeated"
-        spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
-        on_force = spring and any(
-            HOLDS[d.hold].needs == "spring" for d in system.connections if d.hold
-        )
-        if on_force or "spring" in (HOLDS[c.hold or ""].needs, HOLDS[new.hold or ""].needs):
-            why = "holds of a spring share its energy: take `reset`"
-        if held_polynomials.order(system, c) or held_polynomials.order(system, new):
-            why = "the FMU takes derivatives of its inputs: take `reset`"
-        if why:
-            raise InputFault(f"hold of {c.name} = {new.hold}: {why}")
-        return new
-
     def _note(self, text: str) -> None:
         self._run.changes.append((self.time, text))
-
-
-def held_by(c: Connection, hold: str | None, delay: float | None) -> Connection:
-    """The connection with another hold or another constant latency (s); None leaves either."""
-    latency = c.latency if delay is None else Latency(min=delay) if delay else None
-    return replace(c, hold=hold or c.hold, latency=latency)

@@ -5,7 +5,7 @@
     r = hl.run("closed-loop", {"graphics.rate": 10})
     r["virtual_mechanism.x"], r.time("virtual_mechanism.x")
 
-Scenes: `shipped`, `scene`, `explain`. Runs: `run`, `RealTime`, `sweep`, `load`.
+Scenes: `shipped`, `scene`, `explain`. Runs: `run`, `RealTime`, `sweep`, `load`, `compare`, `view`.
 Files: `build`, `export`. Before a hand is on the device: `stability`, `tune`.
 Raised: `InputFault` for bad input, with all findings of a scene `SceneFault`; each is a `Fault`.
 """

@@ -15,8 +15,12 @@ from hapticlink.analysis.stability.workspace_stability import stability as stabi
 from hapticlink.analysis.stability.workspace_verdict import (
     WorkspaceStability as WorkspaceStability,
 )
+from hapticlink.analysis.transparency import Transparency as Transparency
+from hapticlink.analysis.transparency import transparency as transparency
 from hapticlink.analysis.tune import Tuned as Tuned
 from hapticlink.analysis.tune import tune as tune
+from hapticlink.api.compare import Comparison as Comparison
+from hapticlink.api.compare import compare as compare
 from hapticlink.api.files import build as build
 from hapticlink.api.files import export as export
 from hapticlink.api.maps import stability_map as stability_map
@@ -30,6 +34,8 @@ from hapticlink.api.scenes import scene as scene
 from hapticlink.api.scenes import shipped as shipped
 from hapticlink.api.sweeps import Sweep as Sweep
 from hapticlink.api.sweeps import sweep as sweep
+from hapticlink.api.view import Replay as Replay
+from hapticlink.api.view import view as view
 from hapticlink.orchestrator.base.faults import Fault as Fault
 from hapticlink.orchestrator.base.faults import InputFault as InputFault
 from hapticlink.orchestrator.base.faults import SceneFault as SceneFault

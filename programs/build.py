@@ -93,9 +93,9 @@ def _identifier(name: str | Path) -> str:
 def program_files(scene: Scene, identifier: str, without: str | None = None) -> dict[str, bytes]:
     """All files of the FMU but its binaries. Raises InputFault as `build_program`."""
     with resolved(scene, without) as program:
-        components = _components(program)
-        variables = ports(program, components)
-        texts = sources(program, components, variables)
+        made = components(program)
+        variables = ports(program, made)
+        texts = sources(program, made, variables)
         haptic = program.system.timeline.clocks[0]
         step_size = program.system.timeline.seconds(haptic.longest)
     page = documentation(scene, variables)
@@ -118,7 +118,7 @@ def program_files(scene: Scene, identifier: str, without: str | None = None) -> 
     }
 
 
-def _components(program: Resolved) -> dict[str, Component]:
+def components(program: Resolved) -> dict[str, Component]:
     """The component of each member, with the step sizes of the scene."""
     timeline, plans = program.system.timeline, {b.name: b for b in blocks(program.scene).built}
     made = {}

@@ -79,10 +79,18 @@ static Sums sums_of(const Meter *m) {
     return s;
 }
 
-double meter_energy(const Meter *m) {
-    if (!m->counts[0] || !m->counts[1]) return 0.0;
+void meter_work(const Meter *m, double work[2]) {
+    work[0] = work[1] = 0.0;
+    if (!m->counts[0] || !m->counts[1]) return;
     const Sums s = sums_of(m);
-    return m->totals[0] + s.held - (m->totals[1] + s.ideal);
+    work[0] = m->totals[0] + s.held;
+    work[1] = m->totals[1] + s.ideal;
+}
+
+double meter_energy(const Meter *m) {
+    double work[2];
+    meter_work(m, work);
+    return work[0] - work[1];
 }
 
 static void drop(void *rows, int64_t gone, int64_t count, int64_t width) {

@@ -25,3 +25,5 @@ int64_t latency_draw(const Latency *latency, Pcg64 *generator) {
     const uint64_t rest = (uint64_t)product & ((1ull << 53) - 1);
     return (int64_t)(whole / latency->unit + (whole % latency->unit || rest));
 }
+
+double uniform(Pcg64 *generator) { return (double)draw(generator) * 0x1p-53; }

@@ -41,7 +41,13 @@ typedef struct {
     int64_t n, ticks;
 } Pattern;
 
-enum { GET_REAL, SET_REAL, DO_STEP, GET_STATE, SET_STATE };
+/* Kinds of events in which the changed clock takes steps of any length, others as in `key`: for one of
+ * `dticks` the operations from `first` on, that grow with each tick by `slopes` from there on. */
+typedef struct {
+    int64_t first, n, dticks, slopes, key[8];
+} Family;
+
+enum { GET_REAL, SET_REAL, DO_STEP, GET_STATE, SET_STATE, FREE_STATE };
 
 typedef struct {
     const char *name, *guid;
@@ -100,12 +106,22 @@ static const double TOLERANCE = 1e-12; /* of start values: run/initialize.py */
 static const double GROWTH = 1e12;     /* of outputs without a bound: fmi/output_bounds.py */
 static const double NEAR = 1e-3;       /* of a tick, by which a time may be before it */
 
+enum { MOST_POINTS = 64 }; /* of the window of a clock whose rate was changed */
+
+typedef struct { /* of the scene while it runs: changes.h */
+    int64_t chosen[N_HOLDS + 1], delay[N_HOLDS + 1]; /* 1 + choice, 0: the scene's; ticks, -1: the scene's */
+    int64_t millihertz, begun, index, kinds; /* 0: the scene's rate; points and kinds made since */
+    double jitter;
+    Pcg64 generator;
+} Changes;
+
 typedef struct { /* what fmi2GetFMUstate saves, beside the states of the blocks */
     char guid[40];
     int64_t mode, settled, tick; /* settled: start values agree. tick: where the program stands */
     double time;
     Pcg64 generators[N_LATENCIES + 1];
     double step_errors[N_FMUS][N_CHECKED + 1]; /* sums of the rows of step checks that are dropped */
+    Changes changes;
     Scene scene;
 } State;
 
@@ -123,27 +139,22 @@ typedef struct {
     fmi2FMUstate members[N_MEMBERS];
 } Saved;
 
+#include "fmi2_common.h"
+
 /* --- messages ------------------------------------------------------------------------------- */
 
-static void say(const Model *m, fmi2Status status, const char *text) {
-    static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
-                                             "logStatusError", "logStatusFatal"};
-    m->callbacks.logger(m->callbacks.componentEnvironment, m->name, status, categories[status], text);
+static const char *standing(const Model *m) {
+    switch (m->now.mode) {
+    case INSTANTIATED: return "is instantiated";
+    case INITIALIZATION: return "is in initialisation mode";
+    case STEP_MODE: return "is initialised";
+    case ENDED: return "has ended the simulation";
+    case FAILURE: return "has failed; reset it or restore a state";
+    }
+    return "is terminated";
 }
 
-static fmi2Status fail(const Model *m, fmi2Status status, const char *format, ...) {
-    if (!m) return fmi2Error; /* without an instance there is nobody to tell */
-    char message[1024], text[2 * sizeof message], *to_text = text;
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(message, sizeof message, format, arguments);
-    va_end(arguments);
-    for (const char *c = message; *c; *to_text++ = *c++)
-        if (*c == '%') *to_text++ = '%'; /* the logger takes a message for a format (2.1.5) */
-    *to_text = 0;
-    say(m, status, text);
-    return status;
-}
+static int has_ended(const Model *m) { return m->now.mode == ENDED; }
 
 /* Messages of a block, with its name. */
 static void member_logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
@@ -152,25 +163,6 @@ static void member_logger(fmi2ComponentEnvironment environment, fmi2String name,
     snprintf(text, sizeof text, "%s: %s", name, message);
     say(environment, status, text);
     (void)category;
-}
-
-static int out_of_order(const Model *m, const char *call, int allowed) {
-    const int64_t mode = m ? m->now.mode : 0;
-    if (mode & allowed) return 0;
-    fail(m, fmi2Error, "%s may not be called: the FMU %s", call,
-         mode == INSTANTIATED     ? "is instantiated"
-         : mode == INITIALIZATION ? "is in initialisation mode"
-         : mode == STEP_MODE      ? "is initialised"
-         : mode == ENDED          ? "has ended the simulation"
-         : mode == FAILURE        ? "has failed; reset it or restore a state"
-                                  : "is terminated");
-    return 1;
-}
-
-static int is_null(const Model *m, const char *call, size_t n, const void *a, const void *b) {
-    if (m && (!n || (a && b))) return 0;
-    fail(m, fmi2Error, "%s got a null pointer for %zu entries", call, n);
-    return 1;
 }
 
 /* --- the data of the scene ------------------------------------------------------------------- */
@@ -185,9 +177,12 @@ static const void *function(const Member *member, int which) {
     case SET_REAL: return (const void *)member->set;
     case DO_STEP: return (const void *)member->step;
     case GET_STATE: return (const void *)member->get_state;
+    case FREE_STATE: return (const void *)member->free_state;
     }
     return (const void *)member->set_state;
 }
+
+static void use_chosen(Model *m);
 
 /* Writes all pointers of the scene: into itself, to the blocks and to their functions. */
 static void relocate(Model *m) {
@@ -197,6 +192,7 @@ static void relocate(Model *m) {
     for (int i = 0; i < N_CALLS; i++)
         put(m, calls[i].at, function(members + calls[i].member, calls[i].function));
     for (int i = 0; i < N_SLOTS; i++) put(m, slots[i], m->slots + i);
+    use_chosen(m);
 }
 
 static void restart(Model *m) {
@@ -270,6 +266,8 @@ static int begin(Model *m) {
     return loop_carry_out(l, 0, &at);
 }
 
+#include "changes.h"
+
 /* --- events ---------------------------------------------------------------------------------- */
 
 static int64_t next_tick(const Events *e) {
@@ -294,10 +292,12 @@ static int next_window(Clock *c, const Pattern *p) {
 
 static void draw(Model *m, int64_t hold) {
     int i = 0;
-    while (latencies[i].hold != hold) i++;
     Link *link = m->now.scene.loop.holds[hold]->link;
+    const Changes *now = &m->now.changes;
+    const int is_changed = now->chosen[hold] && now->delay[hold] >= 0;
+    while (!is_changed && latencies[i].hold != hold) i++;
     for (int64_t k = 0; k < link->n_late; k++)
-        link->late[k] = latency_draw(latencies + i, m->now.generators + i);
+        link->late[k] = is_changed ? now->delay[hold] : latency_draw(latencies + i, m->now.generators + i);
     link->at_late = 0;
 }
 
@@ -348,10 +348,14 @@ static int serve(Model *m, int code) {
     switch (code) {
     case PAUSE: return 1;
     case STARTS:
+        if (next_rated_window(m, s->events.clocks + at->what)) return 1;
         if (next_window(s->events.clocks + at->what, patterns + at->what)) return 1;
         fail(m, fmi2Error, "the scene's communication points end at t = %.17g s: give it a longer "
              "duration", seconds(m, next_tick(&s->events)));
         return 0;
+    case KIND:
+        if (new_kind(m)) return 1;
+        break;
     case DRAW: draw(m, op->a); return 1;
     case JUDGE:
         at->op++;
@@ -396,9 +400,6 @@ static int advance(Model *m, int64_t until) {
 
 /* --- life of an instance -------------------------------------------------------------------- */
 
-const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
-const char *fmi2GetVersion(void) { return fmi2Version; }
-
 void fmi2FreeInstance(fmi2Component c) {
     Model *m = c;
     if (!m) return;
@@ -434,11 +435,6 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     }
     restart(m);
     return m;
-}
-
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
-                               const fmi2String categories[]) {
-    return c ? fmi2OK : fmi2Error; /* failures are always logged; there is nothing else to say */
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
@@ -548,17 +544,6 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
     return fmi2OK;
 }
 
-#define HAS_NO(verb, kind, type)                                                                \
-    fmi2Status fmi2##verb##kind(fmi2Component c, References vr, size_t n, type value[]) {       \
-        return c && !n ? fmi2OK : fail(c, fmi2Error, "no variable is of type " #kind);          \
-    }
-HAS_NO(Get, Integer, fmi2Integer)
-HAS_NO(Get, Boolean, fmi2Boolean)
-HAS_NO(Get, String, fmi2String)
-HAS_NO(Set, Integer, const fmi2Integer)
-HAS_NO(Set, Boolean, const fmi2Boolean)
-HAS_NO(Set, String, const fmi2String)
-
 /* --- stepping ------------------------------------------------------------------------------- */
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolean no_way_back) {
@@ -584,53 +569,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     return fmi2OK;
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c) {
-    return fail(c, fmi2Error, "no step is ever pending");
-}
-
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
-    if (!c || !value) return fmi2Error;
-    if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = ((Model *)c)->now.time;
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
-    if (!c || !value) return fmi2Error;
-    if (kind != fmi2Terminated) return fmi2Discard;
-    *value = ((Model *)c)->now.mode == ENDED;
-    return fmi2OK;
-}
-
-#define NOT_KEPT(name, type)                                                                    \
-    fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) { return fmi2Discard; }
-NOT_KEPT(fmi2GetStatus, fmi2Status)
-NOT_KEPT(fmi2GetIntegerStatus, fmi2Integer)
-NOT_KEPT(fmi2GetStringStatus, fmi2String)
-
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, References vr, size_t n,
-                                       const fmi2Integer order[], const fmi2Real value[]) {
-    return fail(c, fmi2Error, "inputs are constant over a step");
-}
-
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, References vr, size_t n,
-                                        const fmi2Integer order[], fmi2Real value[]) {
-    return fail(c, fmi2Error, "there are no derivatives of outputs");
-}
-
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, References unknown, size_t n,
-                                        References known, size_t k, const fmi2Real seed[],
-                                        fmi2Real derivative[]) {
-    return fail(c, fmi2Error, "there are no directional derivatives");
-}
-
 /* --- FMU state ------------------------------------------------------------------------------ */
-
-static int is_ours(const Model *m, const void *bytes) {
-    if (m && bytes && !memcmp(bytes, GUID, sizeof GUID)) return 1;
-    fail(m, fmi2Error, "this FMU state was not saved by this FMU");
-    return 0;
-}
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     Model *m = c;

@@ -8,6 +8,10 @@
 /* Energy (J) that the connection of a meter has generated so far: orchestrator/run/energy/meter.py. */
 double meter_energy(const Meter *m);
 
+/* The work (J) of the held effort of a meter, and that of the ideal one; the first less the second is
+ * what sampling and holding have generated. */
+void meter_work(const Meter *m, double work[2]);
+
 /* Adds rows of a meter to its sums and drops them; whether that made room. */
 int meter_fold(Meter *m);
 
@@ -27,5 +31,8 @@ typedef struct {
 
 /* Draws the next latency (ticks), -1 for a lost sample: Link.draw of orchestrator/system/latency.py. */
 int64_t latency_draw(const Latency *latency, Pcg64 *generator);
+
+/* A uniform number from 0 to 1. */
+double uniform(Pcg64 *generator);
 
 #endif

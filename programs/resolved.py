@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.communication_points import Frames
-from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.base.ticks import Timeline, exact
 from hapticlink.orchestrator.fmi.in_process import InProcess
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account
@@ -38,6 +38,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.system import Recording, System
 from hapticlink.programs import refusals
+from hapticlink.programs.changes import CLOCK, LEAST_RATE, NONE, Changes, changes
 
 NO_END = 2**61
 """The end (ticks) of a program's timeline: as far as its times are exact it has none."""
@@ -87,6 +88,10 @@ class Resolved:
     """Of each clock."""
     recorded: frozenset[str]
     """The outputs, `fmu.output`, that the scene records."""
+    start_values: NDArray[np.float64]
+    """The vector of signals at t = 0."""
+    changes: Changes
+    """What it can be changed to while it runs."""
     kept: object
     """What the structures lie in."""
 
@@ -109,9 +114,12 @@ class Resolved:
 
 
 @contextmanager
-def resolved(scene: Scene, outside: str | None = None) -> Iterator[Resolved]:
-    """The structures of a scene's run. outside: the block to leave out. Raises InputFault, with
-    what stands in the way, for a scene that cannot be a program."""
+def resolved(
+    scene: Scene, outside: str | None = None, changing: bool = False
+) -> Iterator[Resolved]:
+    """The structures of a scene's run. outside: the block to leave out. changing: holds and rates
+    can be changed while the program runs. Raises InputFault, with what stands in the way, for a
+    scene that cannot be a program."""
     scene = replace(scene, record=replace(scene.record, every=1), isolate=False)
     refusals.of_scene(scene)
     with built(scene) as every, ExitStack() as stack:
@@ -127,7 +135,7 @@ def resolved(scene: Scene, outside: str | None = None) -> Iterator[Resolved]:
         refusals.of_simulation(simulation, scene.title)
         simulation.start()
         refusals.of_start(simulation, scene.title)
-        yield _resolved(scene, plan, simulation, outside, rooms, _recorded(fetched))
+        yield _resolved(scene, plan, simulation, outside, rooms, _recorded(fetched), changing)
 
 
 def _recorded(system: System) -> frozenset[str]:
@@ -165,8 +173,10 @@ def _resolved(
     outside: str | None,
     rooms: Mapping[str, int],
     recorded: frozenset[str],
+    changing: bool,
 ) -> Resolved:
-    _as_before_the_start(simulation, outside)
+    start_values = simulation.signals.values.copy()
+    _as_before_the_start(simulation, outside, changing)
     system = simulation.system
     machine = Machine(load(), simulation)
     for name, room in rooms.items():
@@ -179,12 +189,13 @@ def _resolved(
         samples += [Sample(name, 0), Move(name, 0)]
     start = machine.block([(instruction, _nothing) for instruction in samples])
     binder = Binder(simulation, machine.joined)
-    kinds = {}
+    kinds = dict[Event, tuple[int, int]]()
     for event in _kinds(system.timeline):
         bound = binder.instructions(plan.block(event))
         kinds[event] = machine.block([b for b in bound if getattr(b[0], "fmu", "") != outside])
+    found = changes(machine, simulation, plan, binder, kinds) if changing else NONE
     refusals.of_machine(machine.in_python, scene.title)
-    events = Events(system.timeline, kinds)
+    events = Events(system.timeline, kinds, found)
     fmus, memory = machine.names("fmu"), Memory()
     into = [n for n in fmus if any(c.target == n for c in system.connections)]
     setters = (structures.Setter * len(into))()
@@ -205,6 +216,7 @@ def _resolved(
             ("loop", "Loop", ctypes.addressof(machine.loop), 1),
             ("events", "Events", ctypes.addressof(events.c), 1),
             ("start_setters", "Setter", ctypes.addressof(setters), len(into)),
+            ("alternatives", "Hold *", found.address, len(found.choices)),
         ],
         counts=machine.counts() | {"n_values": len(simulation.signals.values)},
         start=start,
@@ -214,6 +226,8 @@ def _resolved(
         meters=machine.names("meter"),
         patterns=events.patterns,
         recorded=recorded,
+        start_values=start_values,
+        changes=found,
         tables=machine.names("table"),
         kept=(machine, events, setters, memory, rows),
     )
@@ -223,7 +237,7 @@ def _nothing(tick: int) -> None:
     """What stands for the call of an operation that a program carries out."""
 
 
-def _as_before_the_start(simulation: Simulation, outside: str | None) -> None:
+def _as_before_the_start(simulation: Simulation, outside: str | None, changing: bool) -> None:
     """Takes back what `start` has set, which a program does itself, except for the outputs of the
     block that is left out; checks and meters have the rows that a program keeps."""
     values = simulation.signals.values
@@ -237,18 +251,21 @@ def _as_before_the_start(simulation: Simulation, outside: str | None) -> None:
         check.estimates = check.estimates[:STEP_CHECKS]
         check.times, check.weights = check.times[:STEP_CHECKS], check.weights[:STEP_CHECKS]
     for connection, meter in simulation.meters.of.items():
-        rows = max(METER_ROWS, 4 * _steps_apart(simulation.system, connection))
+        rows = max(METER_ROWS, 4 * _steps_apart(simulation.system, connection, changing))
         for name in ("stamps", "samples", "ticks", "moves", "efforts"):
             array = getattr(meter, name)
             setattr(meter, name, np.zeros((rows, *array.shape[1:]), array.dtype))
         meter.counts[:], meter.full = 0, rows
 
 
-def _steps_apart(system: System, connection: str) -> int:
+def _steps_apart(system: System, connection: str, changing: bool) -> int:
     """The largest number of steps that one end of a connection takes within a step of the other."""
     c, timeline = system.connection[connection], system.timeline
     clocks = [timeline.clock(system.fmu[fmu].clock) for fmu in (c.source, c.target)]
-    return max(clock.longest for clock in clocks) // min(clock.shortest for clock in clocks)
+    longest = max(clock.longest for clock in clocks)
+    if changing and any(clock.name == CLOCK for clock in clocks):
+        longest = max(longest, math.ceil(1 / (exact(LEAST_RATE) * timeline.base)))
+    return longest // min(clock.shortest for clock in clocks)
 
 
 def _newest_rows(machine: Machine, simulation: Simulation) -> list[object]:
@@ -309,8 +326,10 @@ class Events:
     """The structure of the event loop, with the kinds of events and the blocks of their operations,
     and the first communication points of each clock with their patterns."""
 
-    def __init__(self, timeline: Timeline, kinds: Mapping[Event, tuple[int, int]]) -> None:
-        n = len(timeline.clocks)
+    def __init__(
+        self, timeline: Timeline, kinds: Mapping[Event, tuple[int, int]], found: Changes
+    ) -> None:
+        n, n_kinds = len(timeline.clocks), len(kinds) + found.n_kinds
         self.patterns: list[Pattern] = []
         self._windows: list[object] = []
         self._clocks = (structures.Clock * n)()
@@ -319,16 +338,18 @@ class Events:
             self._windows.append(window)
             self.patterns.append(pattern)
             c.starts, c.n = window.ctypes.data, len(window)
-        self._keys = np.zeros((len(kinds), 1 + n), np.int64)
-        self._key, self._blocks = np.zeros(1 + n, np.int64), (structures.Block * len(kinds))()
-        for key, block, (event, span) in zip(self._keys, self._blocks, kinds.items(), strict=True):
+        self._keys = np.full((n_kinds, 1 + n), -1, np.int64)  # spare ones are no event's
+        self._key, self._blocks = np.zeros(1 + n, np.int64), (structures.Block * n_kinds)()
+        for key, block, (event, span) in zip(self._keys, self._blocks, kinds.items(), strict=False):
             fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
             key[:] = [event.first, *(fired.get(clock.name, 0) for clock in timeline.clocks)]
             block.first, block.last = span
+        for i, block in enumerate(self._blocks[len(kinds) :]):
+            block.first = block.last = found.spare + i * found.most
         self.c = c = structures.Events()
         c.clocks, c.n_clocks, c.end = ctypes.addressof(self._clocks), n, NO_END
         c.keys, c.key = self._keys.ctypes.data, self._key.ctypes.data
-        c.kinds, c.n_kinds = ctypes.addressof(self._blocks), len(kinds)
+        c.kinds, c.n_kinds = ctypes.addressof(self._blocks), n_kinds
         c.at.op = -1
 
 

@@ -15,7 +15,7 @@ import fmpy
 import numpy as np
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.native.archive import WRAPPER
+from hapticlink.fmus.native.archive import COMMON, WRAPPER
 from hapticlink.fmus.native.source import component_source, number
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.in_process import InProcess
@@ -26,7 +26,7 @@ from hapticlink.programs.resolved import Resolved
 from hapticlink.programs.typed_data import TypedData
 
 HERE = Path(__file__).parent
-OWN = ("program.h", "program.c", "platform.c", "latencies.c", "energies.c")
+OWN = ("program.h", "program.c", "changes.h", "platform.c", "latencies.c", "energies.c")
 REPLACED = ("platform.c", "process_state.c", "python_errors.c")
 """Files of the loop in whose place a program has its own platform.c."""
 HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
@@ -36,6 +36,7 @@ FUNCTIONS = {
     "fmi2DoStep": "DO_STEP",
     "fmi2GetFMUstate": "GET_STATE",
     "fmi2SetFMUstate": "SET_STATE",
+    "fmi2FreeFMUstate": "FREE_STATE",
 }
 
 
@@ -44,6 +45,7 @@ def sources(
 ) -> dict[str, str]:
     """All C files by name; scene.h lacks the GUID. components: by member."""
     files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in REPLACED}
+    files[COMMON.name] = COMMON.read_text()
     files["hold_laws.h"] = loop.LAWS["text"]()
     files |= {name: (HERE / name).read_text() for name in OWN}
     headers = Path(fmpy.__file__).parent / "c-code"
@@ -71,10 +73,10 @@ def _member(id_: str, component: Component) -> tuple[str, dict[str, str]]:
     own = f'{prefix}#define GUID "{guid}"\n{header}'
     text = WRAPPER.read_text().replace('#include "component.h"', own)
     files = {f"{id_}.c": text} | {f"{id_}_{k:03}.c": piece for k, piece in enumerate(pieces)}
-    return guid, {name: _prefixed(text, id_) for name, text in files.items()}
+    return guid, {name: prefixed(text, id_) for name, text in files.items()}
 
 
-def _prefixed(text: str, id_: str) -> str:
+def prefixed(text: str, id_: str) -> str:
     text = text.replace("component_ ## ID", f"{id_}_ ## ID")
     return re.sub(r"\bpart(\d+)_", rf"{id_}_part\1_", text)
 
@@ -89,7 +91,9 @@ def _scene(
         for fmu in members
         for name in FUNCTIONS
     }
-    data = TypedData(Regions(resolved.roots, resolved.counts), handles, functions)
+    regions = Regions(resolved.roots, resolved.counts)
+    data = TypedData(regions, handles, functions)
+    changes = resolved.changes
     settable = [p for p in ports if p.kind in ("INPUT", "OUTSIDE", "PARAMETER")]
     latencies = [*_latencies(resolved)]
     slot_members = [member for _, member in data.slots]
@@ -113,6 +117,15 @@ def _scene(
         "N_HANDLES": len(data.handles),
         "N_CALLS": len(data.calls),
         "N_SLOTS": len(data.slots),
+        "N_METERS": len(resolved.meters),
+        "N_CLOCKS": len(resolved.patterns),
+        "N_CHOICES": len(changes.choices),
+        "N_FAMILIES": len(changes.families),
+        "CHANGED_CLOCK": changes.clock,
+        "N_SPARE": changes.n_kinds,
+        "SPARE_OP": changes.spare,
+        "SPARE_OPS": changes.most,
+        "HAPTIC_TICKS": resolved.system.timeline.clocks[0].longest,
         "START_FIRST": resolved.start[0],
         "START_LAST": resolved.start[1],
     }
@@ -123,37 +136,65 @@ def _scene(
             "/* The data of the scene, as Python has resolved it. */",
             *(f"#define {name} {value}" for name, value in sizes.items()),
             f"#define START_SETTERS(s) {setters}",
+            f"#define ALTERNATIVES(s) {'(s)->alternatives' if changes.choices else '((Hold **)0)'}",
             "#define MEMBERS(X) " + " ".join(
                 f"X({ids[fmu]}, {json.dumps(fmu)}, {json.dumps(guids[fmu])})" for fmu in members
             ),
             data.structure,
             f"static const Scene initial = {data.values};",
-            _table("struct { size_t at, to; } pointers", (
+            table("struct { size_t at, to; } pointers", (
                 f"{{{_at(a)}, {_at(b)}}}" for a, b in data.pointers)),
-            _table("struct { size_t at; int member; } handles", (
+            table("struct { size_t at; int member; } handles", (
                 f"{{{_at(a)}, {member}}}" for a, member in data.handles)),
-            _table("struct { size_t at; int member, function; } calls", (
+            table("struct { size_t at; int member, function; } calls", (
                 f"{{{_at(a)}, {member}, {FUNCTIONS[name]}}}" for a, member, name in data.calls)),
-            _table("size_t slots", (_at(place) for place, _ in data.slots)),
-            _table("int slot_members", map(str, slot_members)),
-            _table("int member_fmus", (str(resolved.fmus.index(fmu)) for fmu in members)),
-            _table("int fmu_members", (str(members.index(fmu)) for fmu in resolved.fmus)),
-            _table("int member_tables", (
+            table("size_t slots", (_at(place) for place, _ in data.slots)),
+            table("int slot_members", map(str, slot_members)),
+            table("int member_fmus", (str(resolved.fmus.index(fmu)) for fmu in members)),
+            table("int fmu_members", (str(members.index(fmu)) for fmu in resolved.fmus)),
+            table("int member_tables", (
                 str(resolved.tables.index(resolved.system.fmu[fmu].clock)) for fmu in members)),
-            _table("int start_fmus", map(str, resolved.start_fmus)),
-            _table("Pattern patterns", (f"{{{p.n}, {p.ticks}}}" for p in resolved.patterns)),
-            _table("Latency latencies", latencies),
-            _table("char *const holds", map(json.dumps, resolved.holds)),
-            _table("char *const signals", map(json.dumps, names)),
-            _table("double bounds", (number(s.bound or 0.0) for s in outputs)),
-            _table("double nominals", (
+            table("int start_fmus", map(str, resolved.start_fmus)),
+            table("Pattern patterns", (f"{{{p.n}, {p.ticks}}}" for p in resolved.patterns)),
+            table("Latency latencies", latencies),
+            table("char *const holds", map(json.dumps, resolved.holds)),
+            table("char *const signals", map(json.dumps, names)),
+            table("double bounds", (number(s.bound or 0.0) for s in outputs)),
+            table("double nominals", (
                 "INFINITY" if none else number(s.nominal)
                 for s, none in zip(outputs, unbounded, strict=True))),
-            _table("Variable variables", map(_variable, ports)),
-            _table("double starts", (number(p.start or 0.0) for p in settable)),
+            *_changes(resolved, regions),
+            table("Variable variables", map(_variable, ports)),
+            table("double starts", (number(p.start or 0.0) for p in settable)),
             "",
         ]
     )  # fmt: skip
+
+
+def _changes(resolved: Resolved, regions: Regions) -> Iterator[str]:
+    """The tables of what a program can be changed to."""
+    system, changes, places, choices = resolved.system, resolved.changes, [], []
+    clocks = [clock.name for clock in system.timeline.clocks]
+    for i, choice in enumerate(changes.choices):
+        own = re.compile(rf"alternative_{i}(_|$)")
+        found = [region.name for region in regions.all if own.match(region.name)]
+        hold = resolved.holds.index(choice.connection)
+        choices.append(f"{{{hold}, {len(places)}, {len(found)}}}")
+        places += [f"{{{_at(name)}, sizeof(((Scene *)0)->{name})}}" for name in found]
+    yield table("struct { int hold, first, n; } choices", choices)
+    yield table("struct { size_t at, size; } choice_regions", places)
+    held = [system.connection[name] for name in resolved.holds]
+    yield table("int hold_clocks", (str(clocks.index(system.fmu[c.source].clock)) for c in held))
+    yield table("int own_latency", (str(int(c.latency is not None)) for c in held))
+    slopes = [slope for family in changes.families for slope in family.slopes]
+    first, families = 0, []
+    for family in changes.families:
+        key = ", ".join(map(str, family.key))
+        families.append(f"{{{family.first}, {family.n}, {family.dticks}, {first}, {{{key}}}}}")
+        first += family.n
+    yield table("Family families", families)
+    yield table("struct { int64_t b, c, d; double x; } slopes", (
+        f"{{{int(b)}, {int(c)}, {int(d)}, {number(x)}}}" for b, c, d, x in slopes))  # fmt: skip
 
 
 def _component(instance: InProcess) -> int:
@@ -169,7 +210,7 @@ def _at(place: str) -> str:
     return f"offsetof(Scene, {place})"
 
 
-def _table(declared: str, entries: Iterable[str]) -> str:
+def table(declared: str, entries: Iterable[str]) -> str:
     """A C array with an additional entry of zeros at its end, since a C array must not be empty."""
     rows = [f"    {entry}," for entry in entries]
     zero = "{0}" if any(row.endswith("},") for row in rows) else "0"

@@ -26,6 +26,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # After the settings above, which are read when NumPy is imported.
 from tests.shared_fixtures import (  # noqa: E402, F401
     bar,
+    fmus_unpacked_once,
     loop,
     own_temporary_folder,
     stamped,

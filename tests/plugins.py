@@ -5,22 +5,27 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from functools import cache as once
 from pathlib import Path
 
-RUNNER = """
+SERVER = """
 import json, os, shlex, sys
-# Once for all.
+# Once for all commands of the tests.
 import hapticlink.orchestrator.experiment, hapticlink.visualization.figures.run_figures
 from hapticlink.commands import main
-for line in json.load(sys.stdin):
-    with open("said", "w+") as said:
-        child = os.fork()
-        if not child:
-            os.dup2(said.fileno(), 1), os.dup2(said.fileno(), 2)
-            main(shlex.split(line)[1:])
-        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        said.seek(0)
-        print(json.dumps([status, said.read()]), flush=True)
+for request in map(json.loads, sys.stdin):
+    said = os.open(os.path.join(request["folder"], "said"), os.O_RDWR | os.O_CREAT | os.O_TRUNC)
+    child = os.fork()
+    if not child:
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0), os.dup2(said, 1), os.dup2(said, 2)
+        os.chdir(request["folder"])
+        os.environ.clear(), os.environ.update(request["environment"])
+        sys.path[:0] = request["path"]
+        main(shlex.split(request["line"])[1:])
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    text = os.pread(said, os.fstat(said).st_size, 0).decode()
+    os.close(said)
+    print(json.dumps([status, text]), flush=True)
 """
 
 
@@ -40,8 +45,21 @@ def hapticlink(
         environment["PYTHONPATH"] = f"{path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     if cache:
         environment["HAPTICLINK_CACHE"] = str(cache)
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", RUNNER], cwd=folder, env=environment, check=True,
-        input=json.dumps(lines), capture_output=True, text=True,
+    request = {"folder": str(folder), "environment": environment, "path": [str(path)] * bool(path)}
+    server = _server()
+    assert server.stdin
+    assert server.stdout
+    ended = []
+    for line in lines:
+        print(json.dumps(request | {"line": line}), file=server.stdin, flush=True)
+        ended.append(Ended(*json.loads(server.stdout.readline())))
+    return ended
+
+
+@once
+def _server() -> subprocess.Popen[str]:
+    """A process that has imported the package, forked for each command; it ends with this one."""
+    return subprocess.Popen(
+        [sys.executable, "-P", "-c", SERVER], env=os.environ | {"MPLBACKEND": "agg"},
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
-    return [Ended(*json.loads(line)) for line in done.stdout.splitlines()]

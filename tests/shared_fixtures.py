@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from hapticlink.commands import main
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.overrides import Options, written
@@ -31,6 +32,14 @@ def own_temporary_folder(
     monkeypatch.setenv("TMPDIR", str(folder))
     monkeypatch.setattr(tempfile, "tempdir", None)
     return folder
+
+
+@pytest.fixture(scope="module")
+def fmus_unpacked_once() -> Iterator[None]:
+    """Runs of a module of tests leave the FMUs of this project unpacked for the next one, as those
+    of a sweep do."""
+    with process_cache.unpacked_once():
+        yield
 
 
 def status(*arguments: object) -> int:

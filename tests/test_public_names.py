@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import inspect
 import os
 import pydoc
@@ -13,8 +14,7 @@ import pytest
 
 import hapticlink as hl
 from docs import make_api
-
-ROOT = Path(__file__).parent.parent
+from tests.docs.notebook import SCRIPT, notebook
 
 
 def test_names_are_there_for_people_type_checkers_and_help() -> None:
@@ -54,9 +54,8 @@ def test_the_page_is_made_from_the_docstrings_as_they_are() -> None:
 
 
 def test_the_first_steps_run(tmp_path: Path) -> None:
-    script = ROOT / "docs" / "first_steps.py"
     done = subprocess.run(
-        [sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False,
+        [sys.executable, SCRIPT], cwd=tmp_path, capture_output=True, text=True, check=False,
         env={**os.environ, "TMPDIR": str(tmp_path)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -70,3 +69,25 @@ def test_the_first_steps_run(tmp_path: Path) -> None:
         "hand.fmu", "virtual_mechanism.fmu",
     }  # fmt: skip
     assert not list(tmp_path.glob("hapticlink-*"))  # no temporary folder is left
+
+
+def test_the_first_steps_show_themselves_in_a_notebook(tmp_path: Path) -> None:
+    """Each in the cell whose value it is: verdict, mechanism and three numbers of a run, the
+    picture of a figure, the table of a comparison, a replay."""
+    pytest.importorskip("ipykernel", reason="ipykernel is not installed")
+    pytest.importorskip("nbconvert", reason="nbconvert is not installed")
+    shown = {cell["source"][-1]: cell["outputs"] for cell in notebook(tmp_path)}
+    value = {
+        last: found[-1]["data"] for last, found in shown.items() if "data" in (found or [{}])[-1]
+    }
+    run = "".join(value["r"]["text/html"])
+    assert ": done at 1 s" in "".join(shown["r"][0]["text"])
+    assert "<p><b>done at 1 s</b></p>" in run
+    assert run.count("<img ") == 1
+    assert run.count("<li>") == 3
+    for figure in ('r.figures()["distance"]', "s.figure()"):
+        assert base64.b64decode(value[figure]["image/png"]).startswith(b"\x89PNG")
+    compared = "".join(value["hl.compare(runs)"]["text/html"])
+    assert compared.count("<img ") == 1
+    assert "<td>passive</td>" in compared
+    assert "<iframe " in value['hl.view(runs["zoh"], runs["passive"])']["text/html"][0]

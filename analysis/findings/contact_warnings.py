@@ -3,7 +3,7 @@ rendered."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.contact.depth import depths, middle, overlaps
 from hapticlink.components.contact.stiffness import STABLE, poles, sticking_poles
-from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.integrators import METHODS
+from hapticlink.components.integrators.base import ContactState, Integrator
+from hapticlink.components.specs.contacts import Contacts, Pair
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 from hapticlink.orchestrator.base.loop_names import (
     CONTACT_GAP,
@@ -40,11 +42,11 @@ def lines(results: Results) -> Iterator[str]:
     if JOINT_COORDINATES in table:  # both are recorded
         yield from _deep(linkage, contacts, table)
     mechanism = scene_part(results, "mechanism", Mechanism)
-    if mechanism.integrator != "passive-midpoint" and len(table["time"]) > 1:
+    method = METHODS.get(mechanism.integrator, Integrator)  # a plugin's may not be loaded
+    if method.bounded_by and len(table["time"]) > 1:
         rate = record.fmus[CONTACT_GAP.partition(".")[0]].rate
         step_s = record.clocks[rate].longest / mechanism.substeps
-        implicit = mechanism.integrator == "linearly-implicit"
-        yield from _stiff(linkage, contacts, step_s, implicit)
+        yield from _stiff(linkage, contacts, step_s, method.bounded_by)
 
 
 def _unrendered(results: Results, table: Table) -> Iterator[str]:
@@ -64,14 +66,14 @@ def _unrendered(results: Results, table: Table) -> Iterator[str]:
 def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
     most = {pair: middle(linkage, contacts, pair) for pair in near(linkage, contacts)}
     time, q = table["time"], table[JOINT_COORDINATES]
-    found = [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
+    depths_by_pair = [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
     deep = np.flatnonzero(table[CONTACT_GAP] < -min(most.values()))
     if len(deep):
         chosen = deep[np.linspace(0, len(deep) - 1, min(len(deep), ROWS)).astype(int)]
-        found += [(*item, time[chosen]) for item in depths(linkage, contacts, q[chosen])]
-    if not found:
+        depths_by_pair += [(*item, time[chosen]) for item in depths(linkage, contacts, q[chosen])]
+    if not depths_by_pair:
         return
-    pair, depth, times = max(found, key=lambda item: float(item[1].max()) - most[item[0]])
+    pair, depth, times = max(depths_by_pair, key=lambda item: float(item[1].max()) - most[item[0]])
     if (worst := float(depth.max())) > most[pair]:
         yield (
             f"warning: at {times[depth.argmax()]:.4g} s {pair.body} is {short(worst * 1e3)} mm "
@@ -81,16 +83,19 @@ def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
         )
 
 
-def _stiff(linkage: Linkage, contacts: Contacts, step_s: float, implicit: bool) -> Iterator[str]:
-    pushing = () if implicit else poles(linkage, contacts)
-    sticking = sticking_poles(linkage, contacts, step_s)
-    kinds = (
-        (pushing, "", "damping or stiffness", "linearly-implicit"),
-        (sticking, " that stick", "stiffness", "passive-midpoint"),
+def _stiff(
+    linkage: Linkage, contacts: Contacts, step_s: float, bounded_by: Collection[ContactState]
+) -> Iterator[str]:
+    pushing = poles(linkage, contacts) if "pushing" in bounded_by else ()
+    sticking = sticking_poles(linkage, contacts, step_s) if "sticking" in bounded_by else ()
+    states: tuple[tuple[ContactState, Iterable[tuple[Pair, float]], str, str], ...] = (
+        ("pushing", pushing, "", "damping or stiffness"),
+        ("sticking", sticking, " that stick", "stiffness"),
     )
-    for found, which, less, method in kinds:
-        pair, pole = max(found, key=lambda item: item[1], default=(None, 0.0))
+    for state, pair_poles, which, less in states:
+        pair, pole = max(pair_poles, key=lambda item: item[1], default=(None, 0.0))
         if pair and pole * step_s > STABLE:
+            method = next(n for n, each in METHODS.items() if state not in each.bounded_by)
             yield (
                 f"warning: contacts of {pair.body} with {pair.obstacle}{which} have a pole at "
                 f"{pole:.3g} 1/s, too fast for steps of {step_s:.3g} s: take a smaller "

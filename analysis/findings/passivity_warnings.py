@@ -1,5 +1,5 @@
-"""Warnings of what takes the bound from a passivity controller or from `pspm`, which count the
-energy of a force over the motion that follows its sample."""
+"""Warnings of what takes the bound from holds, energy tanks and passivity controllers, which count
+the energy of a force over the motion that follows its sample."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from hapticlink.orchestrator.base.loop_names import (
     CONTROLLER,
     MEASURED_HANDLE_POSE,
     PASSIVITY_DAMPING,
+    PASSIVITY_ENERGY,
     block_of_user,
     signal_of_user,
     user_of_block,
@@ -25,8 +26,10 @@ from hapticlink.orchestrator.results.tables import Results
 
 def lines(results: Results) -> Iterator[str]:
     """A line for each late force and pose of a passivity controller or of `pspm`, for motors at
-    their limit beside a passivity controller, and for one that damps counts of encoders."""
+    their limit beside a passivity controller, for one that damps counts of encoders, and for energy
+    that was generated outside the premises."""
     record = results.record
+    yield from _outside(results)
     late = {name: age.max for name, age in record.delays.items() if age.max > 0.0}
     guarded = _guarded(record.scene)
     for name, age in late.items():
@@ -53,6 +56,57 @@ def lines(results: Results) -> Iterator[str]:
     if record.scene["sensing"] == "encoders":
         yield from _counts(results)
     yield from _set_positions(results, late)
+
+
+MATTERS = 0.05
+"""Energy, as a share of what the hands put in, from which steps outside the premises matter."""
+LEAST_J = 1e-6
+
+
+def _outside(results: Results) -> Iterator[str]:
+    """A line for each hold, tank and passivity controller that gave more energy than its theorem
+    allows, where that matters beside what the hands put in."""
+    record = results.record
+    put_in = sum(
+        max(energy.ideal, 0.0)
+        for name, energy in record.meters.items()
+        if user_of_block(_fmus(name)[0], CONTROLLER) is None
+    )
+    matters = MATTERS * put_in + LEAST_J
+    shared = {*map(_fmus, (name for name, J in record.overdrawn.items() if J > 0.0))}
+    counted = {
+        name: f"{short(100 * p.outside / p.steps)} % of the steps were not as it foresees, in "
+        f"which {short(1e3 * p.at_stake)} mJ were at stake"
+        for name, p in record.premises.items()
+        if p.outside
+    }
+    for name, J in record.overdrawn.items():
+        if matters < J:
+            back = [said for n, said in counted.items() if _fmus(n)[::-1] == _fmus(name)]
+            yield (
+                f"warning: pspm of {name} was overdrawn by {short(1e3 * J)} mJ, where hands put in "
+                f"{short(1e3 * put_in)} mJ: {'; '.join(back) or 'sampling gave them'}; take a "
+                "higher rate, or weaker gains of the coupling"
+            )
+    for name, said in counted.items():
+        generated = record.meters[name].peak if name in record.meters else 0.0
+        if (
+            min(generated, record.premises[name].at_stake) > matters
+            and _fmus(name)[::-1] not in shared
+        ):
+            yield (
+                f"warning: {record.holds[name]} of {name} generated {short(1e3 * generated)} mJ, "
+                f"where hands put in {short(1e3 * put_in)} mJ: {said}; take a higher rate"
+            )
+    for user in _laws(record.scene):
+        table = of_block(results, left := signal_of_user(PASSIVITY_ENERGY, user))
+        if table and len(table["time"]) and -(least := float(table[left].min())) > matters:
+            yield (
+                f"warning: the motors of {block_of_user(CONTROLLER, user)} gave "
+                f"{short(-1e3 * least)} mJ beyond the budget of its passivity controller, where "
+                f"hands put in {short(1e3 * put_in)} mJ: its damping is at its limit, or acts on "
+                "motion above its noise alone; take a higher rate, or weaker gains"
+            )
 
 
 def _guarded(scene: Mapping[str, Any]) -> list[str]:
@@ -93,7 +147,8 @@ def _counts(results: Results) -> Iterator[str]:
             yield (
                 f"warning: {key}.passivity.noise is {law.noise:g} J, and one count of an encoder "
                 f"in a period {short(count)} J: the passivity controller damps counts, which give "
-                f"no energy; take {key}.passivity.noise={1.1 * count:.2g}"
+                f"no energy; fewer of them, and with a looser bound, from {key}.passivity.noise="
+                f"{1.1 * count:.2g}"
             )
 
 

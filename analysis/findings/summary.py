@@ -36,8 +36,8 @@ from hapticlink.orchestrator.base.loop_names import (
     user_of_block,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.run_record import RunRecord, StepErrors
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors
+from hapticlink.orchestrator.results.tables import TABLES, Results
 from hapticlink.orchestrator.scene.start_pose import outside
 from hapticlink.orchestrator.system.system import Replacement
 
@@ -47,12 +47,44 @@ def ending(results: Results) -> str:
     end = results.record.end
     if end.time is None:
         return "not ended: it is still running, or its process was killed"
-    how = {
-        "stop_when": f"ended by {results.record.stop_when}",
-        "terminated": f"ended: {end.asked},",
-        "duration": "done",
-    }
+    if end.reason == "stop_when":
+        return f"{stopped_by(results.record.stop_when)} at {end.time:.6g} s"
+    how = {"terminated": f"ended: {end.asked},", "duration": "done"}
     return f"{how.get(end.reason, end.reason)} at {end.time:.6g} s"
+
+
+def stopped_by(condition: str) -> str:
+    """What the condition means that ended a run, in words where it is that of a device."""
+    signal, _, limit = condition.partition(" < ")
+    device, _, port = signal.partition(".")
+    if port != WORKSPACE_MARGIN.partition(".")[2] or not limit or float(limit):
+        return f"ended by {condition}"
+    user = user_of_block(device, DEVICE)
+    return f"the device{f' of {user}' if user else ''} left its workspace"
+
+
+def warnings(results: Results) -> Sequence[str]:
+    """The lines on warnings as they are recorded; computed where no row is in the folder, or too
+    many to be read back."""
+    recorded = results.record.warnings
+    return [*lines(results)] if recorded is None else recorded
+
+
+def told(results: Results, name: str) -> Iterator[str]:
+    """The lines that `hapticlink run` and `print` show of a run: how it ended, its numbers,
+    warnings, time and files."""
+    yield f"{name}: {ending(results)}"
+    recorded = warnings(results)
+    doubtful = [line for line in recorded if line.startswith("warning: ")]
+    for line in (*doubtful, *numbers(results), *(r for r in recorded if r not in doubtful)):
+        yield f"  {line}"
+    record = results.record
+    if record.timings.run and record.end.time:  # a signal may come before the first event
+        speed = record.end.time / record.timings.run
+        yield f"  {record.timings.run:.2f} s of run time, {speed:.1f} times real time"
+    if results.folder:
+        files = sorted(record.files, key=lambda name: not name.endswith(TABLES))
+        yield f"  {results.folder}/: {', '.join(files)}"
 
 
 def numbers(results: Results) -> Iterator[str]:
@@ -69,11 +101,7 @@ def numbers(results: Results) -> Iterator[str]:
         yield f"largest forces: {'; '.join(peaks)}"
         yield from _saturated(results)
     if port := results.record.user_port:
-        yield (
-            f"energy at the user's port beyond what the hand put in: at most "
-            f"{short(1e3 * port.peak)} mJ at {port.time_of_peak:.3g} s, "
-            f"{short(1e3 * port.generated)} mJ at the end"
-        )
+        yield _energy(port)
     for name, energy in results.record.across.items():
         if max(energy.peak, abs(energy.generated)) >= SMALLEST_J:
             yield (
@@ -93,6 +121,17 @@ def _tracking(user: str, error: TrackingError) -> str:
     return (
         f"handle at most {short(error.max_mm)} mm from the operational point, "
         f"{short(error.rms_mm)} mm RMS; turned from it by at most {short(error.max_rad)} rad"
+    )
+
+
+def _energy(port: PortEnergy) -> str:
+    """A line on the energy at the user's port, beside the work of the hands."""
+    hands = [1e3 * work for name, work in port.works.items() if name.endswith("hand")]
+    put_in = f"the hand put in {short(sum(hands))} mJ, " if hands else ""
+    return (
+        f"energy at the user's port: {put_in}the rendering generated at most "
+        f"{short(1e3 * port.peak)} mJ, at {port.time_of_peak:.3g} s, {short(1e3 * port.generated)} "
+        "mJ at the end (a passive one at most 0)"
     )
 
 
@@ -180,9 +219,10 @@ def _stopped(results: Results) -> Iterator[str]:
     its energy between steps."""
     table = of_block(results, MECHANISM_STOPS)
     if table and (results.record.scene["contacts"] or {}).get("detection") == "graphics":
+        method = results.record.scene["mechanism"]["integrator"]
         yield (
-            "passive-midpoint makes no energy within a step, but each new frame of contacts may "
-            "change it: take contacts.detection = 'haptics'"
+            f"{method} makes no energy within a step, but each new frame of contacts may change "
+            "it: take contacts.detection = 'haptics'"
         )
     if table and len(table["time"]) and (stops := int(table[MECHANISM_STOPS][-1])):
         yield (
@@ -275,9 +315,11 @@ def _percent(how: str, share: float) -> str:
 
 
 def replaced(replacements: Mapping[str, Replacement]) -> Iterator[str]:
-    """Lines for the ports that FMUs in the place of blocks lack, and for their inputs that nothing
-    feeds."""
+    """Lines for the ports that FMUs in the place of blocks call otherwise or lack, and for their
+    inputs that nothing feeds."""
     for name, replacement in replacements.items():
+        for port, own in replacement.mapped.items():
+            yield f"{name}: {port} is what the FMU calls {', '.join(own)}"
         if lost := replacement.lost:
             yield f"{name} has no ports for {len(lost)} connections: {', '.join(lost)}"
         if unfed := replacement.unfed:
@@ -303,23 +345,34 @@ def _start(results: Results) -> Iterator[str]:
 
 
 def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
-    """A line if assembly moved joints far from their start in [linkage]; q are the assembled joint
-    coordinates."""
-    if far := list(_far(linkage, q)):
-        yield f"warning: the loops do not close at the given start; assembly moved {', '.join(far)}"
-
-
-def _far(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
-    coordinates = iter(q)
+    """A line with both poses if assembly moved joints far from their start in [linkage]; q are the
+    assembled joint coordinates."""
+    starts = linkage["start"]
+    given = {name: np.atleast_1d(start).tolist() for name, start in starts.items()}
+    poses, far, coordinates = {}, [], iter(q)
     for joint in linkage["joint"]:
-        units = COORDINATE_UNITS[joint["type"]]
-        assembled = list(islice(coordinates, len(units)))
-        if joint["name"] not in linkage["start"]:
-            continue
-        given = np.atleast_1d(linkage["start"][joint["name"]]).tolist()
-        for start, value, unit in zip(given, assembled, units, strict=True):
+        name, units = joint["name"], COORDINATE_UNITS[joint["type"]]
+        poses[name] = list(islice(coordinates, len(units)))
+        for start, value, unit in zip(given.get(name, ()), poses[name], units, strict=False):
             if abs(value - start) > SMALLEST_MOVE[unit]:
-                yield f"{joint['name']} from {start:.6g} to {value:.6g} {unit}"
+                far.append(f"{name} by {_turn(value - start, unit)}")
+    if far:
+        yield (
+            f"warning: the loops do not close at the given start; assembly moved {', '.join(far)}. "
+            f"Given: {_pose(given)}. Assembled: {_pose({name: poses[name] for name in given})}"
+        )
+
+
+def _turn(change: float, unit: str) -> str:
+    return f"{np.degrees(change):.3g} degrees" if unit == "rad" else f"{1e3 * change:.3g} mm"
+
+
+def _pose(coordinates: Mapping[str, Sequence[float]]) -> str:
+    """As `linkage.start` is written."""
+    values = {name: [f"{v:.6g}" for v in value] for name, value in coordinates.items()}
+    texts = (v[0] if len(v) == 1 else f"[{', '.join(v)}]" for v in values.values())
+    pairs = zip(values, texts, strict=True)
+    return f"linkage.start = {{ {', '.join(f'{name} = {text}' for name, text in pairs)} }}"
 
 
 SMALLEST_MOVE = {"rad": 0.1, "m": 0.01}

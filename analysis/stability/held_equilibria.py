@@ -1,14 +1,5 @@
 """A scene at its equilibrium in a pose, in a hand: its linearised period under changed gains and in
-other hands, and its compliance.
-
-With the hand cut off (port_response.py), the poses x of the handle at the N haptic
-periods T of a hyperperiod answer to its stacked wrenches u by z' = A z + B u, x = C z + D u. The
-wrench n exp(i w kT), held over each period, moves it at w by
-
-    z = (exp(i w NT) - A)^-1 B W n,   X n = W' (C z + D W n),   W_k = exp(i w kT)/sqrt(N)
-
-the sum over a hyperperiod first: where exp(i w NT) is 1, as the z of a neutral mode is, responses
-to single wrenches leave few digits. X is the compliance (3, 3).
+other hands, and its compliance with the hand cut off (port_response.py).
 """
 
 from __future__ import annotations
@@ -24,6 +15,7 @@ from hapticlink.analysis.stability.equilibrium import newton_step, rests, unrest
 from hapticlink.analysis.stability.gains import Gains, Scales
 from hapticlink.analysis.stability.hand_slopes import HandSlopes, hand_slopes
 from hapticlink.analysis.stability.hands import FIRM, LEVER, spring_hand
+from hapticlink.analysis.stability.kinds import DRIFT, kind
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod, linear_period
 from hapticlink.analysis.stability.linearisable_scene import linearisable
@@ -52,6 +44,11 @@ STEPS, POINTS = 12, 6
 """Newton steps to the equilibrium with the slopes of one point, and points."""
 SURE = 0.01
 """Uncertainty of an eigenvalue below which it may count as 1."""
+
+
+def _felt(mode: Mode) -> bool:
+    """Whether a mode that grows is more than a drift."""
+    return kind(mode.growth, mode.omega / (2 * np.pi), DRIFT) != "drift"
 
 
 class Held:
@@ -86,15 +83,18 @@ class Held:
         return modes(self.period(scales).held(hands).linear, self.map.period)
 
     def stable(self, scales: Scales, hand: float) -> bool:
-        """Whether no mode grows, neutral ones aside, with gains scaled by `scales` in a spring hand
-        of the stiffness `hand` (N/m)."""
+        """Whether no mode grows, neutral ones and slow drift aside, with gains scaled by `scales`
+        in a spring hand of the stiffness `hand` (N/m)."""
         try:
-            found = self.modes(scales, {HAND: hand_slopes(spring_hand(hand), self.T)})
+            period = self.period(scales).held({HAND: hand_slopes(spring_hand(hand), self.T)})
+            found = modes(period.linear, self.map.period)
         except (FmuFault, InputFault):  # diverges at once
             return False
         # An error as large as z says nothing of z = 1.
         counted = [mode for mode in found if not (mode.neutral and mode.uncertainty < SURE)]
-        return bool(counted) and counted[0].growth <= 0.0
+        return bool(counted) and not any(
+            mode.growth > 0.0 and _felt(period.traced(mode)) for mode in counted
+        )
 
     def signal(self, port: str) -> Matrix:
         """The values of an output `fmu.port` at the `equilibrium`; none without such an output."""
@@ -115,11 +115,7 @@ class Held:
         except FmuFault as fault:
             raise InputFault(str(fault)) from None
         found = response(self.map, at, hand_port(self.map.system))
-        N, wT = found.forces // found.m, 2 * np.pi * hertz * self.T
-        W = np.kron(np.exp(1j * wT * np.arange(N))[:, None], np.eye(found.m)) / np.sqrt(N)
-        left = np.exp(1j * wT * N) * np.eye(len(found.A)) - found.A
-        X: Complex = W.conj().T @ (found.C @ np.linalg.solve(left, found.B @ W) + found.D @ W)
-        return X
+        return found.compliance(hertz, self.T)
 
     def period(self, scales: Scales) -> LinearPeriod:
         """The period at the equilibrium with these gains, searched from `equilibrium`, so that the

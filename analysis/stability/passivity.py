@@ -25,7 +25,7 @@ harmonic with the others let go, and from above by scales for them (absolute_sta
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -151,6 +151,12 @@ def of(
     curve = [pair for angle in angles for pair in port.curve(angle)]
     frequency, at_least = max(curve, key=lambda pair: pair[1])
     own, sufficient = zip(*map(port.own_and_sufficient, angles), strict=True)
+    if frequency == hertz(angles[0], 0, port.N, map_.period):
+        at_least = at_zero(lambda angle: port.necessary(angle)[0], angles[0])
+        frequency = 0.0
+        curve.append((frequency, at_least))
+    if sufficient[0] == max(sufficient) > -np.inf:
+        sufficient = (at_zero(lambda a: port.own_and_sufficient(a)[1], angles[0]), *sufficient)
     needed = max(at_least, *sufficient)
     return Passivity(
         title=title,
@@ -162,6 +168,13 @@ def of(
         curve=tuple(sorted(curve)),
         two_port=_between(map_, linear, hand, mechanism, port, angles) if mechanism else None,
     )
+
+
+def at_zero(shortage: Callable[[float], float], angle: float) -> float:
+    """The limit of a damping shortage at the angle 0, of which it is an even function, from that at
+    the least `angle` of a grid and twice as far; not below the first of them."""
+    near, far = shortage(angle), shortage(2 * angle)
+    return near + max(0.0, (near - far) / 3)
 
 
 class _UserPort:

@@ -134,6 +134,22 @@ class Response:
         after = np.concatenate([x[self.m :], turn * x[: self.m]])
         return np.concatenate([after - x, y[k:]])
 
+    def compliance(self, hertz: float, T: float) -> Complex:
+        """The compliance (m, m) of the handle at a frequency, in scene units (m/N): the wrench
+        n exp(i w kT), held over each haptic period T (s), moves it at w by
+
+            z = (exp(i w NT) - A)^-1 B W n,   X n = W' (C z + D W n),   W_k = exp(i w kT)/sqrt(N)
+
+        the sum over a hyperperiod first: where exp(i w NT) is 1, as the z of a neutral mode is,
+        responses to single wrenches leave few digits."""
+        N, wT = self.forces // self.m, 2 * np.pi * hertz * T
+        W = np.kron(np.exp(1j * wT * np.arange(N))[:, None], np.eye(self.m)) / np.sqrt(N)
+        left = np.exp(1j * wT * N) * np.eye(len(self.A)) - self.A
+        k = self.forces
+        B, C, D = self.B[:, :k], self.C[:k], self.D[:k, :k]
+        X: Complex = W.conj().T @ (C @ np.linalg.solve(left, B @ W) + D @ W)
+        return X
+
     @property
     def radius(self) -> float:
         """The spectral radius with the hand gone and the mechanism held."""

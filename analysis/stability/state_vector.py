@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Container, Iterator
 from copy import copy, deepcopy
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.holds import Hold
+from hapticlink.orchestrator.holds.energy_tank import NearEnd
 from hapticlink.orchestrator.holds.history import History
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.latency import Link
@@ -226,7 +228,9 @@ def _copied(path: str, value: Vector) -> Vector:
 
 def _mapped(value: Any, path: str, visit: Visit) -> Any:
     """A copy of nested containers and of the parts of holds, with `visit` applied to every number
-    that is a float; functions and shared tanks stay as they are."""
+    that is a float; what cannot change, functions and shared tanks stay as they are."""
+    if isinstance(value, int | str | NoneType | NearEnd):
+        return value
     match value:
         case np.ndarray() if value.dtype.kind == "f":
             return visit(path, value)

@@ -100,8 +100,16 @@ class TwoPort:
 
 def between(necessary: float, sufficient: float) -> str:
     """A damping, or both bounds of it where they differ."""
-    least, most = f"{necessary:.5g}", f"{sufficient:.5g}"
-    return most if least == most else f"{least} to {most}"
+    least, most = rounded_up(necessary), rounded_up(sufficient)
+    return most if least == most else f"{necessary:.5g} to {most}"
+
+
+def rounded_up(damping: float) -> str:
+    """A damping in 5 digits, none of which is on the unsafe side."""
+    if not 0.0 < damping < np.inf:
+        return f"{damping:.5g}"
+    digits = 4 - int(np.floor(np.log10(damping)))
+    return f"{float(np.ceil(damping * 10.0**digits * (1.0 - 1e-9)) / 10.0**digits):.5g}"
 
 
 def judged(

@@ -119,10 +119,13 @@ def _finished(
         yield from cluster.on_cluster(partial(work, measure=measure), jobs, scheduler)
         return
     running = folder / ".running"
-    shutil.rmtree(running, ignore_errors=True)  # left by a sweep that was killed
+    clear = partial(shutil.rmtree, running, ignore_errors=True)
+    clear()  # left by a sweep that was killed
     running.mkdir(parents=True)
+    interrupt.add(clear)
     try:
         of_job = partial(work, folder=running, measure=measure)
         yield from pool.in_processes(of_job, jobs, processes)
     finally:
-        shutil.rmtree(running, ignore_errors=True)
+        interrupt.remove(clear)
+        clear()

@@ -17,6 +17,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing import util
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.process import BaseProcess
 from types import ModuleType
@@ -92,13 +93,14 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
         for process in set(multiprocessing.active_children()) - before:
             process.kill()
             process.join(1.0)
+        util._run_finalizers(0)  # type: ignore[attr-defined]  # its semaphores, else warned of
 
+    interrupt.add(kill)
     context = SpawnContext()  # FMUs hold threads and libraries: no fork
     context.Process = _Worker  # type: ignore[misc]
     pool = ProcessPoolExecutor(
         count, mp_context=context, initializer=_follow, max_tasks_per_child=RUNS
     )
-    interrupt.add(kill)
     try:
         yield pool
     except BaseException:

@@ -57,7 +57,7 @@ class Feel:
         if not found:
             raise InputFault(
                 "no direction of the handle is constrained, and nothing touches: no stiffness to "
-                "tune"
+                "tune; take a linkage with loops or fewer joints, or [contacts]"
             )
         return cls(place, found)
 

@@ -3,7 +3,8 @@
 A projector on the constrained directions that is held is stale while the mechanism moves, which a
 linearisation at rest cannot show: gains that stiffen a constraint can throw the handle off. So the
 handle may leave the operational point by at most TRACKED times as far as with the scene's own
-gains, scaled to the margin where they lack it.
+gains, scaled to the margin where they lack it, and the user's port may give at most TRACKED times
+as much energy, or LEAST_J.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.tables import Results
 
 TRACKED = 1.2
+LEAST_J = 1e-3
+"""Energy (J) at the user's port that any gains may give: what moves the handle at 8 cm/s."""
 
 
 def motion(run: Results, end: float = 0.0) -> dict[str, float]:
@@ -35,7 +38,9 @@ class RunLimit:
 
     def __init__(self, run: Results) -> None:
         self._end = Measures(run).tracking[""].end_s
-        self._distance = TRACKED * motion(run)["distance"]
+        own = motion(run)
+        self._distance = TRACKED * own["distance"]
+        self._energy = max(TRACKED * own["energy_peak"], LEAST_J)
         if not np.isfinite(self._distance):
             raise InputFault(f"the scene's own run fails: {run.record.fault}")
 
@@ -46,5 +51,10 @@ class RunLimit:
         if not moved["distance"] <= self._distance:
             raise InputFault(
                 f"the run: the handle may leave its point by {1e3 * self._distance:.3g} mm"
+            )
+        if moved["energy_peak"] > self._energy:
+            raise InputFault(
+                f"the run: the user's port may give {1e3 * self._energy:.3g} mJ and gives "
+                f"{1e3 * moved['energy_peak']:.3g}"
             )
         return moved

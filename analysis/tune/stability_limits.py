@@ -49,5 +49,10 @@ class Judge:
                 try:
                     found = largest(partial(self._stable, place, scales), fine)
                 except InputFault:
-                    raise InputFault(f"unstable with any gains in the pose at {place[0]}") from None
+                    raise InputFault(
+                        f"unstable with any gains in the pose at {place[0]}, in a hand of "
+                        f"{place[1]:g} N/m: take a higher graphics.rate or haptics.rate, more "
+                        "damping of the controller, or a shorter duration, which does not come "
+                        "there"
+                    ) from None
         return found

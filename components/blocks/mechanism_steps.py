@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from functools import cached_property
 
 import casadi as ca
@@ -28,6 +29,13 @@ from hapticlink.components.time_signals import TimeSignal
 
 DEFLECTIONS = ("deflection", "contact_deflection")
 """The states of friction: of joints, and of contacts."""
+
+MANY, MOST = 250_000, 5_000_000
+"""Operations of a step from which on the build takes minutes, and those that no build may have: 87
+bytes each in a Python FMU, which may have 1 GiB when it is unpacked."""
+EVALUATIONS = 6
+"""Evaluations of the equations of motion to which a step of a method comes, its event functions and
+Jacobian counted in these: 5.0 to 6.6 with one to four boxes in an enclosure, 8.4 with friction."""
 
 _ONCE = {"cse": True}
 
@@ -92,7 +100,30 @@ class MechanismSteps(MechanicalSystem):
             closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
         qdd = self._space.solver.follow(efforts, closing, refined=method.extrapolates)
         ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], _ONCE)
+        if touching:
+            self._require_buildable(ode.n_instructions(), len(touching.sides))
         return self.projected(integrators.step(method, ode, x, self.u, p, t, self.h, range(self.n)))
+
+    def _require_buildable(self, operations: int, places: int) -> None:
+        """operations: of the equations of motion. Logs a step that comes to MANY operations, before
+        it is built. Raises ValueError for more than MOST."""
+        steps, bodies = 2 * self._mechanism.events + 1, self._model.linkage.body
+        about = EVALUATIONS * steps * operations
+        if about < MANY:
+            return
+        message = (
+            f"{len(bodies)} bodies with {places} places where contacts and joint limits push: "
+            f"{operations:,} operations for their accelerations, about {about:,} for a step "
+            f"with `mechanism.integrator` = '{self._mechanism.integrator}' and "
+            f"`mechanism.events` = {self._mechanism.events} ({steps} steps in one)"
+        )
+        remedy = (
+            "fewer: `mechanism.events` = 0, `contacts.bodies` = 'none', no `contacts.friction`, "
+            "bodies with fewer corners or a `radius` alone"
+        )
+        if about > MOST:
+            raise ValueError(f"{message}, more than {MOST:,}; {remedy}")
+        logging.getLogger(__name__).warning("%s, which takes minutes to build; %s", message, remedy)
 
     def projected(self, x: ca.SX) -> ca.SX:
         if self._mechanism.stabilization != "projection":

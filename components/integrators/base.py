@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:  # a scene is checked against the names of methods, and that needs no equations
     import casadi as ca
@@ -107,6 +107,9 @@ class Baumgarte:
     beta: float = 1.0
 
 
+ContactState = Literal["pushing", "sticking"]
+
+
 class Integrator(ABC):
     """An integration method; a step is a pure expression."""
 
@@ -117,6 +120,8 @@ class Integrator(ABC):
     are amplified."""
     l_stable: bool = False
     """Whether modes of any stiffness die out, so that friction does not bound the step."""
+    bounded_by: frozenset[ContactState] = frozenset({"pushing", "sticking"})
+    """The contacts whose stiffness and damping bound the step of a mechanism."""
     baumgarte: Baumgarte = Baumgarte()
     """Default gains of Baumgarte's stabilisation, by default those that suit any method
     (dynamics/stabilization.py)."""

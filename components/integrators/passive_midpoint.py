@@ -18,8 +18,10 @@ never adds to E_kin. There is no iteration: G is linear in s about qd_k,
 
     (D_m - h/2 G_s) (s - qd_k) = J_m' M (V_k - J_m qd_k) + h/2 G(qd_k) + W_m' lambda
 
-for springs, dampers, friction and contacts, G(s) = Q(q_k + h s/2, s, t + h/2). The pivots of
-D_m - h/2 G_s are at least those of D_m; they are anyway where G stiffens or dissipates.
+for springs, dampers, friction and contacts, G(s) = Q(q_k + h s/2, s, t + h/2), solved with the
+symmetric part of G_s, whose factors have pivots of at least those of D_m (they have anyway where G
+stiffens or dissipates), and once more with the other part's forces at the rates found: friction
+grows with the pressure of its contact, which does not grow with friction.
 
 What is left is of the order h^3: potentials that are not quadratic along the step, the correction
 of closures, and E_pot where J_m s is not the displacement. It is accounted for exactly by
@@ -45,6 +47,7 @@ STOPS = "steps whose energy balance left only to stop the mechanism: the step is
 
 class PassiveMidpoint(Integrator):
     order = 2
+    bounded_by = frozenset()
     counters = MappingProxyType({"stops": STOPS})
 
     def misfit(self, *, baumgarte: bool, held: bool) -> str:
@@ -89,6 +92,9 @@ def _moved(m: MechanicalSystem) -> tuple[ca.SX, ca.SX]:
     G, slope = pull(qd, x, u, p, t, h)
     A = -h / 4 * (slope + slope.T) if is_soft else none
     s = qd + midpoint(q_m, lag, h / 2 * G, A, qd, p)
+    if is_soft:
+        G += (slope - slope.T) / 2 @ (s - qd)
+        s = qd + midpoint(q_m, lag, h / 2 * G, A, qd, p)
     after = q + h * s
     rest = 2 * m.velocities(q_m, s, p) - V - m.velocities(after, s, p)
     qd = s + next_pose(after, rest, ca.SX(n, 1), none, s, p)

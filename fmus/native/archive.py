@@ -23,6 +23,8 @@ from hapticlink.fmus.native.compiler import (
 from hapticlink.fmus.native.source import component_source
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
+COMMON = Path(__file__).parent / "fmi2_common.h"
+"""What it includes."""
 
 
 def entries(
@@ -51,6 +53,7 @@ def entries(
         **files,
         "component.h": header.encode(),
         "fmi2.c": WRAPPER.read_bytes(),
+        COMMON.name: COMMON.read_bytes(),
         "compiler": json.dumps(made_by).encode(),
         "xml": model_description(
             component, "", stop_time=stop_time, step_size=step_size, needs_tool=False
@@ -64,6 +67,7 @@ def entries(
         (room / "component.h").write_bytes(head + content["component.h"])
         main = room / "fmi2.c"
         main.write_bytes(content["fmi2.c"])
+        (room / COMMON.name).write_bytes(content[COMMON.name])
         sources: Iterable[Path] = chain([main], _written(pieces, room))
         for platform in platforms:
             library = compile_library(sources if pieces else main, room / "library", platform)

@@ -39,6 +39,8 @@ SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
 _ARITHMETIC = ("-ffp-contract=off", "-fno-slp-vectorize")
 FLAGS = ("-fPIC", "-std=gnu11", "-O2", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
 LINK = ("-shared", "-s")
+WEBASSEMBLY = "wasm32-wasi"
+WEBASSEMBLY_FLAGS = ("-std=gnu11", "-Os", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
@@ -88,12 +90,21 @@ def compile_library(
     return library
 
 
+def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[str] = ()) -> bytes:
+    """A WebAssembly module of C files, which exports what has an `export_name`. It imports a few
+    functions of WASI, for files, which it does not call. Raises as `compile_library`."""
+    compiler_version()
+    return _compiled(source, folder, WEBASSEMBLY, options)
+
+
 def _compiled(
     source: Path | str | Iterable[Path], folder: Path, target: str, options: Sequence[str]
 ) -> bytes:
     own_folder = folder / target
     own_folder.mkdir()
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
+    if target == WEBASSEMBLY:
+        link = ["-mexec-model=reactor", "-s"]
     # A Mach-O file contains the path that it was written to, so this is the same everywhere.
     if isinstance(source, (Path, str)):
         inputs = [str(Path(source).resolve())]
@@ -111,7 +122,8 @@ def _compiled(
 
 
 def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *FLAGS]
+    flags = WEBASSEMBLY_FLAGS if target == WEBASSEMBLY else FLAGS
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags]
     command += [f"-I{_HEADERS}", *arguments]
     with tempfile.TemporaryDirectory(dir=folder) as local, compiler_cache() as own:
         # zig keeps its own C library in its cache, but not our code.

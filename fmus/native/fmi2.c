@@ -56,24 +56,17 @@ typedef struct {
     char name[];
 } Model;
 
+#include "fmi2_common.h"
+
 /* --- messages ------------------------------------------------------------------------------- */
 
-static fmi2Status fail(const Model *m, fmi2Status status, const char *format, ...) {
-    static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
-                                             "logStatusError", "logStatusFatal"};
-    if (!m) return fmi2Error; /* without an instance there is nobody to tell */
-    char said[1024], text[2 * sizeof said], *to_text = text;
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(said, sizeof said, format, arguments);
-    va_end(arguments);
-    for (const char *c = said; *c; *to_text++ = *c++)
-        if (*c == '%') *to_text++ = '%'; /* the logger takes a message for a format (2.1.5) */
-    *to_text = 0;
-    const fmi2CallbackFunctions *to = &m->callbacks;
-    to->logger(to->componentEnvironment, m->name, status, categories[status], text);
-    return status;
+static const char *standing(const Model *m) {
+    const long long mode = m->now.mode;
+    return mode == INSTANTIATED ? "is instantiated" : mode == INITIALIZATION ? "is in initialisation mode"
+           : mode == STEP ? "is initialised" : "is terminated";
 }
+
+static int has_ended(const Model *m) { return 0; }
 
 typedef struct { char text[32]; } Number;
 
@@ -86,23 +79,6 @@ static Number number(double value) {
         if (strtod(n.text, NULL) == value) break;
     }
     return n;
-}
-
-/* Whether `call` may not be made: without an instance, or in another mode than `allowed`. */
-static int out_of_order(const Model *m, const char *call, int allowed) {
-    const long long mode = m ? m->now.mode : 0;
-    if (mode & allowed) return 0;
-    fail(m, fmi2Error, "%s may not be called: the FMU is %s", call,
-         mode == INSTANTIATED ? "instantiated" : mode == INITIALIZATION ? "in initialisation mode"
-         : mode == STEP ? "initialised" : "terminated");
-    return 1;
-}
-
-/* Whether `call` got no instance, or a null pointer for one of two arrays of n entries. */
-static int is_null(const Model *m, const char *call, size_t n, const void *a, const void *b) {
-    if (m && (!n || (a && b))) return 0;
-    fail(m, fmi2Error, "%s got a null pointer for %zu entries", call, n);
-    return 1;
 }
 
 static int first_not_finite(const double *values, int n) {
@@ -169,9 +145,6 @@ static void restart(Model *m) {
 
 /* --- life of an instance -------------------------------------------------------------------- */
 
-const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
-const char *fmi2GetVersion(void) { return fmi2Version; }
-
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
                               fmi2Boolean logging) {
@@ -189,11 +162,6 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 }
 
 void fmi2FreeInstance(fmi2Component c) { free(c); }
-
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
-                               const fmi2String categories[]) {
-    return c ? fmi2OK : fmi2Error; /* failures are always logged; there is nothing else to say */
-}
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
                                fmi2Real start, fmi2Boolean has_stop, fmi2Real stop) {
@@ -273,17 +241,6 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
     return fmi2OK;
 }
 
-#define HAS_NO(verb, kind, type)                                                                \
-    fmi2Status fmi2##verb##kind(fmi2Component c, References vr, size_t n, type value[]) {       \
-        return c && !n ? fmi2OK : fail(c, fmi2Error, "no variable is of type " #kind);          \
-    }
-HAS_NO(Get, Integer, fmi2Integer)
-HAS_NO(Get, Boolean, fmi2Boolean)
-HAS_NO(Get, String, fmi2String)
-HAS_NO(Set, Integer, const fmi2Integer)
-HAS_NO(Set, Boolean, const fmi2Boolean)
-HAS_NO(Set, String, const fmi2String)
-
 /* --- stepping ------------------------------------------------------------------------------- */
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolean no_way_back) {
@@ -330,48 +287,6 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     return fmi2OK;
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c) {
-    return fail(c, fmi2Error, "no step is ever pending");
-}
-
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
-    if (!c || !value) return fmi2Error;
-    if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = ((Model *)c)->now.time;
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
-    if (!c || !value) return fmi2Error;
-    if (kind != fmi2Terminated) return fmi2Discard;
-    *value = fmi2False;
-    return fmi2OK;
-}
-
-#define NOT_KEPT(name, type)                                                                    \
-    fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) { return fmi2Discard; }
-NOT_KEPT(fmi2GetStatus, fmi2Status)
-NOT_KEPT(fmi2GetIntegerStatus, fmi2Integer)
-NOT_KEPT(fmi2GetStringStatus, fmi2String)
-
-/* --- derivatives, which modelDescription.xml does not promise -------------------------------- */
-
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, References vr, size_t n,
-                                       const fmi2Integer order[], const fmi2Real value[]) {
-    return fail(c, fmi2Error, "inputs are constant over a step");
-}
-
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, References vr, size_t n,
-                                        const fmi2Integer order[], fmi2Real value[]) {
-    return fail(c, fmi2Error, "there are no derivatives of outputs");
-}
-
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, References unknown, size_t n,
-                                        References known, size_t k, const fmi2Real seed[],
-                                        fmi2Real derivative[]) {
-    return fail(c, fmi2Error, "there are no directional derivatives");
-}
-
 /* --- FMU state: bytes, so that saving and serialising are the same, bit for bit -------------- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
@@ -383,13 +298,6 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     /* A plant's outputs follow from the rest, also where an importer has changed the bytes. */
     if (!SAMPLED) ((State *)*state)->output_due = 1;
     return fmi2OK;
-}
-
-/* Whether the bytes of a state are those of this FMU. */
-static int is_ours(const Model *m, const void *bytes) {
-    if (m && bytes && !memcmp(bytes, GUID, sizeof GUID)) return 1;
-    fail(m, fmi2Error, "this FMU state was not saved by this FMU");
-    return 0;
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {

@@ -24,7 +24,7 @@ def opened() -> int:
 def keep(key: int, status: int, message: bytes) -> None:
     """Keep a message of instance `key`, to be shown if a call fails."""
     own = _messages.get(key)
-    if own is not None and status > 0:
+    if own is not None and status != 0:
         text = (message or b"")[: 4 * MAX_LENGTH].decode("utf-8", "replace")
         own.append(text.strip()[:MAX_LENGTH])
 

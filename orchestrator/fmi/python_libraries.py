@@ -30,11 +30,16 @@ _kept: dict[int, ctypes.CDLL] = {}
 """By handle: a reference of our own, so that FMPy's unloading leaves the library in its place."""
 
 
+def is_python(loaded: ctypes.CDLL) -> bool:
+    """Whether a library is one of these."""
+    return hasattr(loaded, "finalizePythonInterpreter")
+
+
 def prepare(loaded: ctypes.CDLL, folder: str) -> bool:
     """Whether a library that FMPy has loaded from an FMU's `folder` holds a Python interpreter,
     which is then released when this process ends. Raises ValueError where such a library would find
     no module."""
-    if not hasattr(loaded, "finalizePythonInterpreter"):
+    if not is_python(loaded):
         return False
     if os.name == "posix":
         library = ctypes.CDLL(loaded._name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY)

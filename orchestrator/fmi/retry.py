@@ -7,6 +7,7 @@ import ctypes
 from collections.abc import Callable
 from typing import Any
 
+from hapticlink.orchestrator.fmi import python_libraries
 from hapticlink.orchestrator.fmi.capabilities import STATE, VARIABLE_STEP
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance_location import Place
@@ -17,17 +18,21 @@ HALVINGS = 10
 
 class Saved:
     """Storage for one FMU state. save and restore return the status of the call; `place` counts
-    them, and forgets which inputs the FMU has."""
+    them, and forgets which inputs the FMU has. overwrites: pythonfmu forgets a state that is saved
+    over (FMI 2.0.5 section 2.1.8 has it reused), so that it is freed before."""
 
     def __init__(self, slave: Any, fmi: str, place: Place) -> None:
         self._place = place
         state = "state" if fmi == "2" else "State"
         self._instance, self.state = ctypes.c_void_p(slave.component), ctypes.c_void_p()
         calls = (slave.dll[f"fmi{fmi}{verb}FMU{state}"] for verb in ("Get", "Set", "Free"))
-        self.get, self.set, self._free = calls
+        self.get, self.set, self.free_state = calls
+        self.overwrites = python_libraries.is_python(slave.dll)
 
     def save(self) -> int:
         self._place.saves += 1
+        if self.overwrites:
+            self.free()
         return self.get(self._instance, ctypes.byref(self.state))
 
     def restore(self) -> int:
@@ -37,7 +42,8 @@ class Saved:
 
     def free(self) -> None:
         if self.state:
-            self._free(self._instance, ctypes.byref(self.state))
+            self.free_state(self._instance, ctypes.byref(self.state))
+            self.state.value = None
 
 
 class Retry:

@@ -35,8 +35,8 @@ class EnergyTank:
     set velocity (row 1), and by the hold of the force on its far side.
 
     stiffness, damping: K and B by entry. `newest` are the newest samples (2, n), `available` is A_k
-    (J), `needed` what of it the near side may take until its next tick, `withheld` the part of F
-    that the modulation took away.
+    (J), `least` the smallest so far, at most 0 (1,), `needed` what of it the near side may take
+    until its next tick, `withheld` the part of F that the modulation took away.
     """
 
     def __init__(self, stiffness: Vector, damping: Vector, near: NearEnd) -> None:
@@ -45,6 +45,7 @@ class EnergyTank:
         self.newest, self._modulated = np.zeros((2, n)), np.zeros((2, n))
         self._x, self._force, self.withheld = np.zeros(n), np.zeros(n), np.zeros(n)
         self._tick, self.available, self.needed, self._credited = -1, 0.0, 0.0, 0.0
+        self.least = np.zeros(1)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> EnergyTank:
         """Returns the tank itself, as copied holds have to share it; whoever restores a state
@@ -72,6 +73,7 @@ class EnergyTank:
                 moved = np.zeros_like(x)
             else:
                 self.available += self._put_in(moved, seconds)
+            self.least[0] = min(self.least[0], self.available)
             needed = stored + self.near.period / 4 * total(self.damping * (velocity * velocity))
             left = max(self.available, 0.0)
             share = 1.0 if needed <= left else math.sqrt(left / needed)

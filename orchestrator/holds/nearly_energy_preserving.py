@@ -10,6 +10,8 @@ Computational Methods for Coupled Problems, 2013).
 
 from __future__ import annotations
 
+import numpy as np
+
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account, Vector, repayment
 
@@ -18,10 +20,16 @@ class NearlyEnergyPreserving(Account):
     def __init__(self, context: HoldContext) -> None:
         super().__init__(context)
         self._last = self._x
-        self._correction = self._last * 0.0
+        self._correction = self._travelled = self._last * 0.0
+
+    def outside(self, furthest: Vector, added: Vector) -> tuple[Vector, Vector]:
+        """A step against the motion of the last period, in which the correction does the opposite
+        work."""
+        beyond = (self.motion * self._travelled < 0.0) & (added > 0.0)
+        return beyond, np.where(beyond, added * np.abs(self.motion), 0.0)
 
     def correction(self, fresh: bool) -> Vector:
         if fresh:
-            travelled, self._last = self._x - self._last, self._x
-            self._correction = repayment(self.generated, travelled, self.largest)
+            self._travelled, self._last = self._x - self._last, self._x
+            self._correction = repayment(self.generated, self._travelled, self.largest)
         return self._correction

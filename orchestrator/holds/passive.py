@@ -49,6 +49,12 @@ class Passive(Account):
         super().__init__(context)
         self._last_predicted = np.zeros(context.size)
 
+    def outside(self, furthest: Vector, added: Vector) -> tuple[Vector, Vector]:
+        """(r + c) |dx| of a step that is not as predicted, (1 - beta) C |dx| of any other."""
+        way = np.abs(self.motion)
+        beyond = (self.motion * self.predicted < 0.0) | (way > furthest)
+        return beyond, np.where(beyond, self.swing + added, (1.0 / self.beta - 1.0) * added) * way
+
     def correction(self, fresh: bool) -> Vector:
         ahead = self._last_predicted
         reversed_ = self.motion * ahead < -STOPPED * (ahead * ahead)

@@ -164,10 +164,15 @@ def make_csv(path: Path) -> int:
     return count
 
 
-def write_json(path: Path, content: Mapping[str, Any], room: int = 0) -> None:
-    """Write a JSON file atomically, padded by `room` spaces that `write_over` can use."""
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a JSON file atomically."""
+    write(path, text(content))
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file atomically."""
     with atomic_file(path) as unfinished:
-        unfinished.write_bytes(_text(content) + b" " * room)
+        unfinished.write_bytes(content)
 
 
 def write_over(path: Path, *contents: Mapping[str, Any]) -> None:
@@ -175,10 +180,11 @@ def write_over(path: Path, *contents: Mapping[str, Any]) -> None:
     on a full disk, too; nothing if none fits."""
     with path.open("r+b", buffering=0) as file:
         room = os.fstat(file.fileno()).st_size
-        fitting = (text for text in map(_text, contents) if len(text) <= room)
-        if text := next(fitting, None):
-            file.write(text.ljust(room))
+        fitting = (each for each in map(text, contents) if len(each) <= room)
+        if fits := next(fitting, None):
+            file.write(fits.ljust(room))
 
 
-def _text(content: Mapping[str, Any]) -> bytes:
+def text(content: Mapping[str, Any]) -> bytes:
+    """What a JSON file has of `content`."""
     return json.dumps(content, indent=2).encode() + b"\n"

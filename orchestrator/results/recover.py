@@ -11,6 +11,7 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folder_lock, json_file, rows
 from hapticlink.orchestrator.results.files import make_csv, write_json
+from hapticlink.orchestrator.results.numbers import last_time
 from hapticlink.orchestrator.results.run_folder import RUN
 from hapticlink.orchestrator.results.tables import load
 
@@ -31,8 +32,7 @@ def recover(
     """What was recovered, by rate; run.json has it too, and a fault of this kind with this message
     where it did not say how the run ended. Raises InputFault where there is no run, where it still
     goes on (`ended`: it is known not to), and where another one writes to the folder."""
-    end = load(folder).run["end"]
-    process = None if ended or os.name != "posix" else end.get("process")
+    process = None if ended or os.name != "posix" else load(folder).record.end.process
     if process and temporary_folders.lives(process):
         raise InputFault(f"{folder}: its run goes on, in process {process}")
     with folder_lock.held(folder):
@@ -40,21 +40,20 @@ def recover(
 
 
 def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
-    run = load(folder).run
-    end = run["end"]
-    found = {}
-    for name in run["rates"]:
+    record = load(folder).record
+    recovered = {}
+    for name in record.rates:
         table = folder / f"{name}.csv"
         if (source := table.with_suffix(rows.SUFFIX)).is_file():
             lost = rows.torn(source)
             _, kept = rows.read(source)
-            found[name] = Recovered(make_csv(table), float(kept[-1, 0]), lost)
-    told: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in found.items()}}
-    if "process" in end:
-        last = next((r.time for r in found.values()), 0.0)
-        told["end"] = {"reason": "fault", "time": last}
-        told["fault"] = {"kind": kind, "time": last, "message": message}
-    if found or "process" in end:
+            recovered[name] = Recovered(make_csv(table), float(kept[-1, 0]), lost)
+    changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
+    if record.end.process is not None:
+        last = last_time(load(folder))  # its tables may be whole: an FMU may crash at its end
+        changes["end"] = {"reason": "fault", "time": last}
+        changes["fault"] = {"kind": kind, "time": last, "message": message}
+    if recovered or record.end.process is not None:
         content = json_file.read(folder / RUN)
-        write_json(folder / RUN, content | told)
-    return found
+        write_json(folder / RUN, content | changes)
+    return recovered

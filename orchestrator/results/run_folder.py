@@ -13,7 +13,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault, Interrupted
 from hapticlink.orchestrator.results import json_file, rows
-from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
+from hapticlink.orchestrator.results.files import Recorder, text, write, write_json, write_over
 from hapticlink.orchestrator.results.run_record import (
     End,
     RecordedFault,
@@ -39,8 +39,12 @@ class RunFolder:
     """
 
     def __init__(self, folder: Path, setup: RunSetup | None = None, csv: bool = True) -> None:
-        self.folder, self.published, self._setup, self._csv = folder, False, setup, csv
+        self.folder, self.published, self._csv = folder, False, csv
+        self._setup = content(setup) if setup else None
         self._recorders: list[Recorder] = []
+        # What the first row needs, before the time of the loop is taken.
+        self._earlier = _listed(folder)
+        self._begun = self._text(End(process=os.getpid()))
 
     def __enter__(self) -> RunFolder:
         interrupt.add(self._interrupted)
@@ -88,12 +92,12 @@ class RunFolder:
         an earlier run."""
         if any(recorder.last is None for recorder in self._recorders):
             return
-        earlier = _listed(self.folder)
-        self._write(End(process=os.getpid()), room=ROOM)
+        if self._begun:
+            write(self.folder / RUN, self._begun + b" " * ROOM)
         for recorder in self._recorders:
             recorder.publish()
         kept = {RUN, *(name for recorder in self._recorders for name in recorder.files)}
-        for name in earlier - kept:
+        for name in self._earlier - kept:
             (self.folder / name).unlink(missing_ok=True)
         self.published = True
 
@@ -108,16 +112,16 @@ class RunFolder:
                     empty.write_bytes(rows.header(("time", *names)))
             self.published = True
         if self.published and self._setup is not None:
-            write_json(self.folder / RUN, content(self._setup) | content(ending))
+            write_json(self.folder / RUN, self._setup | content(ending))
 
     def end_in_place(self, ending: RunEnding) -> None:
         """As `end`, on a full disk, in the bytes reserved: everything, or only how the run ended,
         or nothing if the disk cannot write in place."""
         if self.published and self._setup is not None:
-            setup, whole = content(self._setup), content(ending)
+            whole = content(ending)
             least = {key: whole[key] for key in ("end", "fault")}
             with suppress(OSError):
-                write_over(self.folder / RUN, setup | whole, setup | least)
+                write_over(self.folder / RUN, self._setup | whole, self._setup | least)
 
     def _interrupted(self) -> None:
         for left in self.folder.glob(".run.*.json"):  # unfinished files
@@ -131,15 +135,16 @@ class RunFolder:
     def _broken_off(self, reason: str, error: BaseException) -> None:
         if self.published:
             fault = RecordedFault(type(error).__name__, self.last, str(error))
-            self._write(End(reason, self.last), fault)
+            if unfinished := self._text(End(reason, self.last), fault):
+                write(self.folder / RUN, unfinished)
 
-    def _write(self, end: End, fault: RecordedFault | None = None, room: int = 0) -> None:
-        """Write what is known of a run that has not ended regularly."""
-        if self._setup is not None:
-            ending = content(RunEnding(end, fault))
-            known = ("end", "fault") if fault else ("end",)
-            told = content(self._setup) | {key: ending[key] for key in known}
-            write_json(self.folder / RUN, told, room)
+    def _text(self, end: End, fault: RecordedFault | None = None) -> bytes:
+        """The run.json of a run that has not ended regularly, empty without a setup."""
+        if self._setup is None:
+            return b""
+        ending = content(RunEnding(end, fault))
+        known = ("end", "fault") if fault else ("end",)
+        return text(self._setup | {key: ending[key] for key in known})
 
 
 def _has_rows(folder: Path) -> bool:

@@ -82,6 +82,8 @@ class RunSetup:
     power_across_rates: list[str]
     not_recorded: list[str]
     """The outputs `fmu.port` of which an entry is not written."""
+    events: list[tuple[float, str]] = field(default_factory=list)
+    """Times (s) and texts of what `[[at]]` does, each with the first step that it acts on."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,16 @@ class LinkCounts:
     sent: int
     lost: int
     overtaken: int
+
+
+@dataclass(frozen=True)
+class Premises:
+    """Of a hold that bounds energy: its steps by entry, those outside the premises of its theorem,
+    and the energy (J) `at_stake` in these, which the theorem does not cover."""
+
+    steps: int
+    outside: int
+    at_stake: float
 
 
 @dataclass(frozen=True)
@@ -179,6 +191,11 @@ class RunEnding:
     causal: bool = True
     """Whether no FMU reads a sample that is stamped later than the start of its step."""
     links: dict[str, LinkCounts] = field(default_factory=dict)
+    premises: dict[str, Premises] = field(default_factory=dict)
+    """Of the connections with `passive` or `nepce`."""
+    overdrawn: dict[str, float] = field(default_factory=dict)
+    """By set position, the energy (J) that its tank was short of at most: what the coupling gave
+    beyond all that it was given."""
     isolated: dict[str, str] = field(default_factory=dict)
     """Why an FMU ran in a process of its own."""
     held_outputs: dict[str, int] = field(default_factory=dict)
@@ -240,10 +257,10 @@ class RunRecord(RunEnding, RunSetup):
 
 def content(section: RunSetup | RunEnding | PortEnergy) -> dict[str, Any]:
     """A section as run.json has it, in the same order; its end without what is not known."""
-    found = asdict(section)
-    if "end" in found:
-        found["end"] = {k: v for k, v in found["end"].items() if v not in (None, "")}
-    return found
+    values = asdict(section)
+    if "end" in values:
+        values["end"] = {k: v for k, v in values["end"].items() if v not in (None, "")}
+    return values
 
 
 def read(run: Mapping[str, Any], folder: Path | None) -> RunRecord:

@@ -23,7 +23,7 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.python_loop import PythonLoop
-from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, kinds
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, with_ends
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
 from hapticlink.orchestrator.system.system import System
@@ -122,9 +122,10 @@ def run(
                 else PythonLoop(plan, simulation, {"everything": why})
             )
             simulation.start()
+            if isinstance(loop, CompiledLoop):
+                coming = loop.events.coming()
+                loop.events.prepare(with_ends(coming) if real_time else coming)
             if real_time:
-                assert isinstance(loop, CompiledLoop)
-                loop.events.prepare(kinds(plan))
                 stack.enter_context(real_time.pace.undisturbed())
             _run_events(plan, loop, results, outcome, progress, real_time)
     except (Exception, KeyboardInterrupt) as error:
@@ -184,6 +185,8 @@ def _details(
         delays=ages,
         causal=causal(ages),
         links=simulation.links(),
+        premises=simulation.premises(),
+        overdrawn=simulation.overdrawn(),
         isolated=simulation.isolated,
         held_outputs={name: i.held for name, i in instances.items() if i.held},
         smaller_steps={name: i.smaller_steps for name, i in instances.items() if i.smaller_steps},

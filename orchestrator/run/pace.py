@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.run import real_time_priority
 from hapticlink.orchestrator.run.compiled import structures
 
 MOST = 100_000_000
@@ -42,6 +43,7 @@ class Pace:
         wait: Callable[[int], object] | None = None,
     ) -> None:
         self._given = clock and wait and (clock, wait)
+        self.priority: dict[str, str] = {}
         self.lateness, self.steps = np.zeros(BINS, np.int64), np.zeros(BINS, np.int64)
         self.c = structures.Pace(most=MOST)
         self.c.fill(self, "lateness", "steps")
@@ -63,13 +65,15 @@ class Pace:
     @contextmanager
     def undisturbed(self) -> Iterator[None]:
         """Start now; within the context no collection of garbage looks through what there is
-        already, and other threads of Python hand over soon."""
+        already, other threads of Python hand over soon, and this one has real-time priority as far
+        as the user may."""
         before = sys.getswitchinterval()
         gc.freeze()
         sys.setswitchinterval(SWITCH)
-        self.c.origin = self.clock()
         try:
-            yield
+            with real_time_priority.raised() as self.priority:
+                self.c.origin = self.clock()
+                yield
         finally:
             sys.setswitchinterval(before)
             gc.unfreeze()
@@ -78,6 +82,7 @@ class Pace:
         c = self.c
         return {
             "reproducible": False,
+            "priority": self.priority,
             "ticks": c.ticks,
             "deadlines_missed": c.missed,
             "moved": c.moved * 1e-9,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from itertools import islice
 from typing import Any
 
 from hapticlink.orchestrator.plan.operations import Event
@@ -14,9 +13,6 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.concurrent_fmus import ThreadWorker, Worker
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.simulation import Simulation
-
-MANY = 4096
-"""Events among which the kinds are looked for that are bound before the run."""
 
 
 class Ended(Exception):
@@ -81,10 +77,10 @@ class RealTimeRun:
         }
 
 
-def kinds(plan: Plan) -> set[Event]:
-    """The kinds of events that are likely: those at the beginning, and the same at the end of the
-    run."""
-    found = {moment.event for moment in islice(plan, MANY)}
+def with_ends(coming: Iterable[Event]) -> set[Event]:
+    """The kinds of events that are likely beside wall clocks: those that come, those of each clock
+    alone, and the same at the end of the run."""
+    found = {*coming}
     for event in [*found]:
         alone = (event._replace(firings=(firing,)) for firing in event.firings)
         for kind in (event, *alone) if not event.first else ():

@@ -9,10 +9,13 @@ import numpy as np
 
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
+from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
+from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.run_record import LinkCounts
+from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
+from hapticlink.orchestrator.run import scenario
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meters import Meters
@@ -83,6 +86,7 @@ class Simulation:
                 self.holds[c.name].push(0, values[self.signals.sources(c)], 0)
         self.meters.start()
         self.balance.start()
+        scenario.arm(self.system, self.instances, self.signals)
         for fmu in self.system.fmus:
             incoming = self.system.into(fmu.name)
             if not incoming:
@@ -141,3 +145,28 @@ class Simulation:
         """Per connection with a latency, the number of samples sent, lost and overtaken."""
         links = {n: getattr(h, "link", None) for n, h in self.holds.items()}
         return {n: LinkCounts(k.sent, k.lost, k.overtaken) for n, k in links.items() if k}
+
+    def premises(self) -> dict[str, Premises]:
+        """Per connection with a hold that observes its energy, what was outside its premises."""
+        accounts = {n: own for n, h in self.holds.items() if isinstance(own := _own(h), Account)}
+        return {
+            name: Premises(int(steps), int(outside), float(stake))
+            for name, account in accounts.items()
+            for steps, outside, stake in [account.premises]
+        }
+
+    def overdrawn(self) -> dict[str, float]:
+        """Per set position, the energy (J) that the tank of its spring was short of at most."""
+        owns = {name: _own(hold) for name, hold in self.holds.items()}
+        return {
+            name: 0.0 - float(own.tank.least[0])
+            for name, own in owns.items()
+            if isinstance(own, PassiveSetPosition) and own.row == 0
+        }
+
+
+def _own(hold: Hold) -> Hold:
+    """The hold itself, without what wraps it."""
+    while inner := getattr(hold, "own", None) or getattr(hold, "hold", None):
+        hold = inner
+    return hold

@@ -29,6 +29,8 @@ class BlockPlan:
     block: str
     rate: AnyRate
     settings: dict[str, Any]
+    engine: str | None = None
+    """The physics engine by which it is made, in place of our equations."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,9 @@ class Blocks:
     own: tuple[BlockPlan, ...]
     """The others of the loop."""
     built: tuple[BlockPlan, ...]
-    """All that are built into FMUs: `own`, then those of [[fmu]] tables."""
+    """All that are built into FMUs of our equations: `own`, then those of [[fmu]] tables."""
+    engines: tuple[BlockPlan, ...]
+    """Those of the loop that are built into FMUs of a physics engine."""
     rates: Mapping[str, AnyRate]
     """The rate of each FMU: of the loop's blocks, then of [[fmu]] tables."""
 
@@ -59,7 +63,12 @@ def blocks(scene: Scene, *, skip: bool = True) -> Blocks:
     tables = (
         BlockPlan(f.name, f.block, rates[f.name], dict(f.settings)) for f in scene.fmu if f.block
     )
-    return Blocks(loop, replaced, own, (*own, *tables), rates)
+    engines = tuple(
+        replace(replaced[f.name], rate=rates[f.name], engine=f.engine)
+        for f in scene.fmu
+        if f.engine and f.name in replaced
+    )
+    return Blocks(loop, replaced, own, (*own, *tables), engines, rates)
 
 
 @dataclass(frozen=True)

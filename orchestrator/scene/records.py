@@ -44,10 +44,16 @@ class ForeignFmu:
     both have: [foreign FMUs](swap-an-fmu.md)."""
     path: str | None = None
     """Its file, relative to the scene's file."""
+    map: Mapping[str, str | tuple[str, ...]] = field(default_factory=dict)
+    """By port of the block that it replaces, what the FMU calls it: a variable, or one for each
+    entry of a vector. Names that differ in brackets, underscores or case alone need none."""
     block: Annotated[str, BLOCKS.names()] | None = None
     """In place of a file, the block to build ([extending](extending.md#a-block))."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the block, by name."""
+    engine: Literal["mujoco"] | None = None
+    """In place of a file, the physics engine by which the block that it replaces is made:
+    [MuJoCo](engine.md)."""
     rate: Literal["haptics", "graphics"] | AnyRate | None = None
     """Its communication rate: one of the scene's, or its own, written as graphics.rate is. By
     default that of the block that it replaces, else "haptics"."""
@@ -132,6 +138,29 @@ class Latency:
     """Probability that a sample is lost."""
     seed: Seed = 0
     """Seed of the generator."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimedEvent:
+    """What happens at a time of a run ([scenarios](scenarios.md)): values that are set, and inputs
+    that are disturbed for a while, in place of what their connections bring."""
+
+    time: Elapsed
+    """When: an FMU takes it with its first step from then on."""
+    until: Elapsed | None = None
+    """End of `override`, `freeze` and `noise`; by default that of the run. What is `set` stays."""
+    set: Mapping[str, Value] = field(default_factory=dict)
+    """Values of tunable parameters and of inputs that nothing feeds, `fmu.port`, in the FMU's
+    units; or `graphics.rate`, a number (Hz): steps then end on haptic ticks."""
+    override: Mapping[str, Value] = field(default_factory=dict)
+    """Values of inputs that a connection feeds, `fmu.port`, in the FMU's units."""
+    freeze: tuple[str, ...] = ()
+    """Inputs, `fmu.port`, that keep the value that they have at that time."""
+    noise: Mapping[str, Annotated[float, Quantity(OWN, gt=0)]] = field(default_factory=dict)
+    """Standard deviation of normal noise on each entry of an input, `fmu.port`, in the source's
+    units, drawn at each step by numpy's PCG64."""
+    seed: Seed = 0
+    """Seed of the noise."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -39,6 +39,7 @@ from hapticlink.orchestrator.scene.records import (
     PowerPort,
     Record,
     SetSpring,
+    TimedEvent,
     Wire,
 )
 from hapticlink.orchestrator.scene.scene_source import Origin, Source
@@ -170,6 +171,8 @@ class Scene:
     """Further FMUs: [foreign FMUs](foreign-fmus.md)."""
     connection: tuple[Wire, ...] = ()
     """Connections to and from them."""
+    at: tuple[TimedEvent, ...] = ()
+    """What happens at given times: [scenarios](scenarios.md)."""
     record: Record = field(default_factory=Record)
     """What is written, and how often."""
     faults: Faults = field(default_factory=Faults)
@@ -178,6 +181,25 @@ class Scene:
     """Runs every FMU in a process of its own."""
     packaging: Literal["python", "native"] = "python"
     """native: the scene's own blocks are compiled, and then need no Python: [FMUs](fmus.md)."""
+
+    def __repr__(self) -> str:
+        rates = {"haptics": self.haptics.rate, "graphics": self.graphics and self.graphics.rate}
+        links, users = self.linkage, self.all_devices
+        mechanism = links and f"{len(links.body)} bodies, {len(links.loop)} closed loops"
+        blocks = [*(["device"] * len(users)), *(f.name or f.replaces or f.path for f in self.fmu)]
+        lines = (
+            self.title,
+            f"mechanism: {mechanism or 'none'}; {', '.join(blocks) or 'no device'}",
+            ", ".join(
+                f"{name} at {rate} Hz"
+                if isinstance(rate, int | float | str)
+                else f"{name} at a varying rate"
+                for name, rate in rates.items()
+                if rate
+            ),
+            f"hold {self.hold}, coupling {self.coupling}, {self.duration:g} s",
+        )
+        return "\n  ".join(lines)
 
     def place(self, path: Path, message: str) -> Finding:
         """A finding at a path of the scene, with its line if the scene was read from a file."""
@@ -222,7 +244,7 @@ class Scene:
         return self.stop_when
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class WrittenScene(Scene):
     """A scene that was read, with the file and line of its keys; changed copies keep them."""
 

@@ -16,7 +16,7 @@ from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path as Keys
 from hapticlink.orchestrator.scene.toml_keys import Problem
-from hapticlink.orchestrator.system import checks, fmu_tables, haptic_loop, replacements
+from hapticlink.orchestrator.system import checks, fmu_tables, haptic_loop, replacements, timed
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import connect, whole
 from hapticlink.orchestrator.system.recorded import recorded
@@ -43,9 +43,10 @@ def from_scene(
     of = timeline.of
     replaced = replacements.replaced(blocks.replaced)
     ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in blocks.own)
+    tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
     foreign = (
         Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
-        for fmu, description, starts in fmu_tables.fmus(scene, files, replaced, problems)
+        for fmu, description, starts, _ in tables
     )
     order = {b.name: i for i, b in enumerate(blocks.loop)}
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
@@ -63,6 +64,7 @@ def from_scene(
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(fmus, condition):
         problems.append((("stop_when",), f"{condition}: there is no such output"))
+    timed_events = timed.changes(scene, fmus, assigned, timeline, rules, problems)
     written = recorded(scene.record, fmus, assigned, problems)
     if problems:
         raise SceneFault(scene.title, [scene.place(*problem) for problem in problems])
@@ -81,7 +83,14 @@ def from_scene(
         EnergyPorts(rules.power, rules.springs, haptic_loop.energy_in_play(scene)),
         Recording(written, scene.record.every),
         refused,
-        replacements.replacements(replaced, haptic_loop.rows(scene), fmus, assigned),
+        replacements.replacements(
+            replaced,
+            haptic_loop.rows(scene),
+            fmus,
+            assigned,
+            {fmu.name: names for fmu, *_, names in tables},
+        ),
+        timed_events,
     )
 
 

@@ -48,7 +48,7 @@ def _files(
     platforms: Sequence[str],
     starts: Mapping[str, Starts] | None,
 ) -> Iterator[tuple[str, Path]]:
-    for block in blocks.built:
+    for block in (*blocks.built, *blocks.engines):
         interrupt.check()
         given: Starts = {}
         experiment: dict[str, float] = {}
@@ -68,6 +68,7 @@ def _files(
                 packaging=scene.packaging,
                 platforms=platforms,
                 starts=given,
+                engine=block.engine,
                 poll=interrupt.check,
             )
         except CompilerError as error:

@@ -18,6 +18,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import ForeignFmu, Value
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.system.port_map import Mapped, mapped, renamed
 
 if TYPE_CHECKING:
     from hapticlink.components.component import Component
@@ -28,16 +29,23 @@ def fmus(
     files: Mapping[str, FilePath],
     replaced: Mapping[str, Component],
     problems: list[Problem],
-) -> Iterator[tuple[ForeignFmu, Description, Starts]]:
-    """Each FMU that can be read, with its description and start values; `files` are the FMUs built
-    for blocks. Findings are appended to `problems`."""
+) -> Iterator[tuple[ForeignFmu, Description, Starts, Mapped]]:
+    """Each FMU that can be read, with its description, start values, and the ports that it calls
+    otherwise than the block that it replaces; `files` are the FMUs built for blocks. Findings are
+    appended to `problems`."""
     for i, fmu in enumerate(scene.fmu):
         try:
             description = _described(files.get(fmu.name) or FilePath(fmu.path or ""), fmu)
         except InputFault as fault:
             problems.append((("fmu", i, "path"), str(fault)))
             continue
-        block = replaced.get(fmu.name)
+        block, names = replaced.get(fmu.name), Mapped()
+        if block:
+            try:
+                names = mapped(description, block, fmu.map)
+            except ValueError as error:
+                problems.append((("fmu", i, "map"), str(error)))
+            description = renamed(description, names, block)
         if fmu.timing:
             description = replace(description, timing=fmu.timing)
         elif block and not description.declares_timing:
@@ -53,7 +61,7 @@ def fmus(
                 starts.append(_start(description, name, value))
             except ValueError as error:
                 problems.append((("fmu", i, "start", name), str(error)))
-        yield fmu, description, sum(starts, ())
+        yield fmu, description, sum(starts, ()), names
 
 
 def _described(path: FilePath, fmu: ForeignFmu) -> Description:

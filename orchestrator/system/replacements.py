@@ -12,6 +12,7 @@ from hapticlink.orchestrator.scene.blocks import BlockPlan
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.system.port_map import Mapped
 from hapticlink.orchestrator.system.system import Connection, Fmu, Replacement
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def replacements(
     rows: Iterable[Wire],
     fmus: Iterable[Fmu],
     connections: Iterable[Connection],
+    mapped: Mapping[str, Mapped],
 ) -> dict[str, Replacement]:
     """By replaced block. `rows` are all connections that the haptic loop may have."""
     rows, connections = tuple(rows), tuple(connections)
@@ -58,7 +60,7 @@ def replacements(
         yield from dict.fromkeys(s.port for s in inputs if s.name not in fed)
 
     return {
-        name: Replacement(tuple(lost(name, block)), tuple(unfed(name)))
+        name: Replacement(tuple(lost(name, block)), tuple(unfed(name)), mapped[name])
         for name, block in blocks.items()
         if name in described
     }
@@ -79,7 +81,7 @@ def unfit(
     heard = {c.source for c in connections}
     for i, table in enumerate(scene.fmu):
         name = table.replaces
-        if name not in blocks or name not in described or name in heard:
+        if table.engine or name not in blocks or name not in described or name in heard:
             continue
         block, scalars = blocks[name], described[name].scalars
         gives, takes = (
@@ -96,7 +98,8 @@ def unfit(
             f"none of its outputs reaches another FMU, so that it is no {name}: that block gives "
             f"{_listed(gives)} and takes {_listed(takes)}; "
             f"the FMU has outputs {_listed(has['output'])} and inputs {_listed(has['input'])}. "
-            "Give it ports of these names, or lead a [[connection]] from it"
+            "Give it ports of these names, say what it calls them (map, --map), or lead a "
+            "[[connection]] from it"
         )
         yield ("fmu", i, "replaces"), message
 

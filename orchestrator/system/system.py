@@ -72,10 +72,12 @@ class Connection:
 @dataclass(frozen=True)
 class Replacement:
     """An FMU in the place of a block. lost: connections of the block to ports that the FMU does not
-    have. unfed: inputs of the FMU that no connection feeds, which keep their start values."""
+    have. unfed: inputs of the FMU that no connection feeds, which keep their start values. mapped:
+    by port of the block, what the FMU calls its entries where that is another name."""
 
     lost: tuple[str, ...]
     unfed: tuple[str, ...]
+    mapped: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -113,6 +115,24 @@ class Recording:
 
 
 @dataclass(frozen=True)
+class Change:
+    """What the steps of an FMU from `begin` on get (s): `values` of `inputs` once, or before each
+    step that begins before `end` if that is given. Without values, the inputs keep what `held`
+    brings them at `begin`; `noise` is the standard deviation that adds to it, with a seed. text:
+    for the record of a run. Without inputs it is only for that record."""
+
+    begin: float
+    text: str
+    fmu: str = ""
+    inputs: tuple[Scalar, ...] = ()
+    values: tuple[float, ...] = ()
+    end: float | None = None
+    held: Connection | None = None
+    noise: float = 0.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class System:
     """What is simulated, on which timeline, with which coupling."""
 
@@ -129,6 +149,8 @@ class System:
     """Holds that did not fit."""
     replacements: Mapping[str, Replacement] = field(default_factory=dict)
     """The FMUs in the place of the loop's blocks, by name."""
+    changes: tuple[Change, ...] = ()
+    """What happens at given times, in their order."""
 
     @cached_property
     def fmu(self) -> Mapping[str, Fmu]:

@@ -146,7 +146,7 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
     axes[0].legend(fontsize="small")
     title = "The drift torque chatters from tick to tick"
     axes[1].set(xlabel="time (s)", ylabel="change of F_drift,theta in a tick (N.m)", title=title)
-    unlimited = runs("closed-loop", *ON, jacobi, "device.torque_limit=500.0").run["end"]
+    unlimited = runs("closed-loop", *ON, jacobi, "device.torque_limit=500.0").record.end
     return Entry(
         "Order of calls: Jacobi against Gauss-Seidel",
         draw.save(figure, folder, "order_of_calls.png"),
@@ -157,6 +157,6 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
         f"torque jumps by up to "
         f"{jumps[1]:.2g} N.m a tick ({jumps[0]:.1e} under Gauss-Seidel, {jumps[2]:.1e} with "
         f"0.2). Only the motors' torque limit of 0.5 N.m bounds it: with 500 N.m the run "
-        f"diverges at {unlimited['time']:.2f} s",
+        f"diverges at {unlimited.time:.2f} s",
         command("closed-loop", jacobi),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,27 @@ def test_runs_in_a_loop_stay_flat() -> None:
     gc.collect()
     assert maps() - before[0] < 12
     assert resident() - before[1] < 6 << 20
+
+
+@pytest.mark.parametrize("loop", ["", "python"])
+def test_states_that_are_saved_over_are_freed(loop: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One state before each of the 256 steps that may be repeated: 0.6 kB each would be kept."""
+    monkeypatch.setenv("HAPTICLINK_LOOP", loop)
+
+    def kept(duration: float) -> int:
+        options = {"duration": duration, "faults.discard": "retry"}
+        tracemalloc.start()
+        try:
+            made = hl.run("pendulum", options, progress=None)
+            assert made.run["calls"]["virtual_mechanism"]["save"] >= duration * 512
+            del made
+            gc.collect()
+            return tracemalloc.get_traced_memory()[0]
+        finally:
+            tracemalloc.stop()
+
+    kept(0.01)
+    assert kept(0.5) - kept(0.01) < 60_000
 
 
 def test_fmus_of_one_library_work_beside_each_other(tmp_path: Path) -> None:

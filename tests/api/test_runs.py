@@ -98,6 +98,34 @@ def test_signals_go_by_name_each_with_its_times(short: hl.Run) -> None:
     assert "4 rows of time, virtual_environment.x" in repr(found)
 
 
+def test_print_gives_the_lines_of_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status("run", "closed-loop", *sets(["duration=0.1"]), "--out", tmp_path) == 0
+    name, said = capsys.readouterr().out.partition(":")[::2]
+    found = hl.load(tmp_path)
+    assert name == "closed-loop"
+    assert f"{found}\n" == f"{found.run['scene']['title']}:{said}"
+
+
+def test_a_scene_is_four_lines() -> None:
+    lines = repr(hl.scene("closed-loop", {"graphics.rate": 15})).splitlines()
+    assert len(lines) == 4
+    assert "4 bodies, 1 closed loops" in lines[1]
+    assert "graphics at 15 Hz" in lines[2]
+
+
+def test_runs_in_memory_are_named_by_the_settings_in_which_they_differ() -> None:
+    scene = hl.scene("closed-loop-direct", {"duration": 0.1})
+    found = hl.compare([hl.run(scene, {"hold": hold}) for hold in ("zoh", "foh")])
+    assert [*found.runs] == ["hold zoh", "hold foh"]
+    told = found.values()["hold foh"]
+    assert told["Settings that differ"] == {"hold": "foh"}
+    assert [line.get_label() for line in found.figures()["distance"].axes[0].lines]
+    with pytest.raises(hl.InputFault, match="two runs or more"):
+        hl.compare([found.runs["hold foh"]])
+
+
 def test_tracking_is_what_lies_between_the_two_poses(short: hl.Run) -> None:
     error = short["virtual_mechanism.x"] - short["haptic_device.x_true"]
     time, distance, angle = short.tracking()
@@ -182,7 +210,7 @@ def test_what_a_killed_run_has_written_can_be_looked_at(bar: Path, tmp_path: Pat
     found = hl.load(tmp_path)
     assert same(found, whole)
     assert "not ended" in repr(found)
-    axes = found.figures()["trajectories"].axes[0]
+    axes = found.figures()["mechanism"].axes[0]
     assert "until the last row so far at 0.25 s" in axes.get_title().replace("\n", " ")
 
 

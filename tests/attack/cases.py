@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import csv
+import signal
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -49,15 +51,40 @@ def bad(counts: Mapping[str, Counter[str]]) -> dict[str, int]:
 
 
 def write(
-    path: Path, counts: Mapping[str, Counter[str]], outcomes: Sequence[str] = OUTCOMES
+    path: Path,
+    counts: Mapping[str, Counter[str]],
+    seed: int,
+    outcomes: Sequence[str] = OUTCOMES,
 ) -> None:
-    """A row a kind: `attack,cases,` and a column an outcome."""
+    """A row a kind: `attack,cases,`, a column an outcome, the seed and the commit of the code."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["attack", "cases", *outcomes])
+        writer.writerow(["attack", "cases", *outcomes, "seed", "commit"])
         for kind, found in counts.items():
-            writer.writerow([kind, found.total(), *(found[o] for o in outcomes)])
+            row = [kind, found.total(), *(found[o] for o in outcomes)]
+            writer.writerow([*row, seed, COMMIT])
+
+
+def _commit() -> str:
+    """Of the checkout, "+" where its files have changed since."""
+    git = ["git", "-C", str(Path(__file__).parent)]
+    asked = [[*git, "rev-parse", "--short=7", "HEAD"], [*git, "status", "--porcelain", "-uno"]]
+    head, changed = (
+        subprocess.run(each, capture_output=True, text=True, check=False).stdout.strip()
+        for each in asked
+    )
+    return f"{head}+" if changed else head
+
+
+COMMIT = _commit()
+"""When the attack began: its processes read what stands on the disk."""
+
+
+def hear_interrupts() -> None:
+    """Processes that this one starts hear SIGINT, which a shell ignores in the background."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def command(
@@ -74,7 +101,8 @@ def command(
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=FOLDER / f"{name}.csv")
     given = parser.parse_args()
+    hear_interrupts()
     counts = counted(attack(given.cases, given.seed))
-    write(given.out, counts, outcomes)
+    write(given.out, counts, given.seed, outcomes)
     print(given.out)
     sys.exit(1 if bad(counts) else 0)

@@ -1,13 +1,13 @@
-"""FMUs that behave badly on purpose: of FMI 2.0 and FMI 3.0, in C, in the process of the run or in
-one of their own, in both loops. `hapticlink run` of a scene with such an FMU and one that behaves
-well, which gives to it.
+"""FMUs that behave badly on purpose: of FMI 2.0 and FMI 3.0, in C and in Python (pythonfmu,
+pythonfmu3), in the process of the run or in one of their own, in both loops. `hapticlink run` of a
+scene with such an FMU and one that behaves well, which gives to it.
 
 Whatever the FMU does: the command ends with status 1 and a message, or with 0 and a regular end; in
 both cases run.json and the tables say the same, and no file and no process stays behind. An FMU in
 the process of the run may crash it; then the rows are there nevertheless, and run.json names a
 crash. Where it hangs the process of the run, two signals end that. And nothing is believed that is
 wrong: a status that FMI does not define never counts as success, and the other FMU's numbers are
-those of a run without a hostile FMU. _exit(0) of C code in the process of the run, which nobody is
+those of a run without a hostile FMU. _exit(0) of code in the process of the run, which nobody is
 asked about, and a process that it forks there are left out.
 """
 
@@ -26,6 +26,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
 from tests.attack.cases import Made, command
+from tests.orchestrator import hostile_slave
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
 
 PLACES = ("make", "enter", "leave", "set", "get", "step", "save", "restore", "end", "free")
@@ -40,8 +41,11 @@ ACTS = (
     *("stdout", "deaf", "locale", "prints", "nothing", "format", "long", "bytes"),
     *("thread", "child", "term", "int", "umask", "environ"),
 )
-ENDS_THE_PROCESS = ("exit", "exit3", "leave", "abort", "null", "stack", "thread")
-"""The last one where its thread outlives the library that it runs."""
+PACKED = {"C": ACTS, "Python": tuple(hostile_slave.ACTS)}
+FILES = {"C": "hostile.fmu", "Python": "Hostile{fmi}.fmu"}
+ENDS_THE_PROCESS = ("exit", "exit3", "leave", "abort", "null", "stack", "thread", "queue")
+"""thread: where it outlives the library that it runs; queue: pythonfmu's libraries read the fields
+of what is no message."""
 NEVER_RETURNS = ("loop", "sleep")
 PATIENCE = 90.0
 """Seconds after which a process counts as hung, on a machine that is busy with other things."""
@@ -61,17 +65,21 @@ class Attack:
         for fmi in ("2", "3"):
             (folder / fmi).mkdir()
             hostile_fmu(folder / fmi, fmi)
+            hostile_slave.hostile_slave(folder / fmi, fmi)
         good = hostile_scene(folder / "2", "good_none_0")
         status, said = self._ended(good, "compiled", patience=PATIENCE)
         assert status == 0, said
         table = tables.load(self.out).haptics
         self._source = [table[f"source.{port}"].tolist() for port in ("y", "slope")]
 
-    def made(self, fmi: str, place: str, act: str, step: int, keys: str, loop: str) -> list[str]:
+    def made(
+        self, fmi: str, packed: str, place: str, act: str, step: int, keys: str, loop: str
+    ) -> list[str]:
         """What was wrong, after an outcome."""
         isolated = "isolate" in keys
         name = f"{place}_{act}_{step}"
-        scene = hostile_scene(self.folder / fmi, name, keys)
+        file = FILES[packed].format(fmi=fmi)
+        scene = hostile_scene(self.folder / fmi, name, keys, file)
         hangs = act in NEVER_RETURNS and not isolated
         status, said = self._ended(scene, loop, BEFORE_SIGNALS if hangs else PATIENCE)
         if status is None:
@@ -83,7 +91,7 @@ class Attack:
             return ["believed", "exit(0) of an FMU was a success"]
         if wrong := [*self._untrue(status, said, crash), *self._left()]:
             return ["lost", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"]
-        if wrong := [*self._believed(place, act, status)]:
+        if wrong := [*self._believed(packed, place, act, status)]:
             return ["believed", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"]
         return ["done" if status == 0 else "told", ""]
 
@@ -163,9 +171,10 @@ class Attack:
                 continue
         return found
 
-    def _believed(self, place: str, act: str, status: int) -> Iterator[str]:
+    def _believed(self, packed: str, place: str, act: str, status: int) -> Iterator[str]:
         called = place in ("make", "enter", "leave", "set", "get", "step", "end")
-        if called and act in STATUSES and act != "warning" and status == 0:
+        failed = hostile_slave.RAISES if packed == "Python" else {*STATUSES} - {"warning"}
+        if called and act in failed and status == 0:
             yield f"{act} from {place} was a success"
         if not (self.out / "run.json").exists():
             return
@@ -182,18 +191,18 @@ def attack(number: int, seed: int) -> Iterator[Made]:
         made = Attack(Path(name))
         for i in range(number):
             draw = random.Random(f"{seed} {i}")
-            fmi, act = draw.choice("23"), ACTS[i % len(ACTS)]
+            fmi, packed = draw.choice("23"), ("C", "Python")[i % 2]
+            act = PACKED[packed][i // 2 % len(PACKED[packed])]
             place = draw.choice((*PLACES, "step", "step", "step"))
             keys = draw.choice(("", "isolate = true"))
             loop = draw.choice(("compiled", "python"))
             step = draw.randrange(1, 30)
             if act in ("leave", "child"):
                 keys = "isolate = true"
-            case = (fmi, place, act, step, keys, loop)
+            case = (fmi, packed, place, act, step, keys, loop)
             outcome, wrong = made.made(*case)
-            yield Made(
-                f"FMI {fmi}.0, {'isolated' if keys else 'in process'}", str(case), outcome, wrong
-            )
+            kind = f"FMI {fmi}.0 in {packed}, {'isolated' if keys else 'in process'}"
+            yield Made(kind, str(case), outcome, wrong)
 
 
 OUTCOMES = ("done", "told", "lost", "crashed", "hung", "believed")

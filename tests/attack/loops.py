@@ -28,7 +28,7 @@ from tests.attack.c_interface import UNDEFINED, _address_library, can_sanitize
 from tests.attack.cases import Made, command
 from tests.attack.scenes import written
 
-PATIENCE = 300.0
+PATIENCE = 1200.0
 """Seconds for the scenes of one process, on a machine that is busy with other things."""
 AT_A_TIME = 10
 """Scenes that a process runs."""

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import Made, command
+from tests.attack.cases import Made, command, hear_interrupts
 
 MARK = "HAPTICLINK_ATTACK"
 COMMAND = [sys.executable, "-m", "hapticlink", "run", "closed-loop"]
@@ -60,8 +60,7 @@ class Attack:
     """Cases in a folder of their own."""
 
     def __init__(self, folder: Path, duration: float) -> None:
-        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell has it in the background
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        hear_interrupts()
         self._folder, self._out = folder, folder / "out"
         self._temporary, self._cache = folder / "temporary", folder / "cache"
         self._temporary.mkdir()

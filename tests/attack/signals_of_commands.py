@@ -65,8 +65,12 @@ def _case(name: str, folder: Path, draw: random.Random) -> tuple[str, str]:
     while (processes := _marked(str(folder))) and time.monotonic() < until:
         time.sleep(0.05)
     left = [p.name for p in temporary.iterdir()]
+    hidden = [*(folder / "here").rglob(".*")]
+    left += [str(path.relative_to(folder)) for path in hidden]
     shutil.rmtree(temporary)
     temporary.mkdir()
+    for path in hidden:
+        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
     if process.returncode == -number or _python_itself(process.returncode, said):
         return "before", ""
     broken = any(mark in said for mark in ("Traceback", "Exception ignored", "leaked", "Fatal"))

@@ -12,7 +12,6 @@ import shlex
 import subprocess
 import sys
 import tomllib
-from itertools import groupby
 from pathlib import Path
 
 import jsonschema
@@ -31,6 +30,9 @@ WITH_EXAMPLES = [p for p in PAGES if name(p) not in ELSEWHERE and [*blocks(p, "s
 SHORTER = {"hapticlink sweep": 0.02} | {f"hapticlink run {name}": 0.2 for name in hl.shipped()}
 """Duration (s) of commands that take longer than their page needs."""
 NOT_RUN = {
+    "hapticlink sweep closed-loop --set controller.bias=full --vary graphics.rate=10..60..5 "
+    "--vary hold=zoh,lead,foh":
+        "33 runs; docs/rates.md has a sweep that is run",
     "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,foh":
         "many runs; docs/rates.md has a sweep that is run",
     "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh":
@@ -60,6 +62,7 @@ NOT_RUN = {
     "hapticlink compare runs/closed-loop "
     "runs/closed-loop,graphics.rate=10,controller.topology=false": "as its runs; replay.md",
     "hapticlink bench one": "takes minutes, and measures the machine",
+    "hapticlink bench standalone": "takes minutes, and measures the machine",
     "hapticlink bench view": "takes a minute, and measures the machine",
     "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
         "compiles for minutes; tests/orchestrator/scene/test_packaging.py",
@@ -75,10 +78,12 @@ TOOLS = ("fmpy", "pythonfmu")
 """Commands of other packages, which are installed beside Python."""
 
 
-def shown(command: str) -> str:
-    """A command as it is run, some with a shorter duration."""
+def shown(command: str, folder: Path) -> str:
+    """A command as it is run: some with a shorter duration; after the first run of a page without
+    figures, which that one has drawn."""
     limits = (f" --set duration={limit}" for key, limit in SHORTER.items() if key in command)
-    return command + next(limits, "")
+    again = command.startswith("hapticlink run ") and (folder / "runs").exists()
+    return command + next(limits, "") + " --no-figures" * (again and "--no-fig" not in command)
 
 
 def failures(folder: Path, block: Block) -> dict[str, str]:
@@ -88,19 +93,17 @@ def failures(folder: Path, block: Block) -> dict[str, str]:
         return {}
     if block.language == "python":
         return _failed(folder, sys.executable, "-c", block.text)
-    found = {}
-    wanted = [c for c in block.commands if c not in NOT_RUN and not UNTIL_STOPPED.match(c)]
-    for ours, commands in groupby(wanted, lambda c: c.startswith("hapticlink ")):
-        if ours:
-            each = [*commands]
-            ended = hapticlink(folder, *map(shown, each))
-            found |= {c: e.said for c, e in zip(each, ended, strict=True) if e.status}
+    failed = {}
+    for command in block.commands:
+        words = shlex.split(command)
+        if command in NOT_RUN or UNTIL_STOPPED.match(command):
             continue
-        for command in commands:
-            words = shlex.split(command)
-            if words[0] in TOOLS:
-                found |= _failed(folder, str(Path(sys.executable).with_name(words[0])), *words[1:])
-    return found
+        if words[0] == "hapticlink":
+            (ended,) = hapticlink(folder, shown(command, folder))
+            failed |= {command: ended.said} if ended.status else {}
+        elif words[0] in TOOLS:
+            failed |= _failed(folder, str(Path(sys.executable).with_name(words[0])), *words[1:])
+    return failed
 
 
 def _failed(folder: Path, *words: str) -> dict[str, str]:

@@ -15,7 +15,15 @@ from tests.docs.pages import PAGES, ROOT, blocks, name, prose
 DOCS = ROOT / "docs"
 FOLDERS = [DOCS / "pictures", DOCS / "figures"]
 IMAGE = re.compile(r"!\[.*?\]\((.+?)\)", re.DOTALL)
-TEXT_ALONE = {"index.md", "api.md", "ports.md", "scene-reference.md", "glossary.md", "errata.md"}
+TEXT_ALONE = {
+    "index.md",
+    "api.md",
+    "ports.md",
+    "scene-reference.md",
+    "glossary.md",
+    "errata.md",
+    "install.md",
+}
 """Tables to look things up in."""
 
 
@@ -26,8 +34,9 @@ def test_the_pages_of_scenes_are_those_of_their_files() -> None:
 
 
 def test_every_scene_has_its_picture() -> None:
-    """Those of the shipped scenes and of the examples of own-linkage.md, and no others."""
-    examples = [b.title.removesuffix(".toml") for b in blocks(DOCS / "own-linkage.md", "toml")]
+    """Those of the shipped scenes and of the linkages that pages describe, and no others."""
+    pages = ("own-linkage.md", "scenes.md")
+    examples = [b.title.removesuffix(".toml") for p in pages for b in blocks(DOCS / p, "toml")]
     wanted = sorted([*hl.shipped(), *filter(None, examples)])
     assert sorted(p.stem for p in FOLDERS[0].iterdir()) == wanted
 

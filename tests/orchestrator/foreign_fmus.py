@@ -187,6 +187,7 @@ def c_fmu3(folder: Path) -> Path:
 
 ISOLATED = "isolate = true\n"
 COMMAND = [sys.executable, "-m", "hapticlink"]
+RUN = [*COMMAND, "run", "--no-figures"]
 
 
 def fmu_table(name: str, path: str, more: str = "") -> str:

@@ -39,7 +39,7 @@ duration = 0.5
 haptics.rate = 64
 [[fmu]]
 name = "{name}"
-path = "hostile.fmu"
+path = "{fmu}"
 {lines}
 [[fmu]]
 name = "source"
@@ -63,9 +63,9 @@ def hostile_fmu(folder: Path, fmi: str = "2", **flags: str) -> Path:
     return path
 
 
-def hostile_scene(folder: Path, name: str, lines: str = "") -> Path:
+def hostile_scene(folder: Path, name: str, lines: str = "", fmu: str = "hostile.fmu") -> Path:
     """A scene in which the FMU of that name, "<place>_<act>_<step>", gets the output of another
-    one that behaves well; `lines` are further keys of it."""
+    one that behaves well; `lines` are further keys of it, `fmu` is its file."""
     path = folder / "hostile.toml"
-    path.write_text(SCENE.format(name=name, lines=lines))
+    path.write_text(SCENE.format(name=name, lines=lines, fmu=fmu))
     return path

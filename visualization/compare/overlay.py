@@ -75,19 +75,17 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
 
 def _force(run: Results) -> tuple[Vector, Vector] | None:
     """The largest force (N) of a kind at each time (s) of the most frequent ones."""
-    found = [(time, force) for time, force, _ in all_wrenches(run).values()]
-    if not found:
+    forces = [(time, force) for time, force, _ in all_wrenches(run).values()]
+    if not forces:
         return None
-    at = max((time for time, _ in found), key=len)
-    return at, np.max([np.interp(at, time, force) for time, force in found], axis=0)
+    times = max((time for time, _ in forces), key=len)
+    return times, np.max([np.interp(times, time, force) for time, force in forces], axis=0)
 
 
 def _figure(title: str, x: str, y: str, curves: Curves, steps: bool = False) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
-    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = ShownFigure(figsize=(6.4, 4.0), layout="constrained")
     axes = figure.add_subplot()
     style: Any = "steps-post" if steps else "default"
     for i, (time, values) in enumerate(curves.values()):

@@ -6,9 +6,12 @@ import base64
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
+from itertools import islice
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.results.scene_file import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, settings
@@ -22,25 +25,56 @@ if TYPE_CHECKING:
 STYLE = Path(__file__).with_name("page.css")
 FAULTS = ("fault", "warnings", "holds generate more than is put in")
 """Rows that are shown as bad where they say anything."""
+NUMBERS = 3
+"""Of a run in its opening."""
 FINE = ("none", "no", numbers.NONE)
+
+
+def opening(runs: Mapping[str, Results], heading: str = "h1") -> str:
+    """A headline, how each run ended, a picture, and of a single run three numbers."""
+    every = list(runs.values())
+    titles = dict.fromkeys(run.record.scene["title"] for run in every)
+    if len(every) == 1:
+        (run,) = every
+        parts = [f"<{heading}>{escape(*titles)}</{heading}>", f"<p>{_verdict(run)}</p>"]
+        if drawn := of_a_run.drawings(run).get("mechanism"):
+            parts.append(_picture("mechanism", drawn()))
+        lines = "".join(f"<li>{escape(x)}</li>" for x in islice(summary.numbers(run), NUMBERS))
+        return "\n".join([*parts, f"<ul>{lines}</ul>" if lines else ""])
+    figures = overlay.figures(runs)
+    first = next((name for name in figures), None)
+    headline = figures[first].axes[0].get_title() if first else "; ".join(titles)
+    parts = [f"<{heading}>{escape(headline)}</{heading}>"]
+    ends: dict[str, list[str]] = {}
+    for name, run in runs.items():
+        ends.setdefault(_verdict(run), []).append(name)
+    parts += [f"<p>{escape(', '.join(names))}: {said}</p>" for said, names in ends.items()]
+    if other := settings.other_scenes(every):
+        parts.append(f'<p class="note">{escape(other)}</p>')
+    return "\n".join([*parts, *([_picture(first, figures[first])] if first else [])])
+
+
+def _verdict(run: Results) -> str:
+    """How a run ended, with its fault."""
+    if fault := run.record.fault:
+        return f'<b class="bad">{escape(f"{summary.ending(run)}: {fault.message}")}</b>'
+    return f"<b>{escape(summary.ending(run))}</b>"
 
 
 def page(runs: Mapping[str, Results]) -> str:
     """The page of runs by the names that tell them apart. The same runs give the same bytes."""
     every, names = list(runs.values()), list(runs)
     titles = dict.fromkeys(run.record.scene["title"] for run in every)
-    parts = [f"<h1>{escape('; '.join(titles))}</h1>"]
-    if other := settings.other_scenes(every):
-        parts.append(f'<p class="note">{escape(other)}</p>')
+    parts = [opening(runs)]
     for title, rows in numbers.sections(every).items():
         if rows:
-            parts += [f"<h2>{escape(title)}</h2>", _table(names, rows)]
+            parts += [f"<h2>{escape(title)}</h2>", table(names, rows)]
         if title.startswith(numbers.PERFORMANCE):
             parts += _figures(runs)
     if len(every) > 1:
         rows = [Row(key, values) for key, values in settings.differing(every).items()]
-        table = _table(names, rows) if rows else "<p>None: the scenes are the same.</p>"
-        parts += ["<h2>Settings that differ</h2>", table]
+        found = table(names, rows) if rows else "<p>None: the scenes are the same.</p>"
+        parts += ["<h2>Settings that differ</h2>", found]
     parts += ["<h2>How to make it again</h2>", *_again(runs)]
     style = STYLE.read_text(encoding="utf-8")
     head = (
@@ -52,7 +86,7 @@ def page(runs: Mapping[str, Results]) -> str:
     return head + "\n".join(parts) + "\n</body>\n</html>\n"
 
 
-def _table(names: Sequence[str], rows: Sequence[Row]) -> str:
+def table(names: Sequence[str], rows: Sequence[Row]) -> str:
     """A table of rows; a row that is the same for all runs says so once."""
     head = "".join(f"<th>{escape(name)}</th>" for name in ("", *names))
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(map(_row, rows))}</tbody></table>"
@@ -71,17 +105,22 @@ def _bad(label: str, value: str) -> str:
 
 
 def _figures(runs: Mapping[str, Results]) -> Iterator[str]:
-    """Those of a run; of several, what they have over each other and the drawing of each."""
+    """Those that the opening lacks; of several runs, what they have over each other and the drawing
+    of each."""
     if len(runs) == 1:
         (run,) = runs.values()
-        for name, figure in of_a_run.figures(run).items():
-            yield _picture(name, figure)
+        drawings = of_a_run.drawings(run)
+        drawings.pop("mechanism", None)
+        for name, draw in drawings.items():
+            yield _picture(name, draw())
         return
-    for name, figure in overlay.figures(runs).items():
+    for name, figure in [*overlay.figures(runs).items()][1:]:
         yield _picture(name, figure)
     for name, run in runs.items():
-        if drawn := of_a_run.figures(run).get("mechanism"):
-            drawn.axes[0].set_title(plain(name), fontsize="medium")
+        if draw := of_a_run.drawings(run).get("mechanism"):
+            drawn = draw()
+            title = f"{name}: {drawn.axes[0].get_title()}"
+            drawn.axes[0].set_title(plain(fill(title, 70)), fontsize="medium")
             yield _picture(f"mechanism, {name}", drawn)
 
 

@@ -25,19 +25,20 @@ def real_time(
 ) -> Figure:
     """The figure of a run in real time that had a tick, with further `curves` by their labels and
     `more` said in its title."""
-    found = results.run["real_time"]
-    title = "; ".join(filter(None, (finding(found), more)))
+    report = results.record.real_time
+    assert report
+    title = "; ".join(filter(None, (finding(report), more)))
     figure, axes = titled(results, title, "time (ms)", "share of ticks that exceed it")
-    histograms = found["histograms"]
+    histograms = report["histograms"]
     own = {"step time": histograms["step_time"], "lateness": histograms["lateness"]}
     for (label, histogram), style in zip(
         {**own, **(curves or {})}.items(), ("-", "--", ":", "-."), strict=False
     ):
         axes.step(*exceedance(histogram), style, where="post", label=label)
-    axes.axvline(1e3 * found["period"], color="k", lw=1)
+    axes.axvline(1e3 * report["period"], color="k", lw=1)
     axes.annotate(
         "deadline",
-        (1e3 * found["period"], 0.5),
+        (1e3 * report["period"], 0.5),
         (3, 0),
         xycoords=("data", "axes fraction"),
         textcoords="offset points",

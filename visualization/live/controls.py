@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.analysis.findings import words
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.changes import choices_between_rates, choices_of_slower
 from hapticlink.orchestrator.system.springs import limited_gains
+from hapticlink.orchestrator.system.system import System
 from hapticlink.visualization.live import messages
 from hapticlink.visualization.live.mouse_hand import STIFFNESS
 
@@ -37,15 +41,59 @@ class Settings:
     topology: bool = True
 
 
+class Offered:
+    """What can be changed of a scene that runs: `gains`, values and units by parameter; `holds` by
+    connection, the present one first; the graphics `rate`, None where there is none."""
+
+    def __init__(
+        self, scene: Scene, system: System, holds: Mapping[str, list[str]] | None = None
+    ) -> None:
+        self.gains = _gains(scene, system)
+        self.holds = choices_of_slower(system) if holds is None else holds
+        fmus = [f for f in system.fmus if f.clock == CLOCK]
+        of = dict.fromkeys(words.block(f.name) or f.name for f in fmus)
+        self._of = " and ".join(of)
+        self.rate = scene.graphics.rate if scene.graphics and fmus else None
+        haptics = system.timeline
+        self._most = float(1 / (haptics.clocks[0].longest * haptics.base))
+
+    def described(self, s: Settings) -> dict[str, Any]:
+        """The controls with their ranges and values, as JSON has it."""
+        fixed = float(self.rate) if isinstance(self.rate, int | float) else None
+        return {
+            "rate": None
+            if self.rate is None
+            else {"value": s.rate or fixed, "max": self._most, "jitter": s.jitter}
+            | {"of": _titled(self._of)},
+            "holds": [
+                {"connection": name, "words": _titled(words.connection(name))}
+                | {"hold": s.holds.get(name, choices[0]), "choices": choices}
+                | {"delay": s.delays.get(name, 0.0)}
+                for name, choices in self.holds.items()
+            ],
+            "gains": [
+                {"name": name, "value": value.tolist(), "units": units}
+                | {"factor": s.gains.get(name, 1.0)}
+                for name, (value, units) in self.gains.items()
+            ],
+            "topology": s.topology if self.topology else None,
+        }
+
+    @property
+    def topology(self) -> list[str]:
+        """The gains of the topology controllers of all users."""
+        found = [name for name in self.gains if name.rpartition(".")[2] in TOPOLOGY]
+        return found if len(found) >= len(TOPOLOGY) else []
+
+
 class Controls:
     """The controls of a run, with the `settings` of the page."""
 
     def __init__(self, live: LiveRun, settings: Settings) -> None:
         self._live, self._settings = live, settings
-        self._gains = _gains(live)
-        self._holds = _holds(live)
-        fmus = [f for f in live.system.fmus if f.clock == CLOCK]
-        self._rate = live.scene.graphics.rate if live.scene.graphics and fmus else None
+        self._offered = Offered(live.scene, live.system, choices_between_rates(live.system))
+        self._gains, self._holds = self._offered.gains, self._offered.holds
+        self._rate, self._topology = self._offered.rate, self._offered.topology
         self._pulling = {user: False for user in users(live.scene)}
 
     def restore(self) -> None:
@@ -62,26 +110,7 @@ class Controls:
 
     def described(self) -> dict[str, Any]:
         """The controls with their ranges and values, as JSON has it."""
-        s, fixed = self._settings, isinstance(self._rate, int | float)
-        haptics = self._live.system.timeline
-        most = float(1 / (haptics.clocks[0].longest * haptics.base))
-        return {
-            "rate": None
-            if self._rate is None
-            else {"value": s.rate or (float(self._rate) if fixed else None), "max": most}  # type: ignore[arg-type]
-            | {"jitter": s.jitter},
-            "holds": [
-                {"connection": name, "hold": s.holds.get(name, choices[0]), "choices": choices}
-                | {"delay": s.delays.get(name, 0.0)}
-                for name, choices in self._holds.items()
-            ],
-            "gains": [
-                {"name": name, "value": value.tolist(), "units": units}
-                | {"factor": s.gains.get(name, 1.0)}
-                for name, (value, units) in self._gains.items()
-            ],
-            "topology": s.topology if self._topology else None,
-        }
+        return self._offered.described(self._settings)
 
     def apply(self, message: messages.Message) -> None:
         """Change the run. Raises InputFault where the message does not fit this scene; nothing is
@@ -154,11 +183,9 @@ class Controls:
             else:
                 self._live.set(stiffness(user), (0.0, 0.0, 0.0))
 
-    @property
-    def _topology(self) -> list[str]:
-        """The gains of the topology controllers of all users."""
-        found = [name for name in self._gains if name.rpartition(".")[2] in TOPOLOGY]
-        return found if len(found) >= len(TOPOLOGY) else []
+
+def _titled(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def users(scene: Scene) -> tuple[str, ...]:
@@ -176,12 +203,12 @@ def target(user: str) -> str:
     return f"{block_of_user(HAND, user)}.target"
 
 
-def _gains(live: LiveRun) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
+def _gains(scene: Scene, system: System) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
     """Values and units of the parameters that a page can scale, by their name."""
     found: dict[str, tuple[NDArray[np.float64], list[str]]] = {}
-    fixed = limited_gains(live.system)
-    names = [MECHANISM, *(block_of_user(b, user) for user in users(live.scene) for b in GAINS)]
-    for fmu in (live.system.fmu[name] for name in names if name in live.system.fmu):
+    fixed = limited_gains(system)
+    names = [MECHANISM, *(block_of_user(b, user) for user in users(scene) for b in GAINS)]
+    for fmu in (system.fmu[name] for name in names if name in system.fmu):
         tunable = [
             s
             for s in fmu.description.scalars
@@ -193,17 +220,7 @@ def _gains(live: LiveRun) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
             entries = fmu.description.port(port, "parameter")
             start = np.array([s.start for s in entries])
             found[f"{fmu.name}.{port}"] = start, [s.unit or "" for s in entries]
-    for name in (stiffness(user) for user in users(live.scene)):
+    for name in (stiffness(user) for user in users(scene)):
         if name in found:
             found[name] = np.array(STIFFNESS), found[name][1]
     return found
-
-
-def _holds(live: LiveRun) -> dict[str, list[str]]:
-    """The connections from a slower clock to the haptic one, with the holds that they can have."""
-    fast = live.system.timeline.clocks[0].name
-    return {
-        name: choices
-        for name, choices in live.holds().items()
-        if live.system.fmu[live.system.connection[name].source].clock != fast
-    }

@@ -18,9 +18,9 @@ from hapticlink.analysis.stability.workspace_cases import AtRest, Case
 from hapticlink.components.specs.hand import SpringHand
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
-from hapticlink.orchestrator.real_time_session import held_by
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.changes import held_by
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live.controls import Settings

@@ -24,11 +24,12 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
+from hapticlink.analysis.findings.limits import NOTICEABLE_J
 from hapticlink.visualization.live import messages
 from hapticlink.visualization.live.server_pipe import read
 from hapticlink.visualization.live.stability_process import StabilityProcess
 from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
-from hapticlink.visualization.mechanism.picture import Picture
+from hapticlink.visualization.mechanism.picture import PORT, Picture
 
 PAGE = Path(__file__).parents[1] / "page"
 TYPES = {
@@ -72,7 +73,7 @@ class Pages:
         if kind == "scene":
             self._picture = Picture(*message.pop("picture"))
             message["marks"] = [mark._asdict() for mark in self._picture.marks]
-            message |= {"shapes": SHAPES, "kinds": KINDS}
+            message |= {"shapes": SHAPES, "kinds": KINDS, "port": PORT, "noticeable": NOTICEABLE_J}
             self._holding = {user: self._holding.get(user) for user in message["users"]}
         elif kind == "frame" and self._picture:
             message = self._picture.drawn(message)

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.results.scene_part import by_user
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization.live import messages
 from hapticlink.visualization.live.controls import Controls, Settings, target, users
-from hapticlink.visualization.live.frames import PORT, Frames
+from hapticlink.visualization.live.frames import Frames, power
 from hapticlink.visualization.live.server_pipe import Link
 
 TURN, FRAME = 0.0035, 0.015
@@ -116,7 +116,7 @@ class Session:
                 "picture": (scene.linkage, by_user(scene.device, scene.devices), scene.contacts),
                 "users": [*users(scene)],
                 "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
-                "energies": [PORT, *live.energies()],
+                "power": power(live.system, live.energies()),
             }
         )
         self._tell_controls()

@@ -1,10 +1,11 @@
 """What is drawn of a frame: poses of the bodies and of the devices' arms, directions, forces in cut
-joints, and what happens in it."""
+joints, and what happens in it. All are CasADi functions of the raw signals, so that a page without
+Python evaluates the same, as C."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -21,10 +22,38 @@ from hapticlink.visualization.mechanism.marks import marks, point_of, reach, sta
 PORT = "user's port"
 RAW = ("ghost", "q", "lambda", "P_c", "F_motor", "measured")
 """What frames have instead of what is drawn."""
+LEAST_SHARE = 0.05
+"""Of a constrained direction in the plane, below which it is a mere turn."""
+
+
+class Part(NamedTuple):
+    """A quantity that is drawn: `function` of the raw signals `needs` of a user, each a vector of
+    `sizes`. Its result is a matrix with a column for each of `names`, or for each entry of a list
+    without names; of a state, `gives` of `KINDS`, it is 1 while that holds."""
+
+    user: str
+    gives: str
+    needs: tuple[str, ...]
+    sizes: tuple[int, ...]
+    function: ca.Function
+    names: tuple[str, ...] = ()
+    sparse: bool = False
+    is_state: bool = False
+
+    def value(self, found: Mapping[str, Any]) -> Any:
+        """The quantity of a frame, in a JSON type."""
+        given = zip(self.needs, self.sizes, strict=True)
+        columns = np.asarray(self.function(*(found[name][:size] for name, size in given))).T
+        if self.is_state:
+            return bool(columns[0, 0])
+        entries = [c.tolist() if np.isfinite(c).all() else None for c in columns]
+        entries = [e for e in entries if e is None or any(e)] if self.sparse else entries
+        return dict(zip(self.names, entries, strict=True)) if self.names else entries
 
 
 class Picture:
-    """The picture of a scene, of `marks`; devices: by user, the first one's name is empty."""
+    """The picture of a scene, of `marks`; devices: by user, the first one's name is empty. `parts`
+    is what is computed of the raw signals."""
 
     def __init__(
         self,
@@ -33,97 +62,115 @@ class Picture:
         contacts: Contacts | None,
     ) -> None:
         self.marks = marks(linkage, contacts, devices)
-        self._linkage = linkage
-        self._names, self._poses = pose_function(linkage)
-        self._arms = {user: link_function(each) for user, each in devices.items()}
-        self._limits = {
-            user: (torque_function(each), FULL_TORQUE * each.torque_limit)
-            for user, each in devices.items()
-        }
+        self._linkage, self._users = linkage, [*devices]
+        names, poses = pose_function(linkage)
+        n = poses.size1_in(0)
+        self.parts = [
+            Part("", gives, (q,), (n,), poses, tuple(names))
+            for gives, q in (("poses", "q"), ("ghost", "ghost"))
+        ]
+        if linkage.loop:
+            self.parts.append(_cut(linkage, names, poses))
+        ok, margin, gap = (ca.SX.sym(name) for name in ("branch_ok", "margin", "gap"))
+        force = ca.SX.sym("F_env", 3)
+        touching = ca.logic_and(gap < 0, ca.norm_1(force) > 0)
+        self.parts.append(_state("", "folded", {"branch_ok": ok}, ok == 0))
+        for user in dict.fromkeys(("", *(point.name for point in linkage.point))):
+            self.parts.append(Part(user, "directions", ("P_c",), (9,), directions(), sparse=True))
+            self.parts.append(_state(user, "outside", {"margin": margin}, margin < 0))
+            self.parts.append(_state(user, "contacts", {"gap": gap, "F_env": force}, touching))
+        for user, device in devices.items():
+            self.parts.append(Part(user, "arms", ("handle",), (3,), link_function(device)))
+            self.parts.append(_saturated(user, device))
 
     def drawn(self, frame: dict[str, Any]) -> dict[str, Any]:
         """The frame with `poses`, `ghost` by body's name, forces in the `cut` joints, `states`, and
         of each user `arms` of the device and the constrained `directions` in the plane, in place of
         coordinates, multipliers and projector."""
-        shown = self._of("", frame)
-        states = [*self._states("", frame)]
-        for key, q in (("poses", frame["q"]), ("ghost", frame.get("ghost"))):
-            if q is not None:
-                found = np.asarray(self._poses(q)).T.tolist()
-                shown[key] = dict(zip(self._names, found, strict=True))
-        if "lambda" in frame:
-            shown["cut"] = self._cut(frame["lambda"], shown["poses"])
-        if others := frame.get("others"):
-            shown["others"] = {user: self._of(user, found) for user, found in others.items()}
-            states += [each for user, found in others.items() for each in self._states(user, found)]
+        others = frame.get("others", {})
+        shown = _without_raw(frame)
+        if others:
+            shown["others"] = {user: _without_raw(found) for user, found in others.items()}
+        states = []
+        for part in self.parts:
+            found = others.get(part.user, {}) if part.user else frame
+            if not {*part.needs} <= {*found}:
+                continue
+            value = part.value(found)
+            if part.is_state:
+                states += [state(part.gives, part.user)] if value else []
+            else:
+                (shown["others"][part.user] if part.user else shown)[part.gives] = value
+        if (reach(frame, ("energy", PORT)) or 0.0) > NOTICEABLE_J:
+            states.append("energy")
         return shown | {"states": states}
 
     def at_rest(self, q: Any) -> dict[str, Any]:
         """A frame of the linkage at joint coordinates q, with each device at its user's point."""
         frame = self.drawn({"q": q})
-        for user in self._arms:
+        arms = {part.user: part for part in self.parts if part.gives == "arms"}
+        for user in self._users:
             (_, body), (px, py) = point_of(self._linkage, user)
             x, y, angle = frame["poses"][body]
             turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-            arms = self._arms_at(user, [*(np.array([x, y]) + turn @ (px, py)), angle])
-            (frame.setdefault("others", {}).setdefault(user, {}) if user else frame)["arms"] = arms
+            pose = [*(np.array([x, y]) + turn @ (px, py)), angle]
+            drawn = arms[user].value({"handle": pose})
+            (frame.setdefault("others", {}).setdefault(user, {}) if user else frame)["arms"] = drawn
         return frame
 
-    def _of(self, user: str, found: dict[str, Any]) -> dict[str, Any]:
-        shown = {k: v for k, v in found.items() if k not in RAW}
-        if user in self._arms and "handle" in found:
-            shown["arms"] = self._arms_at(user, found["handle"])
-        if "P_c" in found:
-            shown["directions"] = directions(found["P_c"])
-        return shown
 
-    def _states(self, user: str, found: Mapping[str, Any]) -> list[str]:
-        """The kinds of `KINDS` that a frame shows by itself."""
-        kinds = {
-            "folded": reach(found, ("branch_ok", 0)) == 0,
-            "saturated": self._saturated(user, found),
-            "energy": (reach(found, ("energy", PORT)) or 0.0) > NOTICEABLE_J,
-            "contacts": (reach(found, ("gap", 0)) or 0.0) < 0 and any(found.get("F_env", ())),
-            "outside": (reach(found, ("margin", 0)) or 0.0) < 0,
-        }
-        return [state(kind, user) for kind, holds in kinds.items() if holds]
-
-    def _saturated(self, user: str, found: Mapping[str, Any]) -> bool:
-        if user not in self._limits or not {"F_motor", "measured"} <= {*found}:
-            return False
-        torques, most = self._limits[user]
-        return bool(ca.norm_inf(torques(found["F_motor"], found["measured"])) >= most)
-
-    def _cut(self, multipliers: list[float], poses: dict[str, list[float]]) -> list[list[float]]:
-        """The force (N) in each joint that is cut. It has two multipliers, a slot one; that of what
-        slides is along the normal, and a moment has no arrow."""
-        forces, row = [], 0
-        for loop in self._linkage.loop:
-            normal = poses[loop.bodies[1]][2] + (loop.axis or 0.0)
-            along = multipliers[row]
-            revolute = loop.type == "revolute"
-            forces.append(
-                multipliers[row : row + 2]
-                if revolute
-                else [-along * float(np.sin(normal)), along * float(np.cos(normal))]
-            )
-            row += 1 if loop.type == "slot" else 2
-        return forces
-
-    def _arms_at(self, user: str, handle: list[float]) -> list[list[float] | None]:
-        """Base joint, elbow and crank end of each arm of a user's device at a pose of the handle,
-        None where the arm does not reach, which JSON has no NaN for."""
-        points = np.asarray(self._arms[user](ca.DM(handle))).T.tolist()
-        return [p if np.isfinite(p).all() else None for p in points]
+def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in values.items() if k not in RAW}
 
 
-def directions(P_c: list[float]) -> list[list[float]]:
-    """The constrained directions in the plane, unit vectors (x, y) times their share of the scaled
-    direction (x, y, L theta): eigenvectors of the projector P_c, (9,), to the eigenvalue 1. A
-    direction that is a mere turn has no share."""
-    values, vectors = np.linalg.eigh(np.array(P_c).reshape(3, 3))
-    plane = vectors[:2, values > 0.5].T
-    if len(plane) > 1:  # any basis spans them: take the one with the main axes in the plane
-        _, sizes, axes = np.linalg.svd(plane)
-        plane = sizes[:, None] * axes[: len(sizes)]
-    return [v.tolist() for v in plane if np.linalg.norm(v) > 0.05]
+def _cut(linkage: Linkage, names: list[str], poses: ca.Function) -> Part:
+    """The force (N) in each joint that is cut, (2, k). It has two multipliers, a slot one; that of
+    what slides is along the normal, and a moment has no arrow."""
+    rows = sum(1 if loop.type == "slot" else 2 for loop in linkage.loop)
+    along, q = ca.SX.sym("lambda", rows), ca.SX.sym("q", poses.size1_in(0))
+    angles, forces, row = poses(q)[2, :], [], 0
+    for loop in linkage.loop:
+        normal = angles[names.index(loop.bodies[1])] + (loop.axis or 0.0)
+        force = along[row] * ca.vertcat(-ca.sin(normal), ca.cos(normal))
+        forces.append(along[row : row + 2] if loop.type == "revolute" else force)
+        row += 1 if loop.type == "slot" else 2
+    made = ca.Function("cut", [along, q], [ca.horzcat(*forces)])
+    return Part("", "cut", ("lambda", "q"), (rows, q.numel()), made)
+
+
+def directions() -> ca.Function:
+    """The constrained directions in the plane, (2, 2): unit vectors (x, y) times their share of the
+    scaled direction (x, y, L theta), which span the projector P_c, (9,); zeros in place of those
+    that are none, or a mere turn.
+
+    With an orthonormal basis V (3, r) of its range P_c = V V', so that those with the main axes in
+    the plane are the eigenvectors of the first two rows and columns of P_c times the roots of their
+    eigenvalues, whatever the rank r.
+    """
+    p = ca.SX.sym("P_c", 9)
+    a, b, d = p[0], p[1], p[4]
+    mean, apart, angle = (a + d) / 2, ca.hypot((a - d) / 2, b), ca.atan2(2 * b, a - d) / 2
+    axes = ca.vertcat(ca.cos(angle), ca.sin(angle)), ca.vertcat(-ca.sin(angle), ca.cos(angle))
+    shares = (ca.sqrt(ca.fmax(mean + apart, 0)), ca.sqrt(ca.fmax(mean - apart, 0)))
+    shown = [
+        ca.if_else(share > LEAST_SHARE, share, 0) * axis
+        for share, axis in zip(shares, axes, strict=True)
+    ]
+    return ca.Function("directions", [p], [ca.horzcat(*shown)])
+
+
+def _state(user: str, kind: str, needs: Mapping[str, ca.SX], holds: ca.SX) -> Part:
+    """A state that `holds` or not by the signals that it needs."""
+    function = ca.Function(kind, [*needs.values()], [holds])
+    sizes = tuple(symbol.numel() for symbol in needs.values())
+    return Part(user, kind, (*needs,), sizes, function, is_state=True)
+
+
+def _saturated(user: str, device: Device) -> Part:
+    """Whether a motor gives its largest torque."""
+    force, pose = ca.SX.sym("F_motor", 3), ca.SX.sym("measured", 3)
+    torques = torque_function(device)(force, pose)
+    most = FULL_TORQUE * device.torque_limit
+    return _state(
+        user, "saturated", {"F_motor": force, "measured": pose}, ca.norm_inf(torques) >= most
+    )

@@ -1,35 +1,68 @@
-// The page: the socket to the run, the buttons, and who draws what.
+// The page: messages from and to the run, the buttons, and who draws what.
 import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
+import { Ending } from "./ending.js";
+import { Energies } from "./energies.js";
 import { tags } from "./legend.js";
+import { asked, differing, written } from "./links.js";
+import { loudness } from "./loudness.js";
+import { presets, restored } from "./presets.js";
+import { connected } from "./socket.js";
+import { Sound } from "./sound.js";
 import { Stage } from "./stage.js";
+import { started } from "./worker_run.js";
 
 const $ = (id) => document.getElementById(id);
-const stage = new Stage($("scene"), $("legend"), (at, user) => send({ type: "hand", at, user }));
+const stage = new Stage($("scene"), $("legend"), (at, user) => {
+  $("door").hidden = true;
+  ending.hide();
+  send({ type: "hand", at, user });
+});
+const ending = new Ending($("ended"), () => act("reset"));
 const charts = new Charts($("charts"));
 const controls = new Controls($("controls"), send);
-const view = { frame: null, state: {}, frames: 0, refused: null, stage };
+const SECOND = "#dd6600"; // of run B, where two settings are compared
+const view = { frame: null, levels: [], state: {}, frames: 0, refused: null, stage };
 window.view = view; // for tests and for the curious, in the browser's console
-let socket = null, refusedUntil = 0;
+let refusedUntil = 0, energies = [], sound = null;
+let start = null, shown = null, acts_on_b = false; // controls at the start, and as they are
+let address = "", later = null;
 
-function send(message) {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
-}
+function send(message) { run.send(acts_on_b ? { ...message, b: true } : message); }
 
 const HANDLERS = {
   scene(message) {
     document.title = $("title").textContent = message.title;
     stage.begin(message.marks, message.shapes);
     view.kinds = message.kinds;
-    charts.begin(message.energies, message.users);
+    const runs = message.runs ?? 1;
+    energies = Array.from({ length: runs }, () => new Energies(message));
+    charts.begin([{ name: message.port, words: message.port }, ...message.power], message.users, runs);
+    ending.begin();
     view.frame = null;
+    view.levels = [];
+    view.marks = message.marks;
+    view.sound = sound ??= new Sound(run.listen, message.haptics);
   },
-  controls: (message) => controls.show(message),
+  controls(message) {
+    const begins = !start;
+    start ??= message;
+    if (begins) offer();
+    shown = message;
+    acts_on_b &&= Boolean(message.b);
+    $("acts").textContent = acts_on_b ? "Controls: B" : "Controls: A";
+    $("acts").hidden = !message.b;
+    $("compare").ariaPressed = Boolean(message.b);
+    controls.show(acts_on_b ? message.b : message);
+    if (begins) follow();
+    else note_address();
+  },
   state(message) {
+    if (message.ended && !view.state.ended) ending.show(message.ended);
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));
-    if (message.ended && view.energy === "green") show({ energy: null }); // a run that diverged at once never turned red
+    if (message.ended) show({ energy: "red" }); // a run that diverged at once never turned red
     $("record").textContent = message.recording ? "End recording" : "Record";
     note();
   },
@@ -37,11 +70,20 @@ const HANDLERS = {
     const first = !view.frame;
     view.frame = message;
     view.frames += 1;
+    ending.add(message);
     if (first) note();
+    if (first && !message.directions) $("resists").hidden = true;
+    [message, message.b].forEach((frame, i) => {
+      if (!frame || !energies[i]) return;
+      energies[i].add(frame);
+      if (frame.light) view.levels[i] = frame.light;
+      charts.add(frame, i);
+    });
     if (message.light) show({ energy: message.light });
-    charts.add(message);
+    if (sound.signal) sound.feel(loudness(sound.signal, message));
   },
   map: (message) => show({ map: message }),
+  building({ said }) { view.building = said; note(); },
   refused(message) {
     view.refused = message.why;
     refusedUntil = performance.now() + 4000;
@@ -53,7 +95,8 @@ const HANDLERS = {
 // The light, with the level of the sampling energy and the stability verdict.
 function show(change) {
   Object.assign(view, change);
-  const level = { green: "none", amber: "low", red: "high" }[view.energy];
+  const levels = view.levels.map((light) => ({ green: "none", amber: "low", red: "high" })[light]);
+  const level = levels.length > 1 ? `A ${levels[0]}, B ${levels[1]}` : levels[0];
   $("light").className = `light ${view.map?.verdict === "unstable" ? "red" : view.energy ?? ""}`;
   $("energy").textContent = level ? `sampling energy: ${level}` : "sampling energy";
   $("map").textContent = view.map ? `stability: ${view.map.said}` : "";
@@ -61,48 +104,95 @@ function show(change) {
 }
 
 function note() {
-  const { ended, recording } = view.state;
+  const { recording } = view.state;
   const refused = performance.now() < refusedUntil && view.refused;
-  $("note").textContent = refused || (ended && `${ended}. Reset begins anew.`) ||
-    (recording && `recording to ${recording}`) || (!view.frame && "the FMUs are being built ...") || "";
+  $("note").textContent = refused || (ending.frame && "slow motion of the last 0.2 s") ||
+    (recording && `recording to ${recording}`) || (!view.frame && (view.building ?? "the FMUs are being built ...")) || "";
 }
 
-function connect() {
-  const url = new URL("run", location.href);
-  url.protocol = "ws:";
-  socket = new WebSocket(url);
-  socket.onopen = note;
-  socket.onmessage = (event) => {
-    const message = JSON.parse(event.data);
-    HANDLERS[message.type]?.(message);
-  };
-  socket.onclose = () => {
-    $("note").textContent = "The run has ended, or its connection: start hapticlink view again.";
-    setTimeout(connect, 2000);
-  };
+function received(message) { HANDLERS[message.type]?.(message); }
+
+function lost(why) { $("note").textContent = why; }
+
+// The presets of the scene, each a button that says what it changes.
+function offer() {
+  const found = presets(start);
+  $("presets").hidden = !found.length;
+  $("presets").replaceChildren(...found.map(({ name, about, messages }) => {
+    const button = document.createElement("button"), small = document.createElement("small");
+    button.append(name, small);
+    small.textContent = about;
+    button.onclick = () => { restore(); messages.forEach(send); };
+    return button;
+  }));
 }
 
+function restore() { restored(acts_on_b ? shown.b : shown, start).forEach(send); }
+
+// Does what the page's address asks for, of run A and, where it has settings of B, of both.
+function follow() {
+  const { "": a, "b.": b, why } = asked(location.hash, start);
+  for (const message of a) run.send(message);
+  if (b.length && run.compare) {
+    run.compare(true);
+    for (const message of b) run.send({ ...message, b: true });
+  }
+  if (why.length) HANDLERS.refused({ why: why.join("; ") });
+}
+
+// Writes into the address how the controls differ from the start, so that a link leads there; once they rest, since
+// browsers take few changes of it.
+function note_address() {
+  clearTimeout(later);
+  later = setTimeout(() => {
+    const b = shown.b ? differing(shown.b, start).map(([key, value]) => [`b.${key}`, value]) : [];
+    address = written([...differing(shown, start), ...b]);
+    if (address !== location.hash.slice(1)) location.replace(`#${address}`);
+  }, 300);
+}
+window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== address) follow(); });
+
+const PULLS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const act = (what) => send({ type: "time", do: what });
 $("pause").onclick = () => act(view.state.paused ? "resume" : "pause");
 for (const what of ["step", "reset", "record"]) $(what).onclick = () => act(what);
+$("restore").onclick = restore;
+$("compare").onclick = () => run.compare(!shown.b);
+$("acts").onclick = () => { acts_on_b = !acts_on_b; HANDLERS.controls(shown); };
+$("hear").onchange = () => sound.hear($("hear").value || null);
 document.addEventListener("keydown", (event) => {
-  if (event.target.closest("input, select, button")) return;
+  if (event.target.closest("input, select, button, summary")) return;
+  if (event.key in PULLS) { event.preventDefault(); stage.pullBy(PULLS[event.key]); return; }
+  if (event.key === "+" || event.key === "-") stage.zoom(event.key === "+" ? 0.8 : 1.25);
   const button = { " ": "pause", ".": "step", r: "reset" }[event.key];
   if (event.key === "f") stage.refit();
   if (button && !event.ctrlKey && !event.metaKey) { event.preventDefault(); $(button).click(); }
 });
 
+document.addEventListener("keyup", (event) => { if (event.key in PULLS) stage.letGo(); });
+
+function label(state) {
+  const [kind, user] = state.split(" "), [color, meaning] = view.kinds[kind];
+  return [color, user ? `${meaning}: ${user}` : meaning];
+}
+
+// Run B, which is drawn over A, and how its controls differ.
+function second() {
+  const other = shown.b ? differing(shown.b, shown).map((pair) => pair.join(" ")) : [];
+  return `B, in orange: ${other.join(", ") || "as A; choose Controls: B and change something"}`;
+}
+
 function draw() {
   if (view.frame) {
-    stage.draw(view.frame);
-    tags($("tags"), view.frame.states.map((state) => {
-      const [kind, user] = state.split(" "), [color, meaning] = view.kinds[kind];
-      return [color, user ? `${meaning}: ${user}` : meaning];
-    }));
+    const { b } = view.frame;
+    stage.draw(ending.frame ?? view.frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
+    tags($("tags"), [...view.frame.states.map(label), ...(b ? [[SECOND, second()]] : [])]);
     $("time").textContent = `${view.frame.t.toFixed(2)} s`;
   }
   charts.draw();
   requestAnimationFrame(draw);
 }
-connect();
+// The run is in this file, as its program, or behind the server that the page is from.
+const run = ($("program") ? started : connected)({ received, opened: note, lost });
+for (const id of ["compare", "hear"]) $(id).hidden = !run.compare;
 draw();

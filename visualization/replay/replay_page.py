@@ -19,11 +19,14 @@ WRITTEN = (".html", ".gif", ".webp", ".png")
 
 def html(runs: Sequence[Recorded]) -> str:
     """The page. The same runs give the same bytes."""
-    told = [
-        run.told() | {"short": name}
-        for run, name in zip(runs, names([run.folder for run in runs]), strict=True)
-    ]
-    return one_file.page("replay.html", {"runs": told, "kinds": KINDS, "shapes": SHAPES})
+    told = [run.told() | {"short": name} for run, name in zip(runs, _names(runs), strict=True)]
+    data = {"runs": told, "kinds": KINDS, "shapes": SHAPES}
+    return one_file.page("replay.html", {"data": one_file.as_json(data)})
+
+
+def _names(runs: Sequence[Recorded]) -> list[str]:
+    folders = [run.results.folder for run in runs]
+    return names(folders) if all(folders) else [run.name for run in runs]
 
 
 def require_written(path: Path) -> None:
@@ -42,4 +45,4 @@ def write(runs: Sequence[Recorded], path: Path) -> None:
     from hapticlink.visualization.replay import animation  # with Matplotlib, slow to load
 
     with atomic_file(path) as unfinished:
-        animation.write(runs, names([run.folder for run in runs]), unfinished)
+        animation.write(runs, _names(runs), unfinished)

@@ -24,16 +24,41 @@ SOURCES = (
 )  # fmt: skip
 # No contraction: a fused multiply-add rounds once where Python rounds twice.
 FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", "-g0", "-fvisibility=hidden", "-ffp-contract=off")
-SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+WHEELS = {
+    "manylinux_2_17_x86_64": "x86_64-linux-gnu.2.17",
+    "manylinux_2_17_aarch64": "aarch64-linux-gnu.2.17",
+    "macosx_11_0_x86_64": "x86_64-macos.11.0",
+    "macosx_11_0_arm64": "aarch64-macos.11.0",
+    "win_amd64": "x86_64-windows-gnu",
+}
+"""The compiler's target for each platform tag of a wheel (PEP 425, PEP 600): systems old enough for
+those in use, and all of them from any machine."""
+_ENDINGS = {"macosx": ".dylib", "win": ".dll"}
 
 
-def name() -> str:
-    """The library's file name, with a hash of its sources, so that an older one is never taken."""
+def this_machine() -> str | None:
+    """The platform tag of wheels for this machine, None where WHEELS has none."""
+    processor = platform.machine().lower()
+    processor = {"amd64": "x86_64", "aarch64": "arm64"}.get(processor, processor)
+    if sys.platform == "linux" and platform.libc_ver()[0] != "glibc":
+        return None
+    tag = {
+        "linux": f"manylinux_2_17_{processor.replace('arm64', 'aarch64')}",
+        "darwin": f"macosx_11_0_{processor}",
+        "win32": f"win_{processor.replace('x86_64', 'amd64')}",
+    }.get(sys.platform)
+    return tag if tag in WHEELS else None
+
+
+def name(tag: str | None = None) -> str:
+    """The library's file name, for this machine or the platform tag of a wheel, with a hash of its
+    sources, so that an older one is never taken."""
     sha = hashlib.sha256()
     for source in SOURCES:
         sha.update((HERE / source).read_bytes().replace(b"\r\n", b"\n"))
     sha.update(LAWS["text"]().encode())
-    return f"loop-{sha.hexdigest()[:16]}{SUFFIX}"
+    system = (tag or this_machine() or "").partition("_")[0]
+    return f"loop-{sha.hexdigest()[:16]}{_ENDINGS.get(system, '.so')}"
 
 
 def compilers() -> Iterator[list[str]]:
@@ -46,13 +71,11 @@ def compilers() -> Iterator[list[str]]:
         yield zig()
 
 
-def zig() -> list[str]:
-    """The command of `ziglang`, on Linux for a version of glibc that is old enough for the systems
-    in use."""
-    target = []
-    if sys.platform == "linux" and platform.libc_ver()[0] == "glibc":
-        target = ["-target", f"{platform.machine()}-linux-gnu.2.17"]
-    return [sys.executable, "-m", "ziglang", "cc", *target]
+def zig(tag: str | None = None) -> list[str]:
+    """The command of `ziglang`, for this machine or the platform tag of a wheel. Raises KeyError
+    for a tag that WHEELS does not have."""
+    tag = tag or this_machine()
+    return [sys.executable, "-m", "ziglang", "cc", *(["-target", WHEELS[tag]] if tag else [])]
 
 
 def compile_loop(library: Path, compiler: Sequence[str]) -> None:
@@ -62,7 +85,7 @@ def compile_loop(library: Path, compiler: Sequence[str]) -> None:
         made = Path(room) / library.name
         Path(room, "hold_laws.h").write_text(LAWS["text"](), encoding="utf-8")
         sources = [str(HERE / source) for source in SOURCES if source.endswith(".c")]
-        math = [] if sys.platform == "win32" else ["-lm"]
+        math = [] if library.suffix == ".dll" else ["-lm"]
         command = [*compiler, *FLAGS, f"-I{room}", "-o", str(made), *sources, *math]
         environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(Path(room) / "cache")}
         subprocess.run(command, check=True, capture_output=True, env=environment)

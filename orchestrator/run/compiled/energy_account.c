@@ -10,7 +10,7 @@ static double *vector(const Account *a, int64_t i) { return a->vectors + i * a->
 
 enum {
     SAMPLE_, HELD, X, X_STAMP, WORK, IDEAL, MOTION, STEADY, PREDICTED, V, GAIN, LARGEST, SWING, NOW,
-    AVERAGE, AT_STAMP, BETA, LAST, /* BETA, of `passive`, is the correction of `nepce` */
+    AVERAGE, AT_STAMP, BETA, LAST, TRAVELLED, /* BETA, of `passive`, is the correction of `nepce` */
 };
 
 /* The larger of two as NumPy has it: the first where they are equal, NaN where one is. */
@@ -70,6 +70,31 @@ static void book(Account *a, int64_t stamp, const double *y) {
     a->stamp = stamp;
 }
 
+/* Account._watch */
+static void watch(Account *a) {
+    for (int64_t k = 0; k < a->n; k++) {
+        const double moved = vector(a, MOTION)[k], ahead = vector(a, PREDICTED)[k];
+        const double effort = vector(a, HELD)[k], added = fabs(effort - vector(a, SAMPLE_)[k]);
+        const double furthest = fabs(ahead) + fabs(vector(a, STEADY)[k]), way = fabs(moved);
+        double stake = 0.0;
+        int outside;
+        if (a->tank) {
+            stake = effort * moved - (effort * ahead > 0.0 ? fabs(effort) * furthest : 0.0);
+            outside = stake > 0.0;
+            if (!outside) stake = 0.0;
+        } else if (a->passive) {
+            outside = moved * ahead < 0.0 || way > furthest;
+            stake = (outside ? vector(a, SWING)[k] + added : (1.0 / vector(a, BETA)[k] - 1.0) * added) * way;
+        } else {
+            outside = moved * vector(a, TRAVELLED)[k] < 0.0 && added > 0.0;
+            stake = outside ? added * way : 0.0;
+        }
+        a->premises[0] += 1.0;
+        a->premises[1] += outside;
+        a->premises[2] += stake;
+    }
+}
+
 static void account(Account *a, const Loop *l, int64_t tick) {
     const int64_t n = a->n;
     const size_t bytes = n * sizeof(double);
@@ -89,6 +114,7 @@ static void account(Account *a, const Loop *l, int64_t tick) {
         mean[k] = 0.0;
     }
     a->steps = tick - a->tick;
+    if (a->steps) watch(a);
     const int64_t passed = a->stamp;
     if (!a->path.count || tick > a->path.ticks[a->path.count - 1]) queue(&a->path, n, tick, x);
     if (a->fresh.count) queue(&a->until, n, tick, vector(a, SAMPLE_));
@@ -190,6 +216,7 @@ static double nearly(const Account *a, int64_t k) {
     double *last = vector(a, LAST) + k;
     const double moved = vector(a, X)[k] - *last, most = vector(a, LARGEST)[k];
     *last = vector(a, X)[k];
+    vector(a, TRAVELLED)[k] = moved;
     const double effort = moved != 0.0 ? -generated(a, k) / moved : 0.0;
     return effort < -most ? -most : effort > most ? most : effort;
 }

@@ -39,6 +39,7 @@ void tank_modulate(Tank *t, const Loop *l, int64_t tick) {
     }
     stored /= 2;
     t->available += t->tick < 0 ? stored : put_in(t, over);
+    if (t->available < *t->least) *t->least = t->available;
     const double needed = stored + t->period / 4 * moving;
     const double left = 0.0 > t->available ? 0.0 : t->available;
     const double share = needed <= left ? 1.0 : sqrt(left / needed);

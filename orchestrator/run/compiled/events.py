@@ -37,7 +37,7 @@ class Events:
         n = len(timeline.clocks)
         self._clocks = (structures.Clock * n)()
         self._given = [0] * n
-        self._windows: list[object] = [None] * n
+        self._windows = [np.zeros(0, np.int64)] * n
         self._key = np.zeros(1 + n, np.int64)
         self._keys, self._blocks = np.zeros((0, 1 + n), np.int64), (structures.Block * 0)()
         self._c = c = structures.Events()
@@ -109,13 +109,30 @@ class Events:
         clock.fill(starts=window, n=len(window), at=0)
 
     def _new_kind(self) -> None:
-        key, clocks = self._key.tolist(), self._timeline.clocks
+        self._add(self._event(self._key.tolist()))
+
+    def _event(self, key: Sequence[int]) -> Event:
         fired = (
             Firing(clock.name, k // 2, bool(k % 2))
-            for clock, k in zip(clocks, key[1:], strict=True)
+            for clock, k in zip(self._timeline.clocks, key[1:], strict=True)
             if k
         )
-        self._add(Event(bool(key[0]), tuple(fired)))
+        return Event(bool(key[0]), tuple(fired))
+
+    def coming(self) -> list[Event]:
+        """The kinds of the events of the next windows, in the order of their first occurrence."""
+        end, windows = self._timeline.end, self._windows
+        known = min(end, *(int(window[-2]) for window in windows))
+        ticks = np.unique(np.concatenate([window[:-1] for window in windows]))
+        ticks = ticks[ticks <= known]
+        keys = np.zeros((len(ticks), 1 + len(windows)), np.int64)
+        keys[:, 0] = ticks == 0
+        for i, window in enumerate(windows):
+            start = window[:-1][window[:-1] <= known]
+            after = window[1 : len(start) + 1]
+            keys[np.searchsorted(ticks, start), 1 + i] = 2 * (after - start) + (after > end)
+        kinds = dict.fromkeys(map(bytes, keys))
+        return [self._event(np.frombuffer(kind, np.int64).tolist()) for kind in kinds]
 
     def prepare(self, kinds: Iterable[Event]) -> None:
         """Bind kinds of events before they occur."""

@@ -151,8 +151,12 @@ int fmu_do_step(const Fmu *f, double time, double size) {
 }
 
 /* The status of saving an FMU's state. */
-int fmu_save(const Fmu *f, void *get_state, void *state) {
+int fmu_save(const Fmu *f, void *get_state, void **state) {
     f->place->saves++;
+    if (f->free_state && *state) {
+        ((GetState)f->free_state)(f->fmu, state);
+        *state = NULL;
+    }
     return ((GetState)get_state)(f->fmu, state);
 }
 
@@ -161,7 +165,7 @@ int fmu_step(Fmu *f, double time, double end, double size, At *at) {
     p->time = p->begin = time;
     p->size = size;
     p->end = end;
-    if (p->ended || p->waiting) return CALL;
+    if (p->ended || p->waiting <= time) return CALL;
     if (f->get_state && !fmu_succeeded(at->status = fmu_save(f, f->get_state, f->state)))
         return UNSAVED;
     const int timed = !f->sparse || f->n_steps % EACH == 0;

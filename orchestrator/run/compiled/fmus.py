@@ -45,6 +45,8 @@ def of_instance(
     if instance.retry:
         saved = instance.retry.saved[0]
         c.fill(saved, "state", get_state=saved.get)
+        if saved.overwrites:
+            c.fill(saved, "free_state")
     if isinstance(instance, InProcess3):
         event, terminate, early = instance.step_flags
         c.fill(instance, "reached", event=event, terminate=terminate, early=early)
@@ -61,6 +63,8 @@ def _of_check(check: StepCheck, instance: InProcess, fmu: structures.Fmu) -> obj
     c, saved = structures.Check(), instance.slot(SLOT)
     fmu.fill(check=c)
     c.fill(saved, "state", get_state=saved.get, set_state=saved.set)
+    if saved.overwrites:
+        fmu.fill(saved, "free_state")
     c.fill(check, "steps", "count", "bases", "rates", "ports", "scales", "jumps", "last", "size")
     c.fill(n=len(check.ports), n_ports=len(check.scales))
     c.fill(every=step_check.EVERY, first=step_check.FIRST, at_rest=step_check.AT_REST)

@@ -125,6 +125,7 @@ class CompiledTank(State):
         c = self.structure(structures.Tank)
         stiffness, damping, turns = self._kept
         c.fill(near, "period", "sampled", n=n, tick=-1)
+        c.fill(tank, "least")
         c.fill(near.position, "where", stiffness=stiffness, damping=damping, turns=turns)
         if near.velocity:
             assert isinstance(near.velocity, Reader)
@@ -155,9 +156,9 @@ class CompiledAccount:
     def __init__(self, hold: Account) -> None:
         n = len(hold.sample)
         self.c = c = structures.Account(n=n, tick=-1, since=-1, passive=isinstance(hold, Passive))
-        self._vectors = np.zeros((18, n))
+        self._vectors = np.zeros((19, n))
         self._vectors[16] = 1.0 if c.passive else 0.0  # beta, or no correction
-        c.fill(vectors=self._vectors)
+        c.fill(hold, "premises", vectors=self._vectors)
         self._readers = hold.displacement, hold.velocity
         for reader, of in zip(self._readers, (c.displacement, c.velocity), strict=True):
             if reader:

@@ -19,11 +19,11 @@
 /* --- FMUs ------------------------------------------------------------------------------------- */
 
 /* Where an instance stands (s), and how often its functions were called; shared with its Python
- * object. waiting: settings that it is to take before its next step. setter: the Setter whose values
+ * object. waiting: from when on settings wait for a step. setter: the Setter whose values
  * its inputs have, 0 where that is not known. altered: calls that changed how numbers are rounded. */
 typedef struct {
-    double time, begin, size, end, step_time;
-    int64_t ended, waiting, setter, altered, gets, sets, steps, saves, rollbacks;
+    double time, begin, size, end, step_time, waiting;
+    int64_t ended, setter, altered, gets, sets, steps, saves, rollbacks;
 } Place;
 
 /* What kind of number a call moves, of which version of FMI, and whether the FMU holds a Python
@@ -76,6 +76,7 @@ typedef struct {
     const Transfer *fewer /* [n_fewer] */;
     int64_t n_fewer;
     void *state;                          /* saved by get_state */
+    void *free_state;                     /* before a state is saved over, or NULL */
     uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
     double *reached;
 } Fmu;
@@ -117,6 +118,7 @@ typedef struct {
     double period, available, needed, credited;
     double *newest /* [2 * n] */, *modulated /* [2 * n] */;
     double *x /* [n] */, *moved /* [n] */, *force /* [n] */, *withheld /* [n] */;
+    double *least /* [1] */;              /* least energy available so far, at most 0 */
 } Tank;
 
 /* factor board[where] + offset; factor is NULL where it is 1 and offset 0. */
@@ -134,15 +136,16 @@ typedef struct {
 
 /* Of a hold that observes its energy: energy_account.py. `passive` or `nepce`. path: of the target,
  * until: samples and until when they were held, fresh: samples that are not accounted for; each has
- * `room`. vectors: (18, n). velocity has n = 0 where the target does not have it. */
+ * `room`. vectors: (19, n). velocity has n = 0 where the target does not have it. */
 typedef struct {
     int64_t n, passive, tick, stamp, steps, delayed, room;
     Reader displacement, velocity;
-    double *vectors /* [18 * n] */;
+    double *vectors /* [19 * n] */;
     Queue path, until, fresh;
     Tank *tank;                           /* of a spring on whose far side it is, or NULL */
     double promised, promise;
     int64_t since;                        /* of the promise */
+    double *premises /* [3] */;           /* steps of entries, those outside, energy at stake */
 } Account;
 
 /* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
@@ -325,7 +328,7 @@ int loop_carry_out(Loop *l, int64_t tick, At *at);
 int fmu_get(const Fmu *f, int64_t judged, At *at);
 int fmu_set(const Setter *s, const double *board, At *at);
 int fmu_do_step(const Fmu *f, double time, double size);
-int fmu_save(const Fmu *f, void *get_state, void *state);
+int fmu_save(const Fmu *f, void *get_state, void **state);
 int fmu_step(Fmu *f, double time, double end, double size, At *at);
 int fmu_checked_step(Fmu *f, double time, double end, double size, At *at);
 int meter_sample(Meter *m, const double *board, int64_t stamp);

@@ -110,13 +110,22 @@ class Machine:
     def change_hold(self, name: str, hold: Hold) -> None:
         """Replace the hold of a connection. Raises InputFault where the old or the new one has no
         C."""
-        for each in (hold, self._simulation.holds[name]):
-            if not isinstance(each, CompiledHold) and not can(each, repeats=False):
-                kind = type(parts(each).own).__name__
-                raise InputFault(f"hold of {name}: there is no C for {kind}: take `reset`")
-        self._simulation.holds[name] = made = self._made(name, hold)
-        self._kept.append(made)
+        self._require_compiled(name, self._simulation.holds[name])
+        self._simulation.holds[name] = made = self.other_hold(name, hold)
         self._holds[self._index("hold", name, lambda at: made)] = made.address
+
+    def other_hold(self, name: str, hold: Hold) -> CompiledHold:
+        """A hold that a connection can have in place of its own. Raises InputFault where it has no
+        C."""
+        self._require_compiled(name, hold)
+        made = self._made(name, hold)
+        self._kept.append(made)
+        return made
+
+    def _require_compiled(self, name: str, hold: Hold) -> None:
+        if not isinstance(hold, CompiledHold) and not can(hold, repeats=False):
+            kind = type(parts(hold).own).__name__
+            raise InputFault(f"hold of {name}: there is no C for {kind}: take `reset`")
 
     # --- what the arrays of `loop` hold -----------------------------------------------------
 

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator
 
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.base.loop_names import SHARED
 from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Scene
@@ -25,6 +26,8 @@ def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
         taken[fmu.name] = None
         yield from _source(path, fmu)
         yield from _velocity(path, fmu, scene)
+        if fmu.map and fmu.replaces is None:
+            yield (*path, "map"), "is of an FMU that replaces a block: lead [[connection]]s instead"
         if fmu.replaces is not None:
             yield from _replacement(path, fmu, [b.name for b in blocks.loop])
     for i, wire in enumerate(scene.connection):
@@ -39,7 +42,17 @@ def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
 
 
 def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
-    """Problems unless the FMU is either a file or a block to build."""
+    """Problems unless the FMU is a file, a block to build or one by an engine."""
+    if fmu.engine is not None:
+        if fmu.replaces not in SHARED:
+            yield (*path, "engine"), f"it is the engine of {' and '.join(SHARED)}: give `replaces`"
+        for key in ("path", "block", "settings"):
+            if getattr(fmu, key):
+                yield (
+                    (*path, key),
+                    "is not for an FMU by an engine: take one of them out",
+                )
+        return
     if fmu.path is None and fmu.block is None:
         yield (*path, "block"), "is missing, and so is path: give a block to build or an FMU's file"
     if fmu.path is not None and not text_files.exists(fmu.path):

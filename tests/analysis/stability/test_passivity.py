@@ -40,6 +40,10 @@ def test_a_wall_needs_the_damping_of_the_closed_form(
     found = hl.passivity("virtual-wall", WALL | gains | {"delays": {"wall.F": late * T}})
     form = wall_limits.passive_damping(T, late, np.array([K]), np.array([B]))[0]
     assert found.needed == pytest.approx(needed or form, rel=1e-3)
+    assert found.needed > (needed or form) * (1 - 1e-6)
+    shown = float(next(found.lines()).partition("damping of ")[2].partition(" ")[0])
+    assert found.needed <= shown * (1 + 1e-8)
+    assert shown <= found.needed * (1 + 1e-4)
     assert found.own == pytest.approx(5.0, rel=1e-3)
     assert found.passive == (found.needed <= 5.0)
     assert found.turning == 0.0

@@ -420,6 +420,31 @@ def test_an_interrupted_sweep_goes_on(
     assert not (out / ".running").exists()
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_sweep_that_is_interrupted_twice_leaves_nothing(
+    foreign: Path, tmp_path: Path, number: int
+) -> None:
+    """The second signal, at once, ends the process where it is."""
+    out = tmp_path / "out"
+    vary = ["--vary", "fmu.unit.start.nap=0.4,0.5,0.6", "--jobs", "2"]
+    started = subprocess.Popen(
+        [sys.executable, "-m", "hapticlink", "sweep", str(foreign), *vary, "--out", str(out)],
+        start_new_session=True, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    until = time.monotonic() + 60
+    while len(list(out.glob(".running/*"))) < 2 and time.monotonic() < until:
+        time.sleep(0.05)
+    for _ in range(2):
+        started.send_signal(number)
+        time.sleep(0.01)
+    message = started.communicate(timeout=30)[1]
+    while not _gone(started.pid) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert "interrupted twice" in message
+    assert "resource_tracker" not in message
+    assert not (out / ".running").exists()
+
+
 @pytest.mark.usefixtures("in_this_process")
 def test_a_run_is_made_again_where_its_fmu_has_changed(foreign: Path, tmp_path: Path) -> None:
     arguments = ("sweep", foreign, "--vary", "duration=0.1", "--out", tmp_path / "out")

@@ -18,13 +18,17 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.stability.hands import FIRM, HANDS, spring
+from hapticlink.analysis.stability.hands import FIRM, SPRINGS, spring
 from hapticlink.analysis.stability.held_equilibria import held
 from hapticlink.analysis.stability.linearisation import linearised
-from hapticlink.analysis.stability.poses import LIGHT, Pose
+from hapticlink.analysis.stability.poses import LIGHT, Pose, simulated
+from hapticlink.analysis.tune.run_measures import RunLimit, motion
 from hapticlink.analysis.tune.search import COARSE, search
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import written
+
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
 
 RECORDED = Path(__file__).parents[3] / "results" / "tune"
 TUNED = ("closed-loop", "enclosure", "obstacles", "serial", "telescope")
@@ -257,7 +261,7 @@ def test_the_columns_that_are_carried_hold_all_modes() -> None:
     given = pose.options(("sensing=encoders", "graphics.rate=32"))
     with held("closed-loop", given) as place:
         for scale in (0.1, 1.0, 3.0):
-            place.stable(dict.fromkeys(("drift", "topology"), scale), HANDS[0])
+            place.stable(dict.fromkeys(("drift", "topology"), scale), SPRINGS[0])
             whole = linearised(place._map, place._at.point)
             radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (place._at, whole)]
             assert radii[0] == pytest.approx(radii[1], rel=1e-6)
@@ -304,3 +308,16 @@ def gains(found: dict[str, Any], factor: float) -> tuple[str, ...]:
             for key, value in found["gains"].items()
         }
     )
+
+
+def test_the_energy_at_the_users_port_is_a_limit() -> None:
+    """A run whose port gives more than 1.2 times the energy of the scene's own, and 1 mJ."""
+    soft, stiff = (
+        simulated("closed-loop-direct", (), {"controller.teleoperation.stiffness": [k, k, 0.1]})
+        for k in (100.0, 150.0)
+    )
+    limit, peaks = RunLimit(soft), [motion(run)["energy_peak"] for run in (soft, stiff)]
+    assert limit.motion(soft)["energy_peak"] == peaks[0]
+    assert peaks[1] > max(1.2 * peaks[0], 1e-3)
+    with pytest.raises(InputFault, match="may give"):
+        limit.motion(stiff)

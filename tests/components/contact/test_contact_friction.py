@@ -40,12 +40,11 @@ def body(capsule, slope, inertia=INERTIA, speed=0.0):
 BAR, DISC = ((0.0, 0.0), (LENGTH, 0.0)), ((0.0, 0.0),)
 
 
-def running(linkage, friction, events=1, **contacts):
+def running(linkage, friction, events=1, integrator="rk4", **contacts):
     contacts = {"detection": "haptics"} | contacts
     contacts = Contacts(enclosure=FLOOR, friction=friction, **contacts)
-    return Running(
-        virtual_mechanism(linkage, Mechanism(events=events), None, contacts, step_s=2e-3)
-    )
+    mechanism = Mechanism(events=events, integrator=integrator)
+    return Running(virtual_mechanism(linkage, mechanism, None, contacts, step_s=2e-3))
 
 
 def test_a_bar_below_the_friction_angle_stays_for_a_minute():
@@ -64,12 +63,30 @@ def test_the_hand_feels_friction():
     np.testing.assert_allclose(bar.y["F_env"], -weight, atol=1e-6)
 
 
-def test_a_bar_above_the_friction_angle_slides():
+@pytest.mark.parametrize("integrator", ["rk4", "passive-midpoint"])
+@pytest.mark.parametrize(("slope", "friction"), [(0.6, 0.4), (0.3, 0.25)])
+def test_a_bar_above_the_friction_angle_slides(integrator, slope, friction):
     """a = g (sin - mu cos)."""
-    bar = advance(running(body(BAR, 0.6), 0.4), 2.0)
+    bar = advance(running(body(BAR, slope), friction, integrator=integrator), 2.0)
     before = bar.state["qd"][0]
-    a = G * (math.sin(0.6) - 0.4 * math.cos(0.6))
+    a = G * (math.sin(slope) - friction * math.cos(slope))
     assert advance(bar, 1.0).state["qd"][0] - before == pytest.approx(a, rel=1e-6)
+
+
+def test_passive_midpoint_has_order_two_while_a_pressed_bar_slides():
+    """A bar that sits deeper than at rest rocks on both ends while it slides, at no time out of
+    touch or sticking, so that friction is a smooth function of the pressure."""
+    rates, mu, depth = (500, 1000, 2000, 4000), 0.4, MASS * G / (2 * K)
+
+    def end(integrator, rate):
+        bar = running(body(BAR, 0.3), mu, integrator=integrator, damping=60.0)
+        z = np.full_like(bar.state["contact_deflection"], -mu * depth)
+        bar.put(q=(0.0, R - 1.3 * depth, 1e-4), qd=(5.0, 0.0, 0.0), contact_deflection=z)
+        return advance(bar, 0.05, rate).x[:6]
+
+    exact = end("rk4", 16000)
+    errors = [np.abs(end("passive-midpoint", rate) - exact).max() for rate in rates]
+    assert -np.polyfit(np.log(rates), np.log(errors), 1)[0] > 1.8
 
 
 @pytest.mark.parametrize(("friction", "slips"), [(0.5, False), (0.1, True)])

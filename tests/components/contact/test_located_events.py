@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hapticlink.components.blocks import mechanism_steps
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.contacts import Contacts, Disc
 from hapticlink.components.specs.linkage import (
@@ -176,3 +177,13 @@ def test_a_scene_without_contacts_pays_nothing():
         virtual_mechanism(linkage, Mechanism(events=events), step_s=1e-3).step for events in (0, 1)
     ]
     assert built[0].n_instructions() == built[1].n_instructions()
+
+
+def test_steps_of_many_operations_are_told_before_they_are_built(monkeypatch, caplog):
+    monkeypatch.setattr(mechanism_steps, "MANY", 100)
+    block(loose(((0.0, 0.0),)), FLOOR, integrator="heun", events=2)
+    assert "1 bodies with 2 places" in caplog.text
+    assert "`mechanism.integrator` = 'heun' and `mechanism.events` = 2 (5 steps" in caplog.text
+    monkeypatch.setattr(mechanism_steps, "MOST", 100)
+    with pytest.raises(ValueError, match=r"more than 100; fewer: `mechanism\.events` = 0"):
+        block(loose(((0.0, 0.0),)), FLOOR, integrator="heun", events=3)

@@ -1,8 +1,11 @@
 """L-stability of the linearly implicit method on a stiff joint, where explicit methods diverge."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from hapticlink.components.integrators import step
+from hapticlink.components.integrators.linearly_implicit import GAMMA
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Mechanism, OperationalPoint
 from tests.blocks import Running, virtual_mechanism
 
@@ -33,3 +36,41 @@ def test_stiff_modes_die_out_within_steps(stiffness, damping):
 
 def test_explicit_methods_do_not_hold_it():
     assert not abs(after("rk4", 40, 1e8, 1e5)) < 1
+
+
+def slipping(n):
+    """(x, u, p, t) -> x' of two masses that n springs which slip hold, as friction of contacts."""
+    x, u, p, t = (
+        ca.SX.sym(name, size) for name, size in (("x", 4 + n), ("u", 0), ("p", 0), ("t", 1))
+    )
+    q, v, z = x[:2], x[2:4], x[4:]
+    rates = [v[i % 2] * ca.cos(q[0]) - (1 + i) * z[i] * v[1] ** 2 for i in range(n)]
+    pulls = [-sum((40 * z[i] for i in range(k, n, 2)), start=30 * ca.sin(q[k])) for k in range(2)]
+    return ca.Function("f", [x, u, p, t], [ca.vertcat(v, *pulls, *rates)])
+
+
+def stepped(n):
+    f = slipping(n)
+    x, u, p, t, h = (
+        ca.SX.sym(name, size)
+        for name, size in (("x", 4 + n), ("u", 0), ("p", 0), ("t", 1), ("h", 1))
+    )
+    after = step("linearly-implicit", f, x, u, p, t, h, range(2))
+    return f, ca.Function("after", [x, u, p, t, h], [after], {"cse": True})
+
+
+def test_a_step_is_the_formula_of_its_reference_with_the_whole_matrix():
+    """(1 - gamma h J) k_1 = f(x),  (1 - gamma h J) k_2 = f(x + h k_1) - 2 k_1, by NumPy."""
+    f, after = stepped(5)
+    x, h = np.random.default_rng(1).normal(size=9), 0.05
+    J = ca.Function("J", f.sx_in(), [ca.jacobian(f(*f.sx_in()), f.sx_in()[0])])
+    A = np.eye(9) - GAMMA * h * np.array(J(x, [], [], 0))
+    k1 = np.linalg.solve(A, np.array(f(x, [], [], 0)).ravel())
+    k2 = np.linalg.solve(A, np.array(f(x + h * k1, [], [], h)).ravel() - 2 * k1)
+    expected = x + h * (1.5 * k1 + 0.5 * k2)
+    np.testing.assert_allclose(np.array(after(x, [], [], 0, h)).ravel(), expected, rtol=1e-12)
+
+
+def test_operations_grow_with_the_number_of_springs_that_slip_and_not_with_its_cube():
+    count = {n: stepped(n)[1].n_instructions() for n in (20, 40, 80)}
+    assert count[80] - count[40] < 2.1 * (count[40] - count[20])

@@ -13,7 +13,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.foreign_fmus import COMMAND, ISOLATED
+from tests.orchestrator.foreign_fmus import ISOLATED, RUN
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
 
 pytest.importorskip("resource")  # the FMU needs POSIX
@@ -137,7 +137,7 @@ def test_another_rounding_mode_is_restored_and_told(
 def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
     hostile_fmu(tmp_path, fmi)
     scene, out = hostile_scene(tmp_path, "step_exit_20"), tmp_path / "out"
-    command = [*COMMAND, "run", str(scene), "--out", str(out)]
+    command = [*RUN, str(scene), "--out", str(out)]
     environment = os.environ | {"HAPTICLINK_LOOP": loop}
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert ended.returncode == 1
@@ -147,13 +147,25 @@ def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
     assert found.haptics["time"].tolist() == [k / 64 for k in range(20)]
 
 
+def test_a_crash_at_the_end_is_recorded_at_the_time_of_its_rows(tmp_path: Path) -> None:
+    """The tables are whole by then, and nothing is recovered."""
+    hostile_fmu(tmp_path)
+    scene, out = hostile_scene(tmp_path, "end_null_9"), tmp_path / "out"
+    subprocess.run([*RUN, scene, "--out", out], check=False)
+    until = time.monotonic() + 30
+    while (end := tables.load(out).run["end"])["reason"] == "running" and time.monotonic() < until:
+        time.sleep(0.05)
+    assert end == {"reason": "fault", "time": 0.5}
+    assert tables.load(out).haptics["time"][-1] == 0.5
+
+
 def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path: Path) -> None:
     """A tool that never answers would hang the run; one signal ends it while it loads."""
     hostile_fmu(tmp_path, "2", needsExecutionTool="true")
     run = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").run
     assert set(run["isolated"]) == {"good_none_0", "source"}
     scene = hostile_scene(tmp_path, "make_sleep_0")
-    command = [*COMMAND, "run", str(scene), "--out", str(tmp_path / "o")]
+    command = [*RUN, str(scene), "--out", str(tmp_path / "o")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         time.sleep(4.0)
         assert process.poll() is None

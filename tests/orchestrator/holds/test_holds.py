@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -250,3 +252,28 @@ def test_a_turn_is_one_in_the_unit_of_each_angle(turn: float, seed: int) -> None
         hold.push(k, both, k)
         assert hold.value(k)[0] == pytest.approx(angle, abs=1e-9 * turn)
         assert hold.value(k)[1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("rates", "order"),
+    [((100, 100), 2), ((25, 100), 2), ((37, 100), 1), ((100, 37), 1), ((30, 512), 1)],
+)
+def test_lead_has_order_two_where_rates_divide(rates: tuple[int, int], order: int) -> None:
+    """The integral of a sine over 1 s, from samples of the first rate held over steps of the
+    second; both rates are multiplied by 4 to 32. `foh` has order 2 at any."""
+    errors: dict[str, list[float]] = {"lead": [], "foh": []}
+    for name, finer in itertools.product(errors, (4, 8, 16, 32)):
+        ticks = math.lcm(*rates) * finer
+        source, target = (ticks // (rate * finer) for rate in rates)
+        hold, total, worst = HOLDS[name](HoldContext(1, lambda t, of=ticks: t / of)), 0.0, 0.0  # type: ignore[misc]
+        for tick in sorted({*range(0, ticks, source), *range(0, ticks, target)}):
+            if tick % source == 0:
+                hold.push(tick, np.array([np.sin(3 * tick / ticks)]), tick)
+            if tick % target == 0:
+                if tick > 0.2 * ticks:  # the first two samples are zero-order
+                    worst = max(worst, abs(total - (1 - np.cos(3 * tick / ticks)) / 3))
+                total += target / ticks * float(hold.value(tick, target / 2)[0])
+        errors[name].append(worst)
+    slopes = {n: float(np.log2(e[0] / e[-1])) / 3 for n, e in errors.items()}
+    assert slopes["lead"] == pytest.approx(order, abs=0.25)
+    assert slopes["foh"] == pytest.approx(2, abs=0.25)

@@ -92,3 +92,35 @@ def test_a_step_back_by_a_nanometre_costs_next_to_nothing(reversals: int, apart:
     first = 0.5 * 1000.0 * (5e-4) ** 2  # while no swing is known
     assert made["zoh"] > 50 * first
     assert made["passive"] <= first + reversals * 2 * swing * 1e-9
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 8))
+def test_what_passive_makes_is_at_stake_or_the_first_of_a_swing(seed: int, every: int) -> None:
+    """Forces of any size on a motion of any steps, half of them not as predicted: the energy made
+    at any renewal is at most what the hold says is at stake and, where a force differs more from
+    the one before than any did, that difference times the distance until it is known."""
+    generator = np.random.default_rng(seed)
+    now, v = np.zeros(1), np.zeros(1)
+    hold = HOLDS["passive"](HoldContext(1, displacement=lambda: now, velocity=lambda: v))
+    work = ideal = swing = allowed = force = begun = way = 0.0
+    for tick in range(200):
+        if tick % every == 0:
+            fresh = float(generator.normal()) * 10 ** generator.uniform(-2, 2)
+            if tick:
+                ideal += (force + fresh) / 2 * (float(now[0]) - begun)
+                more = abs(fresh - force) / 2 - swing
+                allowed += max(more, 0.0) * way
+                swing = max(swing, abs(fresh - force) / 2)
+            hold.push(tick, np.array([fresh]), tick)
+            force, begun, way = fresh, float(now[0]), 0.0
+            _ = hold.value(tick, 0.5)
+            stake = hold.premises[2]  # type: ignore[attr-defined]
+            assert work - ideal <= allowed + stake + 1e-9 * (1.0 + abs(work) + abs(ideal))
+        held = float(hold.value(tick, 0.5)[0])
+        step = float(v[0])
+        if generator.random() < 0.5:
+            step = float(generator.normal()) * 10 ** generator.uniform(-3, 0)
+        work += held * step
+        way += abs(step)
+        now[0] += step
+        v[:] = generator.normal() * 10 ** generator.uniform(-3, 0)

@@ -46,7 +46,7 @@ class Coupling:
         self.credit = np.zeros(1)
         self.ends = [self._held(row, latency) for row in (0, 1)]
         self.near = self.far = 0.0
-        self.surplus = self.unforeseen = 0.0
+        self.surplus = self.unforeseen = self.beyond = self.most = 0.0
         self.force, self.effort = np.zeros(N), np.zeros(N)
 
     def _held(self, row: int, latency: Latency) -> Hold:
@@ -93,6 +93,7 @@ class Coupling:
         driven = -self.effort * predicted > 0.0
         right = np.where(driven, np.abs(dy) <= furthest, drawn <= 0.0)
         self.unforeseen += float(np.abs(drawn)[~right].sum())
+        self.beyond += float(np.abs(drawn)[~right].sum())
         self.far += float(drawn.sum())
         self.y += dy
 
@@ -106,6 +107,7 @@ class Coupling:
                 self.w[:] = generator.normal(size=N) * 10 ** generator.uniform(-3, 1)
             net = self.near + self.far - self.start if tick else 0.0
             worst = max(worst, net - self.surplus - self.unforeseen)
+            self.most = max(self.most, net)
             self.tick(tick)
             if tick == 0:
                 self.start = float(self.K @ (self.y - self.x) ** 2) / 2
@@ -145,3 +147,8 @@ def test_the_coupling_gives_both_sides_no_more_than_it_got(
     worst = coupling.run(generator, 200, against)
     scale = abs(coupling.near) + abs(coupling.far)
     assert worst <= 1e-9 * (1.0 + scale)
+    # What the run then reports: the steps beside the premise, and what the tank was short of.
+    steps, outside, stake = coupling.back.premises
+    assert stake <= coupling.beyond + 1e-9 * (1.0 + scale)
+    assert outside <= steps <= N * 200
+    assert coupling.most <= stake - coupling.tank.least[0] + 1e-9 * (1.0 + scale)

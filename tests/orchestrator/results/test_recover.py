@@ -16,7 +16,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.recover import Recovered, recover
-from tests.orchestrator.foreign_fmus import COMMAND, c_fmu, fmu_table, python_fmu, scene
+from tests.orchestrator.foreign_fmus import COMMAND, RUN, c_fmu, fmu_table, python_fmu, scene
 from tests.orchestrator.results.records import run_json
 
 LAST = 3.5
@@ -30,7 +30,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path: Path, extra: str) -> Non
     body = KILLS if not extra else f"if time >= {LAST}: __import__('time').sleep(1000)"
     python_fmu(tmp_path, "Dies", f"self.y = time + size\n        {body}")
     path, out = scene(tmp_path, fmu_table("one", "Dies", extra), duration=5), tmp_path / "out"
-    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    command = [*RUN, str(path), "--out", str(out)]
     if extra:
         with subprocess.Popen(command, stderr=subprocess.DEVNULL) as running:
             while not (table := out / "haptics.rows").exists() or (

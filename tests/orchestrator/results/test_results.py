@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.results.files import Recorder, write_json, write_over
+from hapticlink.orchestrator.results.files import Recorder, text, write, write_over
 from hapticlink.orchestrator.results.tables import read_table
 
 
@@ -100,7 +100,7 @@ def test_nan_is_written_as_such(tmp_path: Path) -> None:
 def test_the_end_of_a_run_is_written_over_what_is_there(tmp_path: Path) -> None:
     """The first that fits, on no more bytes than there were; where none fits, all stays."""
     path = tmp_path / "run.json"
-    write_json(path, {"end": "running"}, room=100)
+    write(path, text({"end": "running"}) + b" " * 100)
     size = path.stat().st_size
     for contents, found in (
         ([{"end": "x" * 200}, {"end": "fault"}], "fault"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -13,12 +14,17 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.plan.operations import Event
+from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_record import Timings
+from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.records import Iteration
 from tests.orchestrator import coupled
 from tests.orchestrator.foreign_fmus import c_fmu, fmu_table, python_fmu, scene
 from tests.orchestrator.native_mass import held
+
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
 
 try:
     load()
@@ -221,3 +227,39 @@ def test_steps_that_are_taken_back(
         found.append((details, outcome.end_time, table.rows.tobytes()))
     assert found[0] == found[1]
     assert found[0][0].energies_within_a_rate
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        [],
+        ["graphics.rate=29.97", "graphics.align=tick"],
+        ["graphics.rate={ min = 20, max = 60, seed = 4 }"],
+        ["graphics.rate=30", "graphics.phase=0.01"],
+        ["duration=20"],
+    ],
+)
+def test_kinds_of_events_are_bound_before_the_loop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str]
+) -> None:
+    """Those that the plan gives, in their order; within the time of the loop only those beyond the
+    communication points that it knows from the start."""
+    bound: list[list[Event]] = []
+    late: list[Event] = []
+    original, new = Events.prepare, Events._new_kind
+
+    def prepare(events: Events, kinds: Iterable[Event]) -> None:
+        bound.append([*kinds])
+        original(events, bound[-1])
+
+    def new_kind(events: Events) -> None:
+        late.append(events._event(events._key.tolist()))
+        new(events)
+
+    monkeypatch.setattr(Events, "prepare", prepare)
+    monkeypatch.setattr(Events, "_new_kind", new_kind)
+    ended = simulate("closed-loop-direct", tmp_path, options)
+    assert ended.outcome.fault is None
+    (prepared,) = bound
+    assert [*prepared, *late] == [*dict.fromkeys(m.event for m in Plan(ended.system))]
+    assert len(late) <= (1 if ended.outcome.end_time > 8 else 0)

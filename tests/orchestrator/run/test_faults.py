@@ -22,6 +22,7 @@ from hapticlink.orchestrator.results import tables
 from tests.orchestrator.foreign_fmus import (
     COMMAND,
     ISOLATED,
+    RUN,
     SLAVE,
     c_fmu,
     fmu_table,
@@ -230,7 +231,7 @@ def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
     c_fmu(tmp_path, python=True)
     path = scene(tmp_path, fmu_table("one", "faults", isolate))
     log = tmp_path / "log"
-    command = [*COMMAND, "run", str(path), "--out", str(tmp_path / "out")]
+    command = [*RUN, str(path), "--out", str(tmp_path / "out")]
     subprocess.run(command, check=True, env=os.environ | {"FAULT_FMU_LOG": str(log)})
     assert log.read_text().splitlines() == ["terminate", "free", "unloaded after its interpreter"]
 
@@ -270,7 +271,7 @@ def test_an_exception_in_terminate_is_told_after_the_last_row(
     python_fmu_of(tmp_path, slave, tmp_path.name)
     one = fmu_table("one", "Bad", isolate)
     path, out = scene(tmp_path, one + one.replace("one", "two")), tmp_path / "out"
-    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    command = [*RUN, str(path), "--out", str(out)]
     ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
     assert ended.returncode == 1
     assert b"hapticlink: two: fmi2Terminate returned fatal at t = 0.5 s" in ended.stderr
@@ -301,7 +302,7 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
 ) -> None:
     python_fmu(tmp_path, "Dies", f"self.y = time + size\n        if time >= 2.0: {crash}")
     path, out = scene(tmp_path, fmu_table("one", "Dies"), duration=5), tmp_path / "out"
-    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    command = [*RUN, str(path), "--out", str(out)]
     # Its end is that of the process beside it, which holds the same stream.
     ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
     assert ended.returncode == status
@@ -345,7 +346,7 @@ def test_a_signal_keeps_results_and_exits_with_1(
     python_fmu(tmp_path, "Slow", body)
     path = scene(tmp_path, fmu_table("one", "Slow", isolate), duration=100)
     out = tmp_path / "out"
-    with subprocess.Popen([*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE) as running:
+    with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.PIPE) as running:
         deadline = time.monotonic() + 60
         while not started.exists() and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -366,7 +367,7 @@ def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path: Path) -> None:
     python_fmu(tmp_path, "Fine", f"self.y = 1 / 3 + time; self.steps == 1 and {limit}")
     path = scene(tmp_path, fmu_table("one", "Fine"), duration=60)
     out = tmp_path / "out"
-    command = [*COMMAND, "run", str(path), "--out", str(out)]
+    command = [*RUN, str(path), "--out", str(out)]
     ended = subprocess.run(command, capture_output=True, check=False)
     assert ended.returncode == 1
     assert b"File too large" in ended.stderr
@@ -400,7 +401,7 @@ def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path: Path, step:
     if subprocess.run(["unshare", "-rm", "sh", "-c", mount], check=False).returncode:
         pytest.skip("no disk of one's own")
     out = disk / "out"
-    command = f"{mount}; {' '.join(COMMAND)} run {path} --out {out}; echo $?"
+    command = f"{mount}; {' '.join(RUN)} {path} --out {out}; echo $?"
     command += f"; cp -r {out} {tmp_path}"
     ended = subprocess.run(
         ["unshare", "-rm", "sh", "-c", command], capture_output=True, check=False

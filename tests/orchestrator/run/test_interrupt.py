@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
-from tests.orchestrator.foreign_fmus import COMMAND, ISOLATED, c_fmu, fmu_table, python_fmu, scene
+from tests.orchestrator.foreign_fmus import ISOLATED, RUN, c_fmu, fmu_table, python_fmu, scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
@@ -76,7 +76,7 @@ def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path: Path)
     python_fmu(tmp_path, "Slow", "__import__('time').sleep(0.01)")
     path = scene(tmp_path, fmu_table("one", "Slow", ISOLATED), duration=100)
     with subprocess.Popen(
-        [*COMMAND, "run", path, "--out", tmp_path / "out"],
+        [*RUN, path, "--out", tmp_path / "out"],
         stderr=subprocess.PIPE, start_new_session=True,
     ) as running:  # fmt: skip
         waited_for(lambda: workers(running.pid))
@@ -117,7 +117,7 @@ def test_a_second_signal_ends_an_fmu_that_hangs(
         text = fmu_table("one", "Hangs", isolate)
     out = tmp_path / "out"
     path = scene(tmp_path, text + "[faults]\ntimeout = 1000.0\n", duration=100)
-    with subprocess.Popen([*COMMAND, "run", path, "--out", out], stderr=subprocess.PIPE) as running:
+    with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.PIPE) as running:
         waited_for(lambda: rows_of(out) == 4)
         for _ in range(2):
             time.sleep(0.2)  # the first is taken, the FMU hangs

@@ -21,6 +21,8 @@ from hapticlink.components.specs.device import Device
 from tests.blocks import Running
 from tests.shared_fixtures import run_once
 
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
+
 MASS, T = 0.3, 1 / 512
 M = np.diag([0.3, 0.3, 3e-4])
 ARM = {
@@ -213,6 +215,18 @@ def test_it_warns_of_motors_at_their_limit() -> None:
     (line,) = warned("closed-loop", weak, "passivity controller counts forces")
     assert "motors of controller were at their limit" in line
     assert not warned("closed-loop", weak | {"controller.passivity": False}, "passivity")
+
+
+@pytest.mark.parametrize("rate", [10, 30])
+def test_a_run_warns_where_steps_outside_the_premises_matter(rate: int) -> None:
+    """`passive` generates more than the hand puts in at 10 Hz, and next to nothing at 30."""
+    options = {"hold": "passive", "graphics.rate": rate}
+    run = hl.run("closed-loop-direct", options, figures=False).record
+    (name,) = (n for n in run.premises if n.startswith("controller.F_drift"))
+    counted, said = run.premises[name], f"warning: passive of {name} generated"
+    assert any(line.startswith(said) for line in run.warnings or ()) == (rate == 10)
+    assert counted.at_stake > run.across[name].peak
+    assert (counted.outside > 0.2 * counted.steps) == (rate == 10)
 
 
 def test_it_warns_where_it_damps_counts_of_the_encoders() -> None:

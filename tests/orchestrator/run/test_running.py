@@ -54,7 +54,12 @@ def test_a_start_that_assembly_moves_far_is_told(
         assert status("run", "four-bar", "--no-figures", "--out", tmp_path, *SHORT, *options) == 0
         told = capsys.readouterr().out
         assert told.count("the loops do not close at the given start") == 2 * count
-    assert told.count("rocker from 2.9 to ") == 2
+    assert told.count("rocker = 2.9 }. Assembled: linkage.start = { crank = ") == 2
+    head, assembled = told.rsplit("linkage.start = ", 1)
+    assert head.rindex("done at") < head.rindex("warning:") < told.rindex("loops close within")
+    closed = f"linkage.start={assembled.splitlines()[0]}"
+    assert status("info", "four-bar", "--set", closed) == 0
+    assert "warning" not in capsys.readouterr().out
 
 
 def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:

@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.analysis.findings import requirements
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Table
 from hapticlink.orchestrator.scene.blocks import FromGraphics, blocks
+
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
 
 SHORT = "duration=0.2"
 
@@ -60,14 +61,3 @@ def test_terms_that_are_zero_change_nothing(tmp_path: Path) -> None:
     without = haptics("five-bar", tmp_path / "without")
     zero = ("linkage.gravity=[0.0, 0.0]", "linkage.joint.elbow1.friction=0.0")
     same(without, haptics("five-bar", tmp_path / "zero", *zero), 1e-13)
-
-
-def test_what_is_left_out_is_told_with_its_reason() -> None:
-    told = {n.part: (n.needed, n.why) for n in requirements.needs(open_scene.load("obstacles"))}
-    assert told["loop closures"] == (False, "no loop: no multiplier, no projection")
-    assert told["link2 on post"] == (False, "out of reach: no narrow phase")
-    assert told["contacts"] == (True, "2 pairs, 7 places, detected by graphics")
-    assert told["virtual_environment"] == (True, "for Lambda_inv, P_c, contact geometry")
-    alone = {n.part: n.needed for n in requirements.needs(open_scene.load("five-bar"))}
-    assert not alone["virtual_environment"]
-    assert alone["loop closures"]

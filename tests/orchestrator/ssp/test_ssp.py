@@ -22,6 +22,8 @@ from tests.orchestrator.foreign_fmus import (
     with_units,
 )
 
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
+
 
 def export(source: str, folder: Path, *options: str) -> Path:
     with pytest.raises(SystemExit) as ended:

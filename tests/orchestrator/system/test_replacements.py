@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pythonfmu.builder import FmuBuilder
 
@@ -68,7 +69,7 @@ def test_a_block_s_own_fmu_in_its_place_changes_no_byte(
     """Connections, order, rate and timing are those of the block."""
     swap = {**SHORT, "fmu.+": {"replaces": block, "path": str(own_files[block])}}
     swapped = hl.run("closed-loop", swap, out=tmp_path, figures=False)
-    assert swapped.run["replaced"] == {block: {"lost": [], "unfed": []}}
+    assert swapped.run["replaced"] == {block: {"lost": [], "unfed": [], "mapped": {}}}
     assert swapped.run["connections"] == own_run.run["connections"]
     for table in ("haptics.csv", "graphics.csv"):
         assert (own_run.folder / table).read_bytes() == (tmp_path / table).read_bytes()
@@ -115,6 +116,81 @@ def test_an_fmu_that_fits_nothing_is_refused(
     assert "[[connection]]" in told
     given = {"hand": "F[3]", "controller": "F_motor[3]", "virtual_mechanism": "x[3]"}
     assert given[block] in told
+
+
+PULL = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class Pull(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        for name in {names}:
+            value = {{"0": -0.5, "2": -0.0025}}.get(name.strip("()")[-1], 0.0)
+            self.register_variable(Real(
+                name, causality=Fmi2Causality.output, getter=lambda value=value: value))
+
+    def do_step(self, time, size):
+        return True
+"""
+"""The constant hand of closed-loop."""
+
+
+def pull(folder: Path, *names: str) -> Path:
+    script = folder / "pull.py"
+    script.write_text(PULL.format(names=names))
+    return Path(FmuBuilder.build_FMU(script, dest=folder))
+
+
+@pytest.mark.parametrize(
+    ("names", "given"),
+    [
+        (("force0", "force1", "force2"), ["--map", "F=force0,force1,force2"]),
+        (("force0", "force1", "force2"), ["--map", "hand.F=force0, force1,force2"]),
+        (("f_0", "f_1", "f_2"), []),
+        (("F(0)", "F(1)", "F(2)"), []),
+    ],
+)
+def test_an_fmu_of_other_names_acts_as_the_block(
+    tmp_path: Path, names: tuple[str, ...], given: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As the scene's own hand, which pushes with the same constant wrench, in signals of its
+    names, which figures and measures know."""
+    file = pull(tmp_path, *names)
+    own = hl.run("closed-loop", SHORT)
+    sets = [f"--set={key}={value}" for key, value in SHORT.items()]
+    command = ["run", "closed-loop", *sets, "--swap", f"hand={file}", *given]
+    assert status(*command, "--no-figures", "--out", tmp_path / "run") == 0
+    assert f"hand: F is what the FMU calls {', '.join(names)}" in capsys.readouterr().out
+    found = hl.load(tmp_path / "run")
+    assert found.run["replaced"]["hand"]["mapped"] == {"F": [*names]}
+    assert np.array_equal(found["hand.F"], own["hand.F"])
+    assert np.array_equal(found["haptic_device.x_true"], own["haptic_device.x_true"])
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("F=force0,force1", "2 variables for the 3 entries of F"),
+        ("G=force0,force1,force2", "no port of the block 'G'"),
+        ("F=force0,force1,force3", "no variable of the FMU 'force3'"),
+        ("F=force0,force0,force1", "force0 is given twice"),
+        ("force0", "--map force0: write port=variable"),
+        ("controller.F=force0", "no port of the block 'controller.F'"),
+    ],
+)
+def test_a_map_that_does_not_fit_is_refused(
+    tmp_path: Path, given: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = pull(tmp_path, "force0", "force1", "force2")
+    command = ["info", "closed-loop", "--swap", f"hand={file}", "--map", given]
+    assert status(*command) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_scene_has_the_map_too(tmp_path: Path) -> None:
+    file = pull(tmp_path, "pull0", "pull1", "pull2")
+    swap = {"replaces": "hand", "path": str(file), "map": {"F": ["pull0", "pull1", "pull2"]}}
+    assert hl.run("closed-loop", {**SHORT, "fmu.+": swap})["hand.F"][0, 0] == -0.5
 
 
 def test_an_fmu_of_other_names_fits_by_a_connection_of_the_scene(tmp_path: Path) -> None:

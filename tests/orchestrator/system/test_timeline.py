@@ -31,6 +31,8 @@ from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
 from tests.orchestrator.timelines import CAUSAL, LOOP, scene_of, scenes
 from tests.shared_fixtures import status
 
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
+
 Make = Callable[[Timeline, str], System]
 
 

@@ -22,6 +22,8 @@ from hapticlink.visualization.compare import numbers, overlay, page, settings
 from hapticlink.visualization.figures.run_figures import figures as run_figures
 from tests.shared_fixtures import status
 
+pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
+
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -69,7 +71,7 @@ def test_errors_are_compared_until_the_first_end(root: Path) -> None:
 def test_other_scenes_are_told(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert status("compare", str(root / "slow"), str(root / "other")) == 0
     said = capsys.readouterr().out
-    assert "warning: different mechanisms: Closed-loop mechanism of Table 6.1; " in said
+    assert "warning: different mechanisms: Five-bar in the hand; " in said
     assert "operational point from that of the first run" not in said
 
 

@@ -25,13 +25,13 @@ AT = """() => {
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
-    """A browser with a profile of its own."""
+def chromium(bypass_csp: bool = True) -> Iterator[Any]:
+    """A browser with a profile of its own; bypass_csp: tests may do what pages forbid."""
     if not CHROMIUM:
         pytest.skip("chromium is not installed")
     with tempfile.TemporaryDirectory() as profile, playwright.sync_playwright() as started:
         yield started.chromium.launch_persistent_context(
-            profile, executable_path=CHROMIUM, args=FLAGS, bypass_csp=True
+            profile, executable_path=CHROMIUM, args=FLAGS, bypass_csp=bypass_csp
         )
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.visualization.live.frames import light
 from hapticlink.visualization.live.messages import Gain, Hand, Time, newest, parse
 from hapticlink.visualization.live.mouse_hand import viewed
-from hapticlink.visualization.mechanism.picture import directions
+from hapticlink.visualization.mechanism.picture import Part, directions
 
 
 def test_a_pull_is_read() -> None:
@@ -59,26 +59,25 @@ def test_what_is_no_message_is_refused(text: str | bytes) -> None:
         parse(text)
 
 
-@pytest.mark.parametrize(
-    ("generated", "put_in", "color"),
-    [(0.0, 0.0, "green"), (-1.0, 0.5, "green"), (5e-5, 0.0, "green"), (5e-4, 0.0, "amber"),
-     (0.2, 1.0, "amber"), (1.1, 1.0, "red"), (0.1, -1.0, "red")],
-)  # fmt: skip
-def test_the_light_compares_what_was_generated_with_what_was_put_in(
-    generated: float, put_in: float, color: str
-) -> None:
-    assert light(generated, put_in) == color
-
-
 def test_constrained_directions_are_those_of_the_projector() -> None:
-    c, s = math.cos(0.3), math.sin(0.3)
-    line = np.array([c, s, 0.0])
-    (found,) = directions(np.outer(line, line).ravel().tolist())
-    assert abs(np.dot(found, [c, s])) == pytest.approx(1.0)
-    turn = np.diag([0.0, 0.0, 1.0])
-    assert directions(turn.ravel().tolist()) == []
-    both = np.array(directions(np.diag([1.0, 1.0, 0.0]).ravel().tolist()))
+    """Against the singular vectors of the projector's range, also where it has rank 2 out of the
+    plane."""
+    part = Part("", "directions", ("P_c",), (9,), directions(), sparse=True)
+
+    def shown(projector: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array(part.value({"P_c": projector.ravel().tolist()})).reshape(-1, 2)
+
+    line = np.array([math.cos(0.3), math.sin(0.3), 0.0])
+    (found,) = shown(np.outer(line, line))
+    assert abs(np.dot(found, line[:2])) == pytest.approx(1.0)
+    assert len(shown(np.diag([0.0, 0.0, 1.0]))) == 0
+    both = shown(np.diag([1.0, 1.0, 0.0]))
     assert np.allclose(both @ both.T, np.eye(2))
+    basis, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 2)))
+    _, sizes, axes = np.linalg.svd(basis[:2].T)
+    found = shown(basis @ basis.T)
+    assert np.hypot(*found.T) == pytest.approx(sizes)
+    assert np.abs(np.sum(found * axes, axis=1)) == pytest.approx(sizes)
 
 
 def test_a_scene_without_a_mechanism_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,171 @@
+"""A scene as a page in one file: size, time to make, and how fast its WebAssembly runs.
+
+Runs of 3 s take turns in rounds, each of a new instance, and the least time of each form counts.
+`run` is the loop of `hapticlink run` alone, with native FMUs, all outputs recorded, and node runs
+the module of the page; of both it is processor time. In Chromium the module runs in a worker of the
+page, opened from the disk, by the wall clock: other processes take part of it. The file is made
+without a cache of FMUs.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import process_time
+from typing import Any
+from unittest.mock import patch
+
+from benchmarks.rows import Rows
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.run import event_loop
+from hapticlink.orchestrator.run.compiled.library import load
+from hapticlink.visualization.live.mouse_hand import viewed
+from hapticlink.visualization.replay import one_file
+from hapticlink.visualization.standalone import page
+
+SCENES = (
+    ("closed-loop", ()),
+    ("closed-loop", ("hold=foh",)),
+    ("closed-loop-direct", ("hold=passive",)),
+    ("two-users", ()),
+    ("pendulum", ()),
+)
+DURATION = 3.0
+COLUMNS = ("scene", "bytes", "make_s", "run", "node", "chromium")
+ROUNDS = 15
+Told = Callable[[str, int, int], None]
+TIMED = """
+const timed = (given, now, rounds) => {
+  const module = new WebAssembly.Module(given.program), times = [];
+  for (let i = 0; i < rounds; i++) {
+    const program = new Program(module, given.data);
+    const ticks = Math.round(given.duration * given.data.scene.haptics);
+    const begun = now();
+    program.run(ticks);
+    times.push(now() - begun);
+  }
+  return Math.min(...times);
+};
+"""
+"""The least time (s) of a run."""
+IN_NODE = """
+import { readFileSync } from "node:fs";
+const now = () => { const { user, system } = process.cpuUsage(); return (user + system) / 1e6; };
+const given = JSON.parse(readFileSync(0));
+given.program = Buffer.from(given.program, "base64");
+console.log(timed(given, now, ROUNDS));
+"""
+IN_CHROMIUM = """async ([code, duration, rounds]) => {
+  const unpacked = async (id) => {
+    const text = atob(document.getElementById(id).textContent);
+    const packed = Uint8Array.from(text, (c) => c.charCodeAt(0));
+    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip")));
+  };
+  const text = async (id) => (await unpacked(id)).text();
+  const source = new Blob([await text("worker"), code], { type: "text/javascript" });
+  const worker = new Worker(URL.createObjectURL(source));
+  const answer = new Promise((resolve) => { worker.onmessage = ({ data }) => resolve(data); });
+  const program = await (await unpacked("program")).arrayBuffer();
+  const given = { data: JSON.parse(await text("data")), program, duration };
+  worker.postMessage([given, rounds]);
+  return answer;
+}"""
+IN_WORKER = """
+const now = () => performance.now() / 1e3;
+onmessage = ({ data: [given, rounds] }) => postMessage(timed(given, now, rounds));
+"""
+
+
+def bench(folder: Path, quick: bool, told: Told, command: str) -> Path:
+    """Measures all scenes, and writes README.md and runs.csv into `folder`."""
+    (folder / "runs.csv").unlink(missing_ok=True)
+    rows = Rows(folder / "runs.csv", COLUMNS, 1)
+    scenes = SCENES[:1] if quick else SCENES
+    with chromium() as browser:
+        for k, (scene, options) in enumerate(scenes):
+            title = " ".join((scene, *options))
+            told(title, k, len(scenes))
+            rows.add(title, *_measured(scene, options, 3 if quick else ROUNDS, browser))
+    path = folder / "README.md"
+    path.write_text(_page([*rows.rows.values()], command), encoding="utf-8")
+    return path
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """A headless browser of the machine's own."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as started:
+        flags = ["--no-sandbox", "--disable-gpu"]
+        yield started.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
+
+
+def _measured(
+    scene: str, options: tuple[str, ...], rounds: int, browser: Any
+) -> tuple[int, float, float, float, float]:
+    """Size (bytes), processor time to make (s), and times real time of run, node and Chromium."""
+    shown = viewed(scene, (*options, "packaging=native"), DURATION)
+    with tempfile.TemporaryDirectory() as name:
+        room = Path(name)
+        load()
+        begin = sum(os.times()[:4])
+        with patch.dict("os.environ", {"HAPTICLINK_CACHE": str(room / "cache")}):
+            page.write(shown, scene, room / "page.html")
+        make = sum(os.times()[:4]) - begin
+        text = (room / "page.html").read_text(encoding="utf-8")
+        opened = browser.new_page()
+        opened.goto(f"file://{room / 'page.html'}")
+        opened.wait_for_function("() => view.frame")
+        opened.click("#pause")
+        runs, nodes, wall = list[float](), list[float](), list[float]()
+        for _ in range(rounds):
+            with patch.object(event_loop, "perf_counter", process_time):
+                runs.append(simulate(shown, room / "run", csv=False).outcome.wall_time)
+            nodes.append(_node(text))
+            wall.append(opened.evaluate(IN_CHROMIUM, [TIMED + IN_WORKER, DURATION, 5]))
+        opened.close()
+        return len(text.encode()), make, *(DURATION / min(t) for t in (runs, nodes, wall))
+
+
+def _node(text: str) -> float:
+    """The least processor time (s) of a run of a page's module under node."""
+    given = {
+        "data": json.loads(one_file.unpacked(text, "data")),
+        "program": base64.b64encode(one_file.unpacked(text, "program")).decode(),
+        "duration": DURATION,
+    }
+    code = one_file.bundle("program.js") + TIMED + IN_NODE.replace("ROUNDS", "5")
+    command = ["node", "--input-type=module", "--eval", code]
+    done = subprocess.run(
+        command, input=json.dumps(given), capture_output=True, text=True, check=True
+    )
+    return float(done.stdout)
+
+
+def _page(rows: list[dict[str, str]], command: str) -> str:
+    first = rows[0]
+    method = " ".join((__doc__ or "").partition("\n\n")[2].split())
+    run, node, browser = (float(first[c]) for c in ("run", "node", "chromium"))
+    text = f"""# A scene as a page in one file
+
+{first["scene"]} is a file of {int(first["bytes"]) / 1e3:.0f} kB, which runs {browser:.0f} times real time in a worker of Chromium and {node:.0f} times under node; its run through FMUs {run:.0f} times.
+
+Made by `{command}`. {method} Measured on a machine with much other work, which shares caches and cores: ratios of processor times hold, other times do not. All rows: [runs.csv](runs.csv).
+
+| scene | kB | s of processors to make | run, times real time | node | Chromium |
+|---|--:|--:|--:|--:|--:|
+"""  # noqa: E501
+    return text + "".join(f"| {' | '.join(_cells(row))} |\n" for row in rows)
+
+
+def _cells(row: dict[str, str]) -> list[str]:
+    times = [f"{float(row[column]):.0f}" for column in ("run", "node", "chromium")]
+    return [row["scene"], f"{int(row['bytes']) / 1e3:.0f}", f"{float(row['make_s']):.1f}", *times]

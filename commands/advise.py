@@ -1,0 +1,71 @@
+"""`hapticlink advise`."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from hapticlink.commands.options import (
+    Json,
+    Out,
+    Quiet,
+    Scene,
+    Set,
+    Swap,
+    default_folder,
+    options,
+    tell,
+)
+from hapticlink.commands.progress import counted
+from hapticlink.commands.sweep import Jobs
+
+Draws = Annotated[int, Parameter(help="Hands and rates around the scene's own.")]
+Seed = Annotated[int, Parameter(help="Seed of the draws.")]
+
+
+def advise(
+    scene: Scene,
+    /,
+    *,
+    out: Out = None,
+    set: Set = None,
+    swap: Swap = None,
+    draws: Draws = 8,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Find the hold and the gains that suit a scene: all are run on it, and the best few in draws
+    around it.
+
+    Prints what to write into the scene, what it costs in error and energy, and what was within the
+    spread. Writes advice.json and table.csv to OUT (default advice/SCENE); the same command
+    continues what was interrupted.
+
+    For example:
+
+        hapticlink advise closed-loop-direct --set graphics.rate=22
+    """
+    from hapticlink.analysis.advise import advise as find
+    from hapticlink.orchestrator.results import folders
+    from hapticlink.orchestrator.results.files import write_json
+
+    folder = folders.ensure(out or default_folder("advice", scene, (*(set or ()), *(swap or ()))))
+    name, processes = default_folder("advice", scene).name, jobs or os.cpu_count() or 1
+    with counted(name, quiet) as show:
+        found = find(
+            scene,
+            options(set, swap),
+            folder,
+            processes=processes,
+            count=draws,
+            seed=seed,
+            tell=show,
+        )
+    write_json(folder / "advice.json", found.record())
+    lines = (f"{name}:", *(f"  {line}" for line in found.lines()), f"  {folder}/")
+    tell(lines, found.record(), quiet, json)
+    return 0

@@ -1,0 +1,73 @@
+"""`hapticlink transparency`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from hapticlink.commands.options import (
+    Json,
+    Out,
+    Quiet,
+    Scene,
+    Set,
+    Swap,
+    default_folder,
+    options,
+    tell,
+)
+from hapticlink.commands.progress import waiting
+from hapticlink.orchestrator.base.terminal_output import say
+
+Poses = Annotated[int, Parameter(help="Number of poses of the scene's run.")]
+Costs = Annotated[
+    bool, Parameter(negative="", help="Beside it what rates, delays and holds change at the start.")
+]
+
+
+def transparency(
+    scene: Scene,
+    /,
+    *,
+    out: Out = None,
+    set: Set = None,
+    swap: Swap = None,
+    poses: Poses = 2,
+    costs: Costs = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Compare what the hand meets at the handle with the mechanism that it should meet.
+
+    At poses of the scene's run, by direction up to 50 Hz: felt inertia, felt stiffness of
+    constrained directions, and the frequency up to which force and direction are within what a
+    person can tell (docs/transparency.md). Writes transparency.json and transparency.png to OUT
+    (default `runs/SCENE`).
+
+    For example:
+
+        hapticlink transparency closed-loop --set sensing=encoders --costs
+    """
+    from hapticlink.analysis import transparency as analysis
+    from hapticlink.orchestrator.results import folders
+    from hapticlink.orchestrator.results.files import write_json
+    from hapticlink.visualization.figure_axes import png, write
+    from hapticlink.visualization.figures import transparency_figure
+
+    given, name = options(set, swap), default_folder("runs", scene).name
+    with waiting(f"{name}: equilibria and linearisations, which can take a minute", quiet):
+        found = analysis.transparency(scene, given, count=poses)
+        beside = dict(analysis.costs(scene, given, say)) if costs else {}
+    folder = folders.ensure(out or default_folder("runs", scene, (*(set or ()), *(swap or ()))))
+    record = {
+        "title": found[0].title,
+        "poses": [pose.record() for pose in found],
+        "changes": {change: pose.record() for change, pose in beside.items()},
+    }
+    write_json(folder / "transparency.json", record)
+    write([("transparency", png(transparency_figure.draw(found)))], folder)
+    lines = [line for pose in found for line in pose.lines()]
+    lines += [line for pose in beside.values() for line in pose.lines()]
+    tell((f"{name}:", *(f"  {line}" for line in lines), f"  {folder}/"), record, quiet, json)
+    return 0

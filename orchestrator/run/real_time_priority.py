@@ -1,0 +1,71 @@
+"""Real-time priority of the thread that runs the haptic loop, as far as the user has the right.
+
+On Linux: SCHED_FIFO (sched(7)), above every normal thread and below the kernel's own; memory that
+is locked, so that no page is fetched in the middle of a step (mlockall(2)); and a core of its own
+where the machine was started with `isolcpus`. Threads and processes that the loop starts keep the
+normal priority: a graphics block beside it never delays it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+PRIORITY = 20
+"""Below the kernel's interrupt threads (50), above all that is not real time."""
+_ISOLATED = Path("/sys/devices/system/cpu/isolated")
+_CURRENT, _FUTURE = 1, 2  # MCL_CURRENT, MCL_FUTURE of mlockall(2)
+
+
+@contextmanager
+def raised() -> Iterator[dict[str, str]]:
+    """A context in which the calling thread has what the user may have of it. Gives what that is,
+    and for what was refused the reason: `scheduler`, `memory`, `core`."""
+    if sys.platform != "linux":
+        yield {"scheduler": "normal: real-time priority is for Linux only"}
+        return
+    cores = os.sched_getaffinity(0)
+    got = {"scheduler": _first_in_first_out(), "memory": _locked(), "core": _isolated()}
+    try:
+        yield got
+    finally:
+        os.sched_setaffinity(0, cores)
+        if got["memory"].startswith("locked"):
+            ctypes.CDLL(None).munlockall()
+        if got["scheduler"].startswith("SCHED_FIFO"):
+            # Only a privileged process may take the second flag back.
+            os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
+
+
+def _first_in_first_out() -> str:
+    try:
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
+    except PermissionError:
+        return f"normal: no right to SCHED_FIFO (ulimit -r {PRIORITY})"
+    return f"SCHED_FIFO {PRIORITY}"
+
+
+def _locked() -> str:
+    import resource  # not on Windows
+
+    unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
+    # With a limit, memory that is asked for later would be refused once it is reached.
+    wanted = _CURRENT | _FUTURE if unlimited or os.geteuid() == 0 else _CURRENT
+    if ctypes.CDLL(None, use_errno=True).mlockall(wanted):
+        return f"not locked: {os.strerror(ctypes.get_errno())} (ulimit -l unlimited)"
+    return "locked"
+
+
+def _isolated() -> str:
+    """Move the thread to the first isolated core."""
+    text = _ISOLATED.read_text().strip() if _ISOLATED.exists() else ""
+    if not text:
+        return "shared: none is isolated (isolcpus)"
+    core = int(text.replace("-", ",").split(",")[0])
+    os.sched_setaffinity(0, {core})
+    return f"{core}, isolated"

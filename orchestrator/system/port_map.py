@@ -1,0 +1,108 @@
+"""The ports of an FMU in the place of a block under the names that the block has for them: by the
+scene's `map`, and where names differ in brackets, underscores or case alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.variables import Scalar
+
+if TYPE_CHECKING:
+    from hapticlink.components.component import Component, Variable
+
+_INDEX = re.compile(r"[\[(_ ]?(\d+(?:[,_]\d+)?)[\])]?$")
+"""The index at the end of a name: F[1], F(1), F_1, F1, M[1,2], M_1_2."""
+Mapped = dict[str, tuple[str, ...]]
+"""By the block's port, the names of the FMU's scalars, row by row."""
+
+
+def mapped(
+    description: Description, block: Component, given: Mapping[str, str | tuple[str, ...]]
+) -> Mapped:
+    """What is called otherwise in an FMU than in the block that it replaces. Raises ValueError for
+    a port or variable that there is not, and for a number of variables that is not the port's."""
+    causes = {"input": block.inputs, "output": block.outputs, "parameter": block.parameters}
+    ports = {v.name: (v, cause) for cause, variables in causes.items() for v in variables}
+    found: Mapped = {}
+    for port, names in given.items():
+        if port not in ports:
+            raise ValueError(unknown("port of the block", port, ports))
+        found[port] = tuple(s.name for s in _named(description, names))
+        if len(found[port]) != (size := len(_places(ports[port][0]))):
+            raise ValueError(f"{len(found[port])} variables for the {size} entries of {port}")
+        if {s.name for s in description.scalars if port in (s.name, s.port)} - {*found[port]}:
+            raise ValueError(f"the FMU has a port {port} of its own: take {port} out of the map")
+    every = [name for names in found.values() for name in names]
+    if twice := [name for name in every if every.count(name) > 1]:
+        raise ValueError(f"{twice[0]} is given twice")
+    for port, (variable, cause) in ports.items():
+        taken = {name for names in found.values() for name in names}
+        free = [s for s in description.scalars if s.causality == cause and s.name not in taken]
+        if port not in found and not description.port(port, cause):
+            own = [s for s in free if s.port not in ports]
+            found |= {port: names} if (names := _alike(variable, own)) else {}
+    return found
+
+
+def renamed(description: Description, names: Mapped, block: Component) -> Description:
+    """The description with the scalars of `mapped` under the block's names."""
+    every = {v.name: v for v in (*block.inputs, *block.outputs, *block.parameters)}
+    new = {
+        own: f"{port}{place}"
+        for port, given in names.items()
+        for own, place in zip(given, _places(every[port]), strict=True)
+    }
+    return replace(
+        description,
+        scalars=tuple(replace(s, name=new.get(s.name, s.name)) for s in description.scalars),
+        dependencies={
+            new.get(output, output): frozenset(new.get(name, name) for name in on)
+            for output, on in description.dependencies.items()
+        },
+        derivatives={new.get(a, a): new.get(b, b) for a, b in description.derivatives.items()},
+    )
+
+
+def _named(description: Description, names: str | tuple[str, ...]) -> Iterator[Scalar]:
+    """The scalars of names, each of a variable or of a whole vector. Raises ValueError."""
+    for name in [names] if isinstance(names, str) else names:
+        there = [s for s in description.scalars if name in (s.name, s.port)]
+        if not there:
+            known = dict.fromkeys(s.port for s in description.scalars)
+            raise ValueError(unknown("variable of the FMU", name, known))
+        yield from sorted(there, key=lambda s: s.indices)
+
+
+def _places(variable: Variable) -> list[str]:
+    """The index of each entry as it is written: [1], [2], ...; "" of a scalar."""
+    places = product(*(range(1, n + 1) for n in variable.shape))
+    return [f"[{','.join(map(str, place))}]" if place else "" for place in places]
+
+
+def _alike(variable: Variable, scalars: Iterable[Scalar]) -> tuple[str, ...]:
+    """The scalars that are a port's entries by their names, counted from 1 or from 0; none where
+    one lacks or there are more."""
+    stem = _plain(variable.name)
+    if not variable.shape:
+        names = [s.name for s in scalars if _plain(s.name) == stem]
+        return tuple(names) if len(names) == 1 else ()
+    found: dict[tuple[int, ...], str] = {}
+    for s in scalars:
+        end = _INDEX.search(s.name)
+        if end and _plain(s.name[: end.start()]) == stem:
+            found[tuple(map(int, re.split("[,_]", end[1])))] = s.name
+    for first in (1, 0):
+        places = [*product(*(range(first, first + n) for n in variable.shape))]
+        if sorted(found) == places:
+            return tuple(found[place] for place in places)
+    return ()
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\W_]", "", name).lower()

@@ -1,0 +1,73 @@
+"""A scene as a WebAssembly module behind a page."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import casadi as ca
+
+from hapticlink.components.component import Component
+from hapticlink.fmus.native.compiler import compile_webassembly
+from hapticlink.fmus.native.source import functions
+from hapticlink.programs.build import OPTIONS
+from hapticlink.programs.ports import Port
+from hapticlink.programs.resolved import Resolved
+from hapticlink.programs.sources import HERE, prefixed, sources, table
+
+PAGE = "page.c"
+"""What stands in place of the FMU's own file, and includes it."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What a page draws: `function` of the signals at `places` (indices in the signal vector)."""
+
+    function: ca.Function
+    places: Sequence[int]
+
+
+def webassembly_files(
+    program: Resolved, components: Mapping[str, Component], ports: Sequence[Port], drawing: Drawing
+) -> dict[str, str]:
+    """The C files of the module, whose functions are those of page.c."""
+    texts = sources(program, components, ports)
+    texts |= {"program.inc": texts.pop("program.c"), **_picture(drawing)}
+    texts[PAGE] = (HERE / PAGE).read_text().replace('"program.c"', '"program.inc"')
+    texts["scene.h"] = f'#define GUID ""\n{texts["scene.h"]}'
+    return texts
+
+
+def webassembly(texts: Mapping[str, str], folder: Path) -> bytes:
+    """The module of these files, compiled in `folder`. Raises CompilerError."""
+    with tempfile.TemporaryDirectory(dir=folder) as name:
+        room = Path(name)
+        for file, text in texts.items():
+            (room / file).write_text(text)
+        files = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
+        return compile_webassembly(files, room, OPTIONS)
+
+
+def _picture(drawing: Drawing) -> dict[str, str]:
+    """C files of the function by which a page draws."""
+    given = drawing.function.expand()
+    text, pieces = functions([given])
+    numbers = f"#define N_RAW {given.nnz_in()}\n#define N_DRAWN {given.nnz_out()}\n"
+    declared = "void draw_picture(const double *raw, double *drawn);"
+    call = (
+        f"\nvoid draw_picture(const double *raw, double *drawn) {{\n"
+        f"    const double *arguments[{given.sz_arg()}] = {{raw}};\n"
+        f"    double *results[{given.sz_res()}] = {{drawn}};\n"
+        f"    casadi_int iw[{given.sz_iw() + 1}];\n    double w[{given.sz_w() + 1}];\n"
+        f"    {given.name()}(arguments, results, iw, w, 0);\n}}\n"
+    )
+    places = table("int raw_places", map(str, drawing.places))
+    parts = {f"picture_{k:03}.c": piece for k, piece in enumerate(pieces)}
+    files = {name: prefixed(part, "picture") for name, part in parts.items()}
+    return {
+        **files,
+        "picture.c": prefixed(text, "picture") + call,
+        "picture.h": f"{numbers}{places}\n{declared}\n",
+    }

@@ -1,0 +1,15 @@
+"""What a scene needs of its parts, and why the others are left out."""
+
+from hapticlink.analysis.findings import requirements
+from hapticlink.orchestrator import open_scene
+
+
+def test_what_is_left_out_is_told_with_its_reason() -> None:
+    told = {n.part: (n.needed, n.why) for n in requirements.needs(open_scene.load("obstacles"))}
+    assert told["loop closures"] == (False, "no loop: no multiplier, no projection")
+    assert told["link2 on post"] == (False, "out of reach: no narrow phase")
+    assert told["contacts"] == (True, "2 pairs, 7 places, detected by graphics")
+    assert told["virtual_environment"] == (True, "for Lambda_inv, P_c, contact geometry")
+    alone = {n.part: n.needed for n in requirements.needs(open_scene.load("five-bar"))}
+    assert not alone["virtual_environment"]
+    assert alone["loop closures"]

@@ -1,0 +1,132 @@
+"""What is felt, against closed forms, and against runs of the FMUs in a hand that shakes or presses
+the handle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import hapticlink as hl
+from hapticlink.analysis import transparency
+from hapticlink.analysis.stability.equilibrium import nearby
+from hapticlink.analysis.stability.hands import spring
+from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
+from hapticlink.analysis.stability.linearisable_scene import linearisable
+from hapticlink.analysis.stability.port_response import hand_port, response
+from hapticlink.analysis.transparency import FORCE, HERTZ
+from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.scene.overrides import written
+
+T = 1 / 512
+LENGTH = 0.2
+W = 2 * np.pi * HERTZ
+ENCODERS = {"sensing": "encoders", "device.encoder_resolution": 1e-9}
+
+
+def mobility() -> NDArray[np.float64]:
+    """Free along x with 2 kg and turning with .01 kg.m2, held along y."""
+    return np.diag([0.5, 0.0, 100.0])
+
+
+def test_a_delay_is_felt_as_an_error_of_its_phase() -> None:
+    """X = Lambda^-1 exp(-i w d)/-w^2: |exp(i w d) - 1| = 2 sin(w d/2), in each direction."""
+    delay = 2e-3
+    X = -np.exp(-1j * W * delay)[:, None, None] * mobility() / (W * W)[:, None, None]
+    found = transparency.of("", "", X, mobility(), LENGTH)
+    assert sorted(d.inertia for d in found.free) == pytest.approx([0.01 / LENGTH**2, 2.0])
+    for direction in found.free:
+        assert direction.error == pytest.approx(2 * np.sin(W * delay / 2), rel=1e-9)
+        assert direction.right_up_to == pytest.approx(FORCE / (2 * np.pi * delay), rel=2e-3)
+    (constraint,) = found.constrained
+    assert np.isinf(constraint.slow)
+    assert np.isinf(found.width)
+
+
+def test_a_spring_and_a_mass_too_many_are_felt_as_what_they_are() -> None:
+    """A constraint of 1 N/mm; 3 kg for 2 along x, so that nothing is right."""
+    X = np.zeros((len(W), 3, 3), complex)
+    X[:, 0, 0], X[:, 1, 1], X[:, 2, 2] = -1 / (3 * W**2), 1e-3, -100 / W**2
+    found = transparency.of("", "", X, mobility(), LENGTH)
+    heavy = max(found.free, key=lambda d: d.inertia)
+    assert heavy.felt == pytest.approx(3.0 + 0j)
+    assert heavy.error == pytest.approx(0.5)
+    assert heavy.right_up_to == 0.0 == found.right_up_to
+    assert found.constrained[0].slow == pytest.approx(1000.0)
+    light = 0.01 / LENGTH**2
+    slow = 2 * np.pi * transparency.SLOW
+    assert found.width == pytest.approx(1000.0 / (slow**2 * light))
+
+
+def test_ideal_sensing_is_right_up_to_half_a_period_of_delay() -> None:
+    """The impedance law makes the mechanism's inertia exactly, and the held motors' force is T/2
+    late: right up to .1/(2 pi T/2)."""
+    found = transparency.transparency("closed-loop", count=1)[0]
+    assert found.right_up_to == pytest.approx(FORCE / (np.pi * T), rel=0.02)
+
+
+def shaken(scene: str, options: dict[str, Any], target: dict[str, Any], seconds: float) -> hl.Run:
+    hand = {"stiffness": [1000.0, 1000.0, 3.0], "damping": [50.0, 50.0, 0.1]}
+    given = options | {"hand": {"type": "spring", "target": target} | hand, "duration": seconds}
+    return hl.run(scene, given, figures=False)
+
+
+def phasor(t: NDArray[np.float64], y: NDArray[np.float64], hertz: float) -> NDArray[np.complex128]:
+    """Of a sine with a slow drift, by least squares."""
+    turn = 2 * np.pi * hertz * t
+    base = np.stack([np.cos(turn), np.sin(turn), np.ones_like(t), t, t * t], axis=1)
+    a, b, *_ = np.linalg.lstsq(base, y, rcond=None)[0]
+    return np.asarray(a - 1j * b)
+
+
+@pytest.mark.parametrize("options", [{}, ENCODERS])
+def test_the_compliance_is_that_of_shaken_runs(options: dict[str, Any]) -> None:
+    """At the start of closed-loop, in a firm grip that is shaken by .1 mm along x and y: poses and
+    forces of the FMUs at the frequency, within .1 %. Of encoders
+    with counts so fine that they are not seen."""
+    start = hl.run("closed-loop", {"duration": 0.01}, figures=False)
+    pose = start.tables["haptics"]["virtual_mechanism.x"][0].tolist()
+    held = written(options | {"hand": spring(pose, (0.0, 0.0, 0.0), 1000.0)})
+    with (
+        linearisable("closed-loop", held) as (read, system, _),
+        lifted_map(long_enough(read, system), 0.0, read) as map_,
+    ):
+        linear = nearby(map_, map_.start)
+        assert linear
+        cut = response(map_, linear, hand_port(map_.system))
+    S = np.diag([1.0, 1.0, LENGTH])
+    for hertz, axis in ((2.0, 0), (8.0, 1), (24.0, 0), (50.0, 1)):
+        amplitude = [0.0, 0.0, 0.0]
+        amplitude[axis] = 1e-4
+        sine = {"mean": pose, "amplitude": amplitude, "frequency": [hertz] * 3}
+        table = shaken("closed-loop", options, sine, 3.0).tables["haptics"]
+        late = table["time"] > 2.0
+        t = table["time"][late] - 2.0
+        x, F = (phasor(t, table[n][late], hertz) for n in ("haptic_device.x", "hand.F"))
+        off = S @ (x - cut.compliance(hertz, T) @ F)
+        assert np.linalg.norm(off) < 1e-3 * np.linalg.norm(S @ x)
+
+
+def test_a_pressed_run_gives_the_felt_stiffness() -> None:
+    """A hand without a spring presses along the constrained direction at 2 Hz: within 1 %."""
+    read = open_scene.load("closed-loop", written(ENCODERS))
+    assert read.linkage
+    S = np.diag([1.0, 1.0, mean_link_length(read.linkage)])
+    felt = transparency.transparency("closed-loop", written(ENCODERS), count=1)[0]
+    (constraint,) = felt.constrained
+    hertz = float(HERTZ[np.argmin(np.abs(HERTZ - transparency.SLOW))])
+    wrench = (0.05 * S @ constraint.along).tolist()
+    sine = {"amplitude": wrench, "frequency": [hertz] * 3, "phase": [np.pi / 2] * 3}
+    hand = {"type": "profile", "table": sine}
+    given = ENCODERS | {"hand": hand, "linkage.start_velocity": {}, "duration": 3.0}
+    table = hl.run("closed-loop", given, figures=False).tables["haptics"]
+    late = table["time"] > 1.0
+    x, F = (
+        phasor(table["time"][late], table[n][late], hertz) for n in ("haptic_device.x", "hand.F")
+    )
+    along = constraint.along
+    size = abs(along @ np.linalg.inv(S) @ F) / abs(along @ S @ x)
+    assert size == pytest.approx(constraint.slow, rel=0.01)

@@ -1,0 +1,48 @@
+"""The priority of the loop's thread: it has what the user may have, and gives it back."""
+
+import os
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator.run import real_time_priority
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="sched(7) is of Linux")
+
+
+def test_the_thread_has_the_priority_and_its_threads_do_not() -> None:
+    before = os.sched_getscheduler(0), os.sched_getaffinity(0)
+    beside: list[int] = []
+    with real_time_priority.raised() as got:
+        own = os.sched_getscheduler(0)
+        thread = threading.Thread(target=lambda: beside.append(os.sched_getscheduler(0)))
+        thread.start()
+        thread.join()
+    allowed = got["scheduler"].startswith("SCHED_FIFO")
+    assert (own & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO) == allowed
+    assert beside == [os.SCHED_OTHER]
+    after = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getaffinity(0)
+    assert after == before
+
+
+def test_a_missing_right_is_a_reason_and_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refused)
+    with real_time_priority.raised() as got:
+        pass
+    assert got["scheduler"] == "normal: no right to SCHED_FIFO (ulimit -r 20)"
+
+
+def test_the_first_isolated_core_is_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    before = os.sched_getaffinity(0)
+    core = min(before)
+    (tmp_path / "isolated").write_text(f"{core}-7\n")
+    monkeypatch.setattr(real_time_priority, "_ISOLATED", tmp_path / "isolated")
+    with real_time_priority.raised() as got:
+        assert os.sched_getaffinity(0) == {core}
+    assert got["core"] == f"{core}, isolated"
+    assert os.sched_getaffinity(0) == before

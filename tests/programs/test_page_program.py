@@ -1,0 +1,181 @@
+"""A scene as WebAssembly, under node: against the same C for the machine, and against a run that is
+changed in the same way at the same ticks."""
+
+from __future__ import annotations
+
+import base64
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+
+from hapticlink.fmus.native.compiler import FLAGS
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.real_time_session import LiveRun
+from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.run.compiled.library import load
+from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
+from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.build_system import built
+from hapticlink.programs.build import components
+from hapticlink.programs.page_program import webassembly_files
+from hapticlink.programs.ports import ports
+from hapticlink.programs.resolved import resolved
+from hapticlink.visualization.live.mouse_hand import STIFFNESS, viewed
+from hapticlink.visualization.replay import one_file
+from hapticlink.visualization.standalone import page
+from hapticlink.visualization.standalone.description import Description
+from tests.visualization.live.javascript import javascript
+
+P_C = "virtual_environment.P_c -> controller.P_c"
+CHANGES: list[tuple[int, dict[str, Any]]] = [
+    (10, {"type": "hand", "at": [0.06, -0.01]}),
+    (40, {"type": "rate", "value": 10.0}),
+    (90, {"type": "hold", "connection": P_C, "hold": "foh"}),
+    (150, {"type": "rate", "value": 77.0}),
+    (170, {"type": "delay", "connection": P_C, "value": 0.0205}),
+    (260, {"type": "hold", "connection": P_C, "hold": "smooth"}),
+    (300, {"type": "gain", "name": "controller.k_j", "factor": 3.0}),
+    (330, {"type": "delay", "connection": P_C, "value": 0.0}),
+    (350, {"type": "topology", "on": False}),
+    (400, {"type": "rate", "value": 200.0}),
+    (420, {"type": "hand", "at": None}),
+]
+"""After so many haptic events."""
+EVENTS = 512
+RUN = """
+const module = new WebAssembly.Module(Buffer.from(given.program, "base64"));
+const program = new Program(module, given.data);
+const changes = [...given.changes];
+answer = [];
+for (let i = 1; i <= given.events; i++) {
+  program.run();
+  answer.push([...program.numbers(program.c.signal_values(program.m), given.data.n_values)]);
+  while (changes.length && changes[0][0] === i) program.apply(changes.shift()[1]);
+}
+"""
+
+
+def under_node(scene: Scene, changes: list[tuple[int, dict[str, Any]]]) -> np.ndarray:
+    """The vector of signals after each haptic event."""
+    text = page.html(scene, "page")
+    data = json.loads(one_file.unpacked(text, "data"))
+    program = base64.b64encode(one_file.unpacked(text, "program")).decode()
+    given = {"data": data, "program": program, "changes": changes}
+    return np.array(javascript("program.js", RUN, given | {"events": EVENTS}))
+
+
+def changed_run(scene: Scene, folder: Path, apply: Callable[[LiveRun, Any], None]) -> np.ndarray:
+    """The same of a run in the loop of every run, whose holds, rate and gains change as those of a
+    run in real time, without waiting for a clock."""
+    rows, changes = list[np.ndarray](), [*CHANGES]
+    with built(scene) as system, ExitStack() as stack:
+        simulation = Simulation(system, RunFolder(folder), stack)
+        loop = CompiledLoop(Plan(system), simulation, load())
+        simulation.start()
+        live = LiveRun(scene)
+        vars(live).update(
+            _simulation=simulation, _loop=loop, _settings={}, _connections={}, _places={},
+            _run=SimpleNamespace(changes=[]),
+        )  # fmt: skip
+        haptic = system.timeline.clocks[0].longest
+
+        def turn(tick: int) -> None:
+            if tick % haptic or len(rows) != tick // haptic:
+                return
+            rows.append(simulation.signals.values.copy())
+            while changes and changes[0][0] == len(rows):
+                apply(live, changes.pop(0)[1])
+                for instance in simulation.instances.values():
+                    instance.settle()  # which a run in real time does before its steps
+
+        loop.events.patience(0)
+        loop.run(turn)
+    return np.array(rows[:EVENTS])
+
+
+def apply(live: LiveRun, message: dict[str, Any]) -> None:
+    """As visualization/live/controls.py does, written out for these gains."""
+    match message:
+        case {"type": "hand", "at": None}:
+            live.set("hand.stiffness", (0.0, 0.0, 0.0))
+        case {"type": "hand", "at": at}:
+            live.set("hand.target", (*at, 0.0))
+            live.set("hand.stiffness", STIFFNESS)
+        case {"type": "rate", "value": rate}:
+            live.rate("graphics", rate)
+        case {"type": "hold", "hold": hold}:
+            live.hold(P_C, hold)
+        case {"type": "delay", "value": delay}:
+            live.hold(P_C, None, delay)
+        case {"type": "gain"}:
+            live.set("controller.k_j", 600.0)
+        case {"type": "topology"}:
+            live.set("controller.k_j", 0.0)
+            live.set("controller.b_j", 0.0)
+
+
+@pytest.mark.parametrize("options", [(), ("graphics.rate=32", "coupling=jacobi")])
+def test_changes_are_those_of_a_run_in_real_time(options: tuple[str, ...], tmp_path: Path) -> None:
+    scene = viewed("closed-loop", options, duration=1.5)
+    expected = changed_run(scene, tmp_path, apply)
+    found = under_node(scene, CHANGES)
+    assert found.shape == expected.shape
+    assert np.ptp(found, axis=0).max() > 1
+    assert np.allclose(found, expected, rtol=1e-9, atol=1e-9), np.abs(found - expected).max(axis=1)
+
+
+MAIN = """
+#include <stdio.h>
+#include <stdint.h>
+void *create(void);
+int set(void *, unsigned, double), begin_run(void *), run(void *, int);
+const double *signal_values(const void *);
+int main(void) {
+    void *m = create();
+    begin_run(m);
+    for (int i = 0; i < EVENTS; i++) {
+        run(m, 1);
+        if (i == 9) { SET }
+        fwrite(signal_values(m), sizeof(double), N_NUMBERS, stdout);
+    }
+}
+"""
+
+
+@pytest.mark.skipif(fmpy.platform != "linux64", reason="runs a program for Linux")
+def test_webassembly_has_the_bits_of_the_same_c_with_the_same_sine(tmp_path: Path) -> None:
+    """Against a program for this machine with musl, whose mathematics WebAssembly has, too."""
+    scene = viewed("closed-loop", ("hold=foh",))
+    with resolved(scene, changing=True) as program:
+        made = components(program)
+        variables = ports(program, made)
+        description = Description(program, variables, "page")
+        files = webassembly_files(program, made, variables, description.drawing)
+    references = description.data["parameters"]
+    pull = dict(zip(references["hand.target"], (0.06, -0.01, 0.0), strict=True))
+    pull |= dict(zip(references["hand.stiffness"], STIFFNESS, strict=True))
+    main = MAIN.replace("SET", " ".join(f"set(m, {r}, {v});" for r, v in pull.items()))
+    (tmp_path / "main.c").write_text(main)
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    numbers = description.data["n_values"]
+    sizes = [f"-DEVENTS={EVENTS}", f"-DN_NUMBERS={numbers}", "-DEXPORT="]
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-linux-musl", *FLAGS, "-w"]
+    command += [*sizes, "-o", "native", *(p.name for p in tmp_path.glob("*.c")), "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    native = subprocess.run(["./native"], cwd=tmp_path, check=True, capture_output=True).stdout
+    expected = np.frombuffer(native).reshape(EVENTS, numbers)
+    found = under_node(scene, [(10, {"type": "hand", "at": [0.06, -0.01]})])
+    assert np.ptp(found[10:], axis=0).max() > 1
+    # 10 events, then the pull acts; JSON has no -0.
+    assert np.array_equal(found, expected + 0.0)

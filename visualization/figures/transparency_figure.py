@@ -1,0 +1,53 @@
+"""The figure of a transparency: felt inertia over the mechanism's, and the error of its force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import fill
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from hapticlink.analysis.transparency import FORCE, HERTZ, Transparency
+from hapticlink.orchestrator.results.numbers import short
+from hapticlink.visualization.figure_axes import plain
+
+
+def draw(found: Sequence[Transparency]) -> Figure:
+    """By pose and direction over the frequency, with the threshold of a force, and the felt
+    stiffness of constrained directions."""
+    stiff = [c.stiffness for pose in found for c in pose.constrained]
+    shown = any(np.isfinite(k).any() for k in stiff)
+    figure = Figure(figsize=(4.2 * (2 + shown), 3.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    felt, error, *third = figure.subplots(1, 2 + shown)
+    for i, pose in enumerate(found):
+        for j, direction in enumerate(pose.free):
+            style = {"color": f"C{i}", "ls": ("-", "--", ":")[j]}
+            name = f"{pose.pose}, {direction.inertia:.3g} kg"
+            felt.semilogx(HERTZ, direction.felt.real / direction.inertia, label=name, **style)
+            error.loglog(HERTZ, 100 * direction.error, **style)
+        for constraint in pose.constrained if shown else ():
+            third[0].loglog(HERTZ, constraint.stiffness, color=f"C{i}", label=pose.pose)
+    felt.axhspan(1 - FORCE, 1 + FORCE, color="0.9", zorder=0)
+    felt.set_ylabel("felt inertia / that of the mechanism")
+    felt.legend(fontsize="small")
+    error.axhline(100 * FORCE, color="tab:red", lw=1.0)
+    error.text(HERTZ[0], 110 * FORCE, "what a person can tell", color="tab:red", fontsize="small")
+    error.set_ylabel("error of the force along the motion (%)")
+    for axes in third:
+        axes.set_ylabel("felt stiffness of the constraint (N/m)")
+    for axes in (felt, error, *third):
+        axes.set_xlabel("frequency (Hz)")
+    figure.suptitle(plain(fill(f"{found[0].title}: {_finding(found)}", 90)), fontsize="medium")
+    return figure
+
+
+def _finding(found: Sequence[Transparency]) -> str:
+    worst = min(pose.right_up_to for pose in found)
+    if np.isinf(worst):
+        return f"force and direction are right up to {HERTZ[-1]:g} Hz"
+    if not worst:
+        return f"the inertia is wrong from {HERTZ[0]:g} Hz on"
+    return f"the inertia is felt right up to {short(worst)} Hz"

@@ -1,0 +1,48 @@
+// What the meters of a run say: of each connection that carries power the work of the effort that was held, and that of an
+// ideal source. `power` lists the connections, whether a hand pushes there (`hand`), and whether what is put in there
+// counts (`counts`: what a controller passes on was not put in by it).
+const WINDOW = 1; // s, over which the light judges
+
+export class Energies {
+  constructor({ power, port, noticeable }) {
+    this.power = power;
+    this.port = port;
+    this.noticeable = noticeable;
+    this.past = [];
+    this.energy = {};
+  }
+
+  // Gives a frame its `energy` (J): generated at the user's port, which is what the mechanism has stored beyond the work
+  // of the hands, and by connection; and where it has new sums, the `light`.
+  add(frame) {
+    if (frame.booked) {
+      this.sum(frame);
+      this.past.push({ t: frame.t, generated: this.generated, put_in: this.put_in });
+      while (frame.t - this.past[0].t > WINDOW) this.past.shift();
+      const [before] = this.past;
+      frame.light = light(this.generated - before.generated, this.put_in - before.put_in, this.noticeable);
+    }
+    frame.energy = this.energy;
+    if (this.energy[this.port] > this.noticeable) frame.states.push("energy");
+  }
+
+  sum({ booked, stored }) {
+    this.start ??= stored;
+    this.energy = { [this.port]: stored - this.start };
+    this.generated = this.put_in = 0;
+    this.power.forEach(({ name, hand, counts }, i) => {
+      const [held, ideal] = booked[i];
+      this.energy[name] = held - ideal;
+      this.generated += held - ideal;
+      if (hand) this.energy[this.port] -= held;
+      if (counts) this.put_in += Math.max(ideal, 0);
+    });
+  }
+}
+
+// Red where sampling and holding generated more (J) than hands and mechanism put in, as in the judgement of a whole run,
+// by more than what is noticeable; amber from a tenth of that on.
+export function light(generated, put_in, noticeable) {
+  const most = Math.max(put_in, 0) + noticeable;
+  return generated > most ? "red" : generated > 0.1 * most ? "amber" : "green";
+}

@@ -1,0 +1,111 @@
+// The worker of a page that needs nothing else: runs the scene beside the clock, once or with two settings beside each
+// other, and answers the page's messages as the server does.
+import { Program, settings } from "./program.js";
+
+const BEHIND = 0.1; // s, by which a run may be late before time is moved
+const LONGEST = 600; // s, of a recording
+let module, data, runs = [], origin = 0, missed = 0, rows = null, heard = null;
+const changed = [settings()]; // of run A, and of B where there are two
+const state = { type: "state", paused: false, recording: null, ended: null };
+const seconds = () => performance.now() / 1e3;
+
+function begin() {
+  state.ended = null;
+  origin = seconds();
+  rows = state.recording ? changed.map(() => []) : null;
+  runs = changed.map((each) => new Program(module, data, each));
+  guarded(tick); // that of t = 0
+  postMessage({ ...data.scene, type: "scene", runs: runs.length });
+  tell();
+}
+
+function tell() {
+  const [a, b] = runs.map((run) => run.controls);
+  postMessage({ type: "controls", ...a, b });
+  postMessage(state);
+  const is_changed = JSON.stringify(a) !== JSON.stringify(data.controls);
+  postMessage(is_changed ? { ...data.map, verdict: "", said: "computed for the settings of the start alone" } : data.map);
+}
+
+// Ends a run that cannot go on, with the reason.
+function guarded(act) {
+  try { act(); } catch (error) {
+    state.ended = error.message;
+    postMessage(state);
+  }
+}
+
+function tick() {
+  for (const run of runs) run.run();
+  heard?.samples.push(...[0, 1].map((side) => (runs[side] ?? runs[0]).heard(heard.signal)));
+  if (!rows) return;
+  runs.forEach((run, i) => rows[i].push(run.row));
+  if (runs[0].time > LONGEST) HANDLERS.time({ do: "record" });
+}
+
+// All haptic events that are due.
+function turn() {
+  if (!state.paused && !state.ended) guarded(() => {
+    const late = seconds() - origin - runs[0].due;
+    if (late > BEHIND) {
+      missed += Math.round(late * data.scene.haptics);
+      origin += late;
+    }
+    while (!state.ended && runs[0].due <= seconds() - origin) tick();
+  });
+  if (heard?.samples.length) {
+    heard.port.postMessage(heard.samples);
+    heard.samples = [];
+  }
+}
+
+function save() {
+  const names = ["time", ...data.tables.flatMap(({ columns }) => columns)].map((name) => (name.includes(",") ? `"${name}"` : name));
+  rows.forEach((each, i) => {
+    const text = [names, ...each].map((row) => row.join(",")).join("\n");
+    postMessage({ type: "file", name: `${data.name}${i ? "-b" : ""}.csv`, text: `${text}\n` });
+  });
+  rows = null;
+}
+
+const HANDLERS = {
+  begin(message) {
+    data = message.data;
+    module = new WebAssembly.Module(message.program);
+    begin();
+    setInterval(turn, 2);
+  },
+  frame() {
+    const [a, b] = runs.map((run) => run.frame);
+    if (a) postMessage({ ...a, b, type: "frame", missed });
+  },
+  time(message) {
+    switch (message.do) {
+      case "pause": state.paused = true; break;
+      case "resume": state.paused = false; origin = seconds() - runs[0].due; break;
+      case "step": state.paused = true; guarded(tick); break;
+      case "reset": return begin();
+      case "record":
+        if (rows) save();
+        state.recording = state.recording ? null : `${data.name}.csv`;
+        if (state.recording) return begin();
+    }
+    tell();
+  },
+  // A second run beside the first, which begin with the same settings; or the first alone again.
+  compare({ on }) {
+    if (rows) HANDLERS.time({ do: "record" });
+    changed.splice(1, 1, ...(on ? [structuredClone(changed[0])] : []));
+    begin();
+  },
+  // Samples of a signal of both runs at each haptic tick go to a port, none without one.
+  sound({ port, signal }) { heard = port ? { port, signal, samples: [] } : null; },
+};
+
+onmessage = ({ data: message }) => {
+  const handler = HANDLERS[message.type];
+  if (handler) { handler(message); return; }
+  const is_hand = message.type === "hand", on = is_hand ? runs : [runs[message.b ? 1 : 0]];
+  try { for (const run of on) run?.apply(message); } catch (error) { postMessage({ type: "refused", why: error.message }); }
+  if (!is_hand && runs.length) tell();
+};

@@ -1,0 +1,139 @@
+"""What a page without a server is told of its scene: what the server would send, and where the
+program has what frames show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+
+from hapticlink.analysis.findings.limits import NOTICEABLE_J
+from hapticlink.orchestrator.base.loop_names import MECHANISM_ENERGY
+from hapticlink.orchestrator.results.scene_part import by_user
+from hapticlink.programs.page_program import Drawing
+from hapticlink.programs.ports import Port
+from hapticlink.programs.resolved import Resolved
+from hapticlink.visualization.frame_signals import shown, shown_of_user
+from hapticlink.visualization.live.controls import Offered, Settings, stiffness, target, users
+from hapticlink.visualization.live.frames import power, there
+from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
+from hapticlink.visualization.mechanism.picture import PORT, RAW, Part, Picture
+
+Places = Mapping[str, Mapping[str, Sequence[int]]]
+"""By user and name in a frame, the indices of its signal in the vector of signals."""
+
+
+class Description:
+    """data: as JSON has it, for program.js. drawing: what the program computes of its signals."""
+
+    def __init__(self, program: Resolved, ports: Sequence[Port], name: str) -> None:
+        scene, system = program.scene, program.system
+        assert scene.linkage
+        picture = Picture(scene.linkage, by_user(scene.device, scene.devices), scene.contacts)
+        places, offered = _places(program), Offered(scene, system)
+        parts = [p for p in picture.parts if {*p.needs} <= {*places.get(p.user, {})}]
+        self.drawing = _drawing(parts, places)
+        timeline = system.timeline
+        if program.changes.clock < 0:
+            offered.rate = None
+        references: dict[str, list[int]] = {}
+        for reference, port in enumerate(ports):
+            references.setdefault(port.name.partition("[")[0], []).append(reference)
+        self.parameters = {name: value.tolist() for name, (value, _) in offered.gains.items()}
+        """The gains with which the page begins, with all hands pulling where the handles are."""
+        for user, found in places.items():
+            handle = [float(program.start_values[place]) for place in found["handle"]]
+            self.parameters[target(user)] = handle
+        hands = {u: {"stiffness": stiffness(u), "target": target(u)} for u in users(scene)}
+        chosen = [*offered.gains, *(hand["target"] for hand in hands.values())]
+        self.data: dict[str, Any] = {
+            "name": name,
+            "scene": {
+                "title": scene.title,
+                "marks": [mark._asdict() for mark in picture.marks],
+                "users": [*users(scene)],
+                "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
+                "power": power(system, program.meters),
+                "shapes": SHAPES,
+                "kinds": KINDS,
+                "port": PORT,
+                "noticeable": NOTICEABLE_J,
+            },
+            "controls": offered.described(Settings()),
+            "topology": offered.topology,
+            "hands": hands,
+            "parameters": {name: references[name] for name in chosen},
+            "choices": [
+                {"connection": c.connection, "hold": c.hold} for c in program.changes.choices
+            ],
+            "signals": [
+                {"user": user, "name": key, "places": [*at]}
+                for user, found in places.items()
+                for key, at in found.items()
+                if key not in RAW
+            ],
+            "parts": [*_laid_out(parts)],
+            "stored": program.simulation.signals.scalar(*MECHANISM_ENERGY.split(".")),
+            "n_values": len(program.simulation.signals.values),
+            "n_drawn": self.drawing.function.nnz_out(),
+            "tables": [{"columns": _columns(program, clock)} for clock in program.tables],
+        }
+
+
+def _places(program: Resolved) -> Places:
+    """The signals that frames of a scene show."""
+    fmus, signals = program.system.fmu, program.simulation.signals
+    found = {}
+    for user in users(program.scene):
+        asked = there(fmus, shown_of_user(user) if user else shown())
+        found[user] = {
+            key: signals.port(fmus[output.partition(".")[0]], output.partition(".")[2])
+            for key, output in asked.items()
+        }
+    return found
+
+
+def _drawing(parts: Sequence[Part], places: Places) -> Drawing:
+    """All parts as one function of their signals in a row."""
+    needed = [
+        (part.user, name, size)
+        for part in parts
+        for name, size in zip(part.needs, part.sizes, strict=True)
+    ]
+    largest = {(user, name): 0 for user, name, _ in needed}
+    for user, name, size in needed:
+        largest[user, name] = max(largest[user, name], size)
+    symbols = {key: ca.SX.sym("_".join(key), size) for key, size in largest.items()}
+    results = []
+    for part in parts:
+        given = zip(part.needs, part.sizes, strict=True)
+        arguments = (symbols[part.user, name][:size] for name, size in given)
+        results.append(ca.densify(ca.vec(part.function(*arguments))))
+    raw, drawn = ca.vertcat(*symbols.values()), ca.vertcat(*results)
+    order = [p for (user, name), n in largest.items() for p in places[user][name][:n]]
+    return Drawing(ca.Function("picture", [raw], [drawn]), order)
+
+
+def _laid_out(parts: Sequence[Part]) -> Iterator[dict[str, Any]]:
+    """Where the results of the parts are among the numbers that are drawn."""
+    at = 0
+    for part in parts:
+        rows, columns = part.function.size_out(0)
+        yield {
+            "user": part.user, "gives": part.gives, "at": at, "rows": rows, "columns": columns,
+            "names": [*part.names], "sparse": part.sparse, "is_state": part.is_state,
+        }  # fmt: skip
+        at += rows * columns
+
+
+def _columns(program: Resolved, clock: str) -> list[str]:
+    """The outputs in a row of a clock's table."""
+    signals = program.simulation.signals
+    span = signals.clock(clock)
+    names = {
+        signals.scalar(fmu.name, s.name): f"{fmu.name}.{s.name}"
+        for fmu in program.system.fmus
+        for s in fmu.description.outputs
+    }
+    return [names[place] for place in range(span.start, span.stop)]
