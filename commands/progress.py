@@ -45,6 +45,37 @@ def progress(
 def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> Iterator[None]:
     """Prints before a long command how many minutes it took at most on this machine, or `guess`,
     and records how many it takes. Raises Fault where it is interrupted."""
+    with _measured(command) as took:
+        if took is not None:
+            guess = f"up to {took:.1f} minutes here, less if partly finished before"
+        if not hidden:
+            say(f"{command}: duration {guess}", file=sys.stderr)
+        try:
+            yield
+        except Interrupted:
+            raise Fault("interrupted; finished runs are kept") from None
+
+
+@contextmanager
+def waiting(what: str, hidden: bool = False) -> Iterator[None]:
+    """Says what is being done, for as long as it takes, and how long it took before, where nothing
+    can be counted."""
+    with _measured(what) as took:
+        if hidden or not sys.stderr.isatty():
+            yield
+            return
+        from rich.console import Console
+        from rich.markup import escape
+
+        before = "" if took is None else f", up to {60 * took:.0f} s before"
+        with Console(stderr=True).status(escape(printable(f"{what}{before}"))):
+            yield
+
+
+@contextmanager
+def _measured(what: str) -> Iterator[float | None]:
+    """Gives the longest duration (minutes) that something took on this machine, None where it is
+    not known, and records how long it takes."""
     from hapticlink.fmus import cache
     from hapticlink.fmus.atomic_file import atomic_file
 
@@ -52,34 +83,13 @@ def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> I
     if folder:
         with suppress(OSError, ValueError):
             known = json.loads((folder / DURATIONS).read_text(encoding="utf-8"))
-    took = known.get(command)
-    if took is not None:
-        guess = f"up to {took:.1f} minutes here, less if partly finished before"
-    if not hidden:
-        say(f"{command}: duration {guess}", file=sys.stderr)
-    begun = monotonic()
-    try:
-        yield
-    except Interrupted:
-        raise Fault("interrupted; finished runs are kept") from None
+    took, begun = known.get(what), monotonic()
+    yield took
     if folder:
         folder.mkdir(parents=True, exist_ok=True)
-        known[command] = max((monotonic() - begun) / 60, took or 0.0)
+        known[what] = max((monotonic() - begun) / 60, took or 0.0)
         with suppress(OSError), atomic_file(folder / DURATIONS) as unfinished:
             unfinished.write_text(json.dumps(known, indent=1), encoding="utf-8")
-
-
-@contextmanager
-def waiting(what: str, hidden: bool = False) -> Iterator[None]:
-    """Says what is being done, for as long as it takes, where nothing can be counted."""
-    if hidden or not sys.stderr.isatty():
-        yield
-        return
-    from rich.console import Console
-    from rich.markup import escape
-
-    with Console(stderr=True).status(escape(printable(what))):
-        yield
 
 
 @contextmanager

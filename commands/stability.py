@@ -66,7 +66,7 @@ def stability(
     set: Set = None,
     swap: Swap = None,
     map: Map = None,
-    poses: Poses = 4,
+    poses: Poses = 3,
     drift: Drift = (1.0, 0.2),
     figure: Figure = False,
     equilibrium: Equilibrium = False,
@@ -124,7 +124,7 @@ def stability(
     folder = out or default_folder("runs", scene, chosen)
     record: dict[str, Any]
     if equilibrium or port or at:
-        with waiting(f"{name}: equilibrium and linearisation, which can take a minute", quiet):
+        with waiting(f"{name}: equilibrium and linearisation", quiet):
             passivity = hl.passivity(scene, given, at=at) if port else None
             result = hl.equilibrium_stability(scene, given, at=at)
         record = result.record() | ({"port": passivity.record()} if passivity else {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -14,6 +15,9 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import STEP_SIZE, sizes
+
+LOG = logging.getLogger(__name__)
+"""Says, at level INFO, which block is being built, or taken from the cache."""
 
 
 def fmu_files(
@@ -48,8 +52,10 @@ def _files(
     platforms: Sequence[str],
     starts: Mapping[str, Starts] | None,
 ) -> Iterator[tuple[str, Path]]:
-    for block in (*blocks.built, *blocks.engines):
+    every = (*blocks.built, *blocks.engines)
+    for i, block in enumerate(every, 1):
         interrupt.check()
+        LOG.info("building block %d of %d: %s", i, len(every), block.name)
         given: Starts = {}
         experiment: dict[str, float] = {}
         if starts is not None:

@@ -105,7 +105,7 @@ class Pages:
 
     async def window(self, connection: ServerConnection) -> None:
         """Serve a window until it is closed."""
-        for kind in ("scene", "controls", "state", "map"):
+        for kind in ("building", "scene", "controls", "state", "map"):
             if kind in self._kept:
                 await connection.send(self._kept[kind])
         self._windows.add(connection)

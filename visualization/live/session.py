@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import pickle
 import time
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.scene_part import by_user
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system import fmu_files
 from hapticlink.visualization.live import messages
 from hapticlink.visualization.live.controls import Controls, Settings, target, users
 from hapticlink.visualization.live.frames import Frames, power
@@ -25,6 +27,20 @@ TURN, FRAME = 0.0035, 0.015
 and between two frames, at most."""
 WAIT = 0.02
 """Time (s) between two looks at the messages while nothing runs."""
+
+
+class Building(logging.Handler):
+    """Tells the page which block is being built."""
+
+    def __init__(self, link: Link) -> None:
+        super().__init__()
+        self._link = link
+        fmu_files.LOG.addHandler(self)
+        fmu_files.LOG.setLevel(logging.INFO)
+        fmu_files.LOG.propagate = False  # the terminal shows the page's address
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._link.send({"type": "building", "said": f"{record.getMessage()} ..."})
 
 
 class Session:
@@ -42,6 +58,7 @@ class Session:
         self._shown = 0.0
         self._state: dict[str, Any] = {"paused": False, "recording": None, "ended": None}
         self.recordings: list[Path] = []
+        Building(link)
 
     def run(self) -> None:
         """Run until Ctrl-C, which raises RunInterrupted or Interrupted, or until the server has

@@ -2,7 +2,7 @@
 import { FELT, fitted, inTheme, text, themed } from "./canvas.js";
 
 const SPAN = 10, LEFT = 44, ENERGIES = 4; // s, px, and the most lines of energies
-const COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee"], DASHES = [[], [5, 3], [2, 3], [7, 3, 2, 3]];
+const COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee", "#999933", "#882255", "#44aa99", "#777777"], DASHES = [[], [5, 3], [2, 3], [7, 3, 2, 3]];
 const size = (v) => v && Math.hypot(v[0], v[1]);
 // `each`: series of every user, from that user's part of a frame; `series`: from the whole frame.
 const CHARTS = [
@@ -28,7 +28,6 @@ export class Charts {
     const fold = document.createElement("details"), title = document.createElement("summary");
     title.textContent = "Expert: closure error, deadlines";
     fold.append(title, ...this.charts.filter((chart) => chart.expert).map((chart) => chart.figure));
-    fold.addEventListener("toggle", () => this.host.dispatchEvent(new Event("changed")));
     this.host.replaceChildren(...this.charts.filter((chart) => !chart.expert).map((chart) => chart.figure), fold);
   }
 
@@ -91,7 +90,7 @@ class Chart {
   }
 
   draw(span, at) {
-    if (this.figure.hidden) return;
+    if (this.figure.hidden || this.figure.closest("details:not([open])")) return;
     const newest = Math.max(...this.runs.map(({ times }) => times.at(-1) ?? 0));
     const [from, to] = span ?? [newest - SPAN, newest];
     const { context, width, height } = fitted(this.canvas);

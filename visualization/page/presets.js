@@ -1,5 +1,5 @@
 // Settings of a scene that show something, each with what it changes; and all settings as at the start.
-const BUZZ_RATE = 20, STIFF = 5; // Hz, and the factor of the coupling's damping
+const BUZZ_RATE = 18, STIFF = 5; // Hz, and the factor of the coupling's damping
 
 // The messages that set all controls as they were at the `start`.
 export function restored(controls, start) {
@@ -21,14 +21,14 @@ export function restored(controls, start) {
 export function presets({ rate, holds, gains }) {
   const calm = { name: "Calm", about: "everything as the scene has it", messages: [] };
   const passive = holds.filter(({ choices }) => choices.includes("passive"));
-  const poses = holds.filter((hold) => !passive.includes(hold) && hold.choices.includes("foh"));
+  const poses = holds.filter(({ connection, choices }) => /\.[xv] -> /.test(connection) && choices.includes("foh"));
   const damping = gains.filter(({ name }) => name.endsWith(".B_pc"));
   const held = (some, hold) => some.map(({ connection }) => ({ type: "hold", connection, hold }));
   if (rate && passive.length) {
     const slow = { type: "rate", value: Math.min(BUZZ_RATE, rate.max) };
     return [
       calm,
-      { name: "Buzz", about: `mechanism at ${slow.value} Hz, and what it sends extrapolated (foh)`, messages: [slow, ...held(poses, "foh")] },
+      { name: "Buzz", about: `mechanism at ${slow.value} Hz, its pose and velocity extrapolated (foh)`, messages: [slow, ...held(poses, "foh")] },
       { name: "Mend it", about: `still ${slow.value} Hz, but the forces on the mechanism in a passive hold`, messages: [slow, ...held(passive, "passive")] },
     ];
   }

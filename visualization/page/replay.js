@@ -105,7 +105,7 @@ function begin() {
   document.title = $("title").textContent = [...new Set(recordings.map((r) => r.title))].join(" and ");
   $("slider").max = end;
   $("speed").append(...SPEEDS.map((s) => new Option(`${s}×`, s, s === 1, s === 1)));
-  charts.begin(recordings[0].energies, recordings[0].users, recordings.length);
+  charts.begin(recordings[0].energies.map((name) => ({ name, words: name })), recordings[0].users, recordings.length);
   recordings.forEach((recording, k) => {
     for (let i = 0; i < recording.times.length; i++) charts.add(recording.frame(i), k, Infinity);
   });
@@ -125,6 +125,7 @@ $("back").onclick = () => step(-1);
 $("on").onclick = () => step(1);
 $("layout").onclick = () => overlay(!view.overlaid);
 $("fit").onclick = () => { for (const { stage } of views) stage.refit(); view.changed = true; };
+charts.host.addEventListener("toggle", () => { view.changed = true; }, true);
 charts.host.addEventListener("pointerdown", (event) => {
   const at = charts.time(event, [0, end]);
   if (at !== null) { pause(); seek(at); }

@@ -40,6 +40,78 @@ def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
     page.page.close()
 
 
+def test_the_page_says_what_to_do_until_somebody_does_it(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    assert page.page.inner_text("#door").startswith(
+        "Press and drag anywhere. Along the dashed line it resists."
+    )
+    page.pull(0.0, 0.0)
+    page.until("document.getElementById('door').hidden")
+    page.page.mouse.up()
+    assert page.faults == []
+    page.page.close()
+
+
+def test_arrow_keys_pull_and_let_go(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    page.page.keyboard.down("ArrowUp")
+    page.until("view.frame.F_hand[1] > 0.1")
+    page.page.keyboard.up("ArrowUp")
+    page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) < 0.1")
+    page.page.close()
+
+
+def test_the_wheel_zooms_about_the_pointer_and_shift_moves(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    box = page.page.locator("#scene").bounding_box()
+    x, y = box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"]
+    under = f"view.stage.toWorld({x - box['x']}, {y - box['y']})"
+    before, scale = page.get(under), page.get("view.stage.scale")
+    page.page.mouse.move(x, y)
+    page.page.mouse.wheel(0, -200)
+    page.until(f"view.stage.scale > 1.2 * {scale}")
+    wide = page.get("(([a, b]) => b - a)(view.stage.limits[0])")
+    assert page.get(under) == pytest.approx(before, abs=0.02 * wide)
+    page.page.keyboard.down("Shift")
+    page.page.mouse.down()
+    page.page.mouse.move(x + 60, y, steps=3)
+    page.page.mouse.up()
+    page.page.keyboard.up("Shift")
+    moved = 60 / page.get("view.stage.scale")
+    page.until(f"Math.abs({under}[0] + {moved} - {before[0]}) < {0.02 * wide + 0.1 * moved}")
+    assert page.get("view.stage.pulls.size") == 0
+    page.page.close()
+
+
+def test_restore_sets_back_what_was_changed(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    page.page.fill("[data-control='controller.K_pc']", "0.5")
+    said = "document.querySelector('[data-control=\"controller.K_pc\"]').parentNode.textContent"
+    page.until(f"!{said}.includes(' 100 N/m') && {said}.includes('316')")
+    page.page.click("#restore")
+    page.until(f"{said}.includes('100 N/m')")
+    page.page.close()
+
+
+def test_idle_charts_are_scaled_by_what_can_be_felt(served: Served, browser: Any) -> None:
+    """No axis is shorter than 1 mm, 0.5 N, 1 mJ."""
+    page = Page(browser, served.url)
+    page.page.click("#reset")
+    page.until("view.frame?.t < 0.3 && view.stage.limits")
+    written = """new Promise((done) => {
+      const own = CanvasRenderingContext2D.prototype.fillText, found = [];
+      CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
+        if (this.canvas.closest("figure")) found.push(Number(text));
+        own.call(this, text, ...rest);
+      };
+      setTimeout(() => { CanvasRenderingContext2D.prototype.fillText = own; done(found); }, 300);
+    })"""
+    ticks = page.get(written)
+    assert ticks
+    assert min(abs(tick) for tick in ticks if tick) >= 0.25
+    page.page.close()
+
+
 MOVES = """{
   const send = WebSocket.prototype.send, [id] = view.stage.pulls.keys();
   window.sent = [];
