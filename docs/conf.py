@@ -36,6 +36,9 @@ html_math_renderer = "mathml"
 html_use_index = False
 html_copy_source = False
 html_show_copyright = False
+WITHIN = (
+    r'<iframe src="\1" title="Drag the handle" style="width:100%;height:640px;border:0"></iframe>'
+)
 
 
 def _inline(translator: Any, node: nodes.math) -> None:
@@ -57,14 +60,12 @@ def _front_page(app: Sphinx, error: Exception | None) -> None:
 
 
 def _dragged(app: Sphinx, error: Exception | None) -> None:
-    """The start page has the page itself in place of its picture."""
+    """The start page has the page in one file in place of its picture, and opens it by its link."""
     path = Path(app.outdir) / "docs" / "index.html"
     if error is None and path.exists():
-        frame = r'<iframe src="\1" title="Drag the handle" class="page-within"></iframe>'
-        text = re.sub(
-            r'<a class="[^"]*" download="" href="([^"]*closed_loop\.html)">\s*<img [^>]*>\s*</a>',
-            frame, path.read_text(encoding="utf-8"),
-        )  # fmt: skip
+        text = re.sub(r'<a [^>]*href="([^"]*closed_loop\.html)"><span[^>]*><img[^>]*></span></a>',
+                      WITHIN, path.read_text(encoding="utf-8"))  # fmt: skip
+        text = re.sub(r'download="" (href="[^"]*closed_loop\.html")', r"\1", text)
         path.write_text(text, encoding="utf-8")
 
 
