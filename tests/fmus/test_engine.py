@@ -98,7 +98,7 @@ def difference(one, two, name):
 def test_a_placed_copy_gives_the_same_loop(tmp_path):
     ours = hl.run("closed-loop", ["duration=0.5"], out=tmp_path / "ours")
     theirs = hl.run("closed-loop", ["duration=0.5", by("virtual_environment")], out=tmp_path / "b")
-    assert theirs.run["replaced"]["virtual_environment"] == {"lost": [], "unfed": []}
+    assert not any(theirs.run["replaced"]["virtual_environment"].values())
     for name in ("virtual_mechanism.x[1]", "haptic_device.x[3]", "controller.F_motor[2]"):
         assert difference(ours, theirs, name) < 1e-11
 
