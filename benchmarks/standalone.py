@@ -9,6 +9,7 @@ without a cache of FMUs.
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import shutil
@@ -41,8 +42,8 @@ COLUMNS = ("scene", "bytes", "make_s", "run", "node", "chromium")
 ROUNDS = 15
 Told = Callable[[str, int, int], None]
 TIMED = """
-const timed = async (given, now, rounds) => {
-  const module = new WebAssembly.Module(await unpacked(given.program)), times = [];
+const timed = (given, now, rounds) => {
+  const module = new WebAssembly.Module(given.program), times = [];
   for (let i = 0; i < rounds; i++) {
     const program = new Program(module, given.data);
     const ticks = Math.round(given.duration * given.data.scene.haptics);
@@ -57,20 +58,28 @@ const timed = async (given, now, rounds) => {
 IN_NODE = """
 import { readFileSync } from "node:fs";
 const now = () => { const { user, system } = process.cpuUsage(); return (user + system) / 1e6; };
-console.log(await timed(JSON.parse(readFileSync(0)), now, ROUNDS));
+const given = JSON.parse(readFileSync(0));
+given.program = Buffer.from(given.program, "base64");
+console.log(timed(given, now, ROUNDS));
 """
 IN_CHROMIUM = """async ([code, duration, rounds]) => {
-  const element = (id) => document.getElementById(id).textContent;
-  const source = new Blob([element("worker"), code], { type: "text/javascript" });
+  const unpacked = async (id) => {
+    const text = atob(document.getElementById(id).textContent);
+    const packed = Uint8Array.from(text, (c) => c.charCodeAt(0));
+    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip")));
+  };
+  const text = async (id) => (await unpacked(id)).text();
+  const source = new Blob([await text("worker"), code], { type: "text/javascript" });
   const worker = new Worker(URL.createObjectURL(source));
   const answer = new Promise((resolve) => { worker.onmessage = ({ data }) => resolve(data); });
-  const given = { data: JSON.parse(element("data")), program: element("program"), duration };
+  const program = await (await unpacked("program")).arrayBuffer();
+  const given = { data: JSON.parse(await text("data")), program, duration };
   worker.postMessage([given, rounds]);
   return answer;
 }"""
 IN_WORKER = """
 const now = () => performance.now() / 1e3;
-onmessage = async ({ data: [given, rounds] }) => postMessage(await timed(given, now, rounds));
+onmessage = ({ data: [given, rounds] }) => postMessage(timed(given, now, rounds));
 """
 
 
@@ -129,8 +138,8 @@ def _measured(
 def _node(text: str) -> float:
     """The least processor time (s) of a run of a page's module under node."""
     given = {
-        "data": json.loads(one_file.element(text, "data")),
-        "program": one_file.element(text, "program"),
+        "data": json.loads(one_file.unpacked(text, "data")),
+        "program": base64.b64encode(one_file.unpacked(text, "program")).decode(),
         "duration": DURATION,
     }
     code = one_file.bundle("program.js") + TIMED + IN_NODE.replace("ROUNDS", "5")

@@ -20,9 +20,9 @@ def doctor(*, json: Json = False) -> int:
     """Report versions, optional packages that are missing and how to install them, and the cache;
     build a small FMU of each packaging that is available, and run it. The exit status is 1 if that
     fails."""
-    found = _found()
-    tell(_lines(found), found, quiet=False, as_json=json)
-    return 0 if all(state == "works" for state in found["runs"].values()) else 1
+    environment = _found()
+    tell(_lines(environment), environment, quiet=False, as_json=json)
+    return 0 if all(state == "works" for state in environment["runs"].values()) else 1
 
 
 def _found() -> dict[str, Any]:
@@ -55,7 +55,7 @@ def _versions(requirements: Any, extra: str) -> dict[str, str | None]:
     the versions that are there; None where one is missing or too old."""
     from packaging.requirements import Requirement
 
-    found: dict[str, str | None] = {}
+    versions: dict[str, str | None] = {}
     for text in requirements:
         asked = Requirement(text)
         needed = asked.marker is None or asked.marker.evaluate({"extra": extra})
@@ -63,15 +63,15 @@ def _versions(requirements: Any, extra: str) -> dict[str, str | None]:
             continue
         if asked.name == "hapticlink":  # an extra that takes in others
             for inner in asked.extras:
-                found |= _versions(requirements, inner)
+                versions |= _versions(requirements, inner)
             continue
         try:
             version = metadata.version(asked.name)
         except metadata.PackageNotFoundError:
-            found[asked.name] = None
+            versions[asked.name] = None
         else:
-            found[asked.name] = version if asked.specifier.contains(version, True) else None
-    return found
+            versions[asked.name] = version if asked.specifier.contains(version, True) else None
+    return versions
 
 
 def _loop() -> str:
@@ -91,35 +91,38 @@ def _runs() -> dict[str, str]:
     import hapticlink as hl
     from hapticlink.orchestrator.base.faults import Fault
 
-    found = {}
+    states = {}
     for packaging in ("python", "native") if find_spec("ziglang") else ("python",):
         try:
             made = hl.run("pendulum", {"duration": 0.05, "packaging": packaging})
-            found[packaging] = str(made.fault) if made.fault else "works"
+            states[packaging] = str(made.fault) if made.fault else "works"
         except Fault as fault:
-            found[packaging] = str(fault)
-    return found
+            states[packaging] = str(fault)
+    return states
 
 
-def _lines(found: dict[str, Any]) -> Iterator[str]:
-    versions = [f"{name} {version or 'MISSING'}" for name, version in found["versions"].items()]
+def _lines(environment: dict[str, Any]) -> Iterator[str]:
+    versions = [
+        f"{name} {version or 'MISSING'}" for name, version in environment["versions"].items()
+    ]
     yield f"hapticlink {metadata.version('hapticlink')} in {sys.prefix}"
     yield (
-        f"Python {found['python']} on {found['platform']}, {found['processors']} processors; "
+        f"Python {environment['python']} on {environment['platform']}, "
+        f"{environment['processors']} processors; "
         f"{', '.join(versions)}"
     )
-    yield f"compiled event loop: {found['compiled_loop']}"
-    for packaging, state in found["runs"].items():
+    yield f"compiled event loop: {environment['compiled_loop']}"
+    for packaging, state in environment["runs"].items():
         yield f"FMUs, packaging = {packaging!r}: {state}"
-    if "native" not in found["runs"]:
+    if "native" not in environment["runs"]:
         yield f"FMUs, packaging = 'native': no compiler: {install_command('native')}"
-    for extra, packages in found["extras"].items():
+    for extra, packages in environment["extras"].items():
         missing = [name for name, version in packages.items() if version is None]
         state = (
             f"missing {', '.join(missing)}: {install_command(extra)}" if missing else "installed"
         )
         yield f"extra {extra}: {state}"
-    kept = found["cache"]
+    kept = environment["cache"]
     if kept["folder"] is None:
         yield "cache of FMUs: off (HAPTICLINK_CACHE)"
     else:

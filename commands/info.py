@@ -121,10 +121,10 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
 def _needs(scene: Any, time: Timeline) -> None:
     from hapticlink.analysis.findings import block_costs, requirements
 
-    found = list(requirements.needs(scene))
+    parts = list(requirements.needs(scene))
     for title, needed in (("needed", True), ("left out", False)):
         say(f"\n{title}")
-        for need in found:
+        for need in parts:
             if need.needed == needed:
                 say(f"  {need.part}: {need.why}")
     say("\noperations of a step and its outputs, signals in and out")

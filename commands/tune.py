@@ -47,19 +47,19 @@ def tune(
 
     kept = False
 
-    def keep(found: Tuned) -> None:
+    def keep(tuned: Tuned) -> None:
         nonlocal kept
         folders.ensure(folder)
-        write_json(folder / "tune.json", found.record())
-        (folder / "tuned.toml").write_text(found.scene(), encoding="utf-8")
-        write([("tune", png(tuning_figure.draw(found)))], folder)
+        write_json(folder / "tune.json", tuned.record())
+        (folder / "tuned.toml").write_text(tuned.scene(), encoding="utf-8")
+        write([("tune", png(tuning_figure.draw(tuned)))], folder)
         kept = True
 
     try:
-        found = find(scene, given, margin=margin, tell=say, keep=keep)
+        result = find(scene, given, margin=margin, tell=say, keep=keep)
     except Interrupted:
         say(f"interrupted: {f'{folder}/ has' if kept else 'no'} gains found so far")
         return 1
-    say(*(f"  {line}" for line in found.lines()), sep="\n")
+    say(*(f"  {line}" for line in result.lines()), sep="\n")
     say(f"  {folder}/: tuned.toml, tune.json, tune.png")
     return 0

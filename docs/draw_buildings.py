@@ -28,7 +28,7 @@ BUILDINGS = {
         "device",
         "blocks",
     ),
-    "fmus": (".", "native"),
+    "fmus": (".", "native", "engine"),
     "orchestrator": (
         "base",
         "fmi",

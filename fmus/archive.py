@@ -43,6 +43,11 @@ ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
 """
 """The module that pythonfmu executes again for each instance: a class that it defined would be
 another one each time, which is never released (60 kB; what is left is in `python_slave.Short`)."""
+_ENGINE = """
+from {}_engine import functions
+
+HapticlinkSlave.made_by = staticmethod(functions)
+"""
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
@@ -99,11 +104,12 @@ def packed(
 
     slave = Path(__file__).with_name("python_slave.py").read_bytes()
     about = _about(component) | dict(about)
+    module_text = _MODULE + _ENGINE * bool(engine)
     content = {
         **files,
         "slave": slave,
         "engine": engine,
-        "module": _MODULE.encode(),
+        "module": module_text.encode(),
         "about": json.dumps(about).encode(),
         "xml": describe(""),
     }
@@ -112,7 +118,7 @@ def packed(
     files |= {
         "modelDescription.xml": describe(guid),
         "resources/component.json": json.dumps(about | {"digest": whole, "guid": guid}).encode(),
-        f"resources/{module}.py": _MODULE.format(module).encode(),
+        f"resources/{module}.py": module_text.replace("{}", module).encode(),
         f"resources/{module}_slave.py": slave,
         "resources/slavemodule.txt": f"{module}\n".encode(),
     }

@@ -12,7 +12,6 @@ from fmpy.model_description import ValidationError
 from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Component
-from hapticlink.fmus import engine
 from hapticlink.fmus.archive import entries, require_platform, write
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.errors import FmuError
@@ -45,6 +44,8 @@ def build_engine(
 ) -> Path:
     """As `build`, with the component's ports by a physics engine (`hapticlink.fmus.engine`);
     `settings` are those of its block."""
+    from hapticlink.fmus import engine
+
     require_platform()
     files = engine.entries(component, settings, stop_time=stop_time, step_size=step_size)
     return _publish(component, files, folder)

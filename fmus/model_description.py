@@ -57,6 +57,10 @@ def model_description(
         modelName=component.name,
         guid=guid,
         description=component.description,
+        author="The hapticlink authors",
+        version=version("hapticlink"),
+        copyright="(c) 2026 The hapticlink authors",
+        license="MIT",
         generationTool=f"hapticlink {version('hapticlink')}",
         variableNamingConvention="structured",
     )

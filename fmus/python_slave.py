@@ -28,7 +28,6 @@ import array
 import atexit
 import ctypes
 import functools
-import importlib
 import json
 import math
 import os
@@ -81,6 +80,8 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
     _loaded: typing.ClassVar[dict] = {}
     """Functions by way of evaluation, read once for all instances."""
     _released: typing.ClassVar[list] = []
+    made_by: typing.ClassVar[typing.Callable | None] = None
+    """Gives the functions of an instance from its resources/, where a physics engine has them."""
 
     def __init__(self, **kwargs: typing.Any) -> None:
         super().__init__(**kwargs)
@@ -109,7 +110,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         self._new_outputs, self._end = new_y if self._sampled else y, end
         self._buffers: list = []
         self._blocks: dict = {}
-        self._engine = self._read_engine() if about.get("engine") else None
+        self._engine = self.made_by(self.resources) if self.made_by else None
         self._evaluate_x0 = self._bind("initialize", (u, p), x)
         self._evaluate_y = self._bind("output", (x, u, p, t), y, z)
         whole = self._bind("advance", (trial, u, p, t, h, end, z), after, self._new_outputs, next_z)
@@ -159,11 +160,6 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
             buffer.set_res(i, result)
         self._buffers.append(buffer)  # `evaluate` holds a bare pointer to it
         return evaluate
-
-    def _read_engine(self) -> dict:
-        """The functions of a physics engine, whose module lies beside this one."""
-        engine = importlib.import_module(f"{__name__.removesuffix('_slave')}_engine")
-        return engine.functions(self.resources)
 
     def _functions(self) -> dict:
         if self._engine is not None:

@@ -125,7 +125,7 @@ class LiveRun:
             raise InputFault(
                 f"{name} = {shortened(repr(value))}: give {len(scalars)} finite numbers"
             )
-        self._simulation.instances[fmu].before_step(lambda: set_from(values))
+        self._simulation.instances[fmu].before_step(lambda time: set_from(values))
 
     def hold(self, name: str, hold: str | None = None, delay: float | None = None) -> None:
         """Give connections another hold, or another constant latency `delay` (s); they are named

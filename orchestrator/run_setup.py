@@ -74,6 +74,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         },
         get_after_set=list(system.coupling.get_after_set),
         power_across_rates=power_across_rates(system),
+        events=[(change.begin, change.text) for change in system.changes],
         not_recorded=not_recorded,
     )
 

@@ -47,7 +47,7 @@ typedef struct {
     int64_t first, n, dticks, slopes, key[8];
 } Family;
 
-enum { GET_REAL, SET_REAL, DO_STEP, GET_STATE, SET_STATE };
+enum { GET_REAL, SET_REAL, DO_STEP, GET_STATE, SET_STATE, FREE_STATE };
 
 typedef struct {
     const char *name, *guid;
@@ -177,6 +177,7 @@ static const void *function(const Member *member, int which) {
     case SET_REAL: return (const void *)member->set;
     case DO_STEP: return (const void *)member->step;
     case GET_STATE: return (const void *)member->get_state;
+    case FREE_STATE: return (const void *)member->free_state;
     }
     return (const void *)member->set_state;
 }

@@ -25,6 +25,9 @@ def of_scene(scene: Scene) -> None:
     if reasons:
         reasons.append("only blocks of this project are compiled into a program; FMUs that contain "
                        "their sources are not yet")  # fmt: skip
+    if scene.at:
+        reasons.append("[[at]]: what happens at given times is done by Python")
+    reasons += [f"{fmu.name} is made by {fmu.engine}" for fmu in scene.fmu if fmu.engine]
     if scene.coupling == "iterated":
         reasons.append("coupling = 'iterated': steps are repeated by Python")
     if scene.faults.discard == "retry":

@@ -18,7 +18,7 @@ NUMBERS: dict[str, Any] = {
     "int16_t": ctypes.c_int16,
     "uint32_t": ctypes.c_uint32,
 }
-FUNCTIONS = ("call", "do_step", "get_state", "set_state")
+FUNCTIONS = ("call", "do_step", "get_state", "set_state", "free_state")
 """Pointers to functions of an FMU."""
 APART = (*FUNCTIONS, "fmu", "state")
 """Pointers that lead out of the memory of the run: into an FMU, or to where its state is saved."""

@@ -36,6 +36,7 @@ FUNCTIONS = {
     "fmi2DoStep": "DO_STEP",
     "fmi2GetFMUstate": "GET_STATE",
     "fmi2SetFMUstate": "SET_STATE",
+    "fmi2FreeFMUstate": "FREE_STATE",
 }
 
 

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hapticlink.analysis.findings.summary import stopped_by
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.faults import shortened
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.tables import Results
 
@@ -66,6 +68,9 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     reason = results.record.end.reason
     if reason != "duration":
         why = _ENDS.get(reason, "a fault ended the run")
+        said = stopped_by(results.record.stop_when)
+        if reason == "stop_when" and said.startswith("the device"):
+            why = said
         title += f", until {why} at {short(last_time(results))} s"
     figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
     framed(figure)
@@ -76,7 +81,25 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     # At a fixed height.
     every[0].set_title(plain(fill(title, 70)), fontsize="medium", y=1.0, pad=12)
     every[-1].set_xlabel(x)
+    if x == "time (s)":
+        for axes in every:
+            _events(axes, results)
     return figure, every if len(y) > 1 else every[0]
+
+
+def _events(axes: Axes, results: Results) -> None:
+    """A line at each time at which something happens in the scene, with its text."""
+    texts: dict[float, list[str]] = {}
+    for time, text in results.run.get("events", ()):
+        if time <= last_time(results):
+            texts.setdefault(time, []).append(shortened(text, 60))
+    for time, said in texts.items():
+        axes.axvline(time, color="0.4", linestyle=":", linewidth=1)
+        axes.annotate(
+            plain("\n".join(said)), (time, 1), xycoords=("data", "axes fraction"), rotation=90,
+            xytext=(-2, -3), textcoords="offset points", fontsize="xx-small", color="0.3",
+            horizontalalignment="right", verticalalignment="top",
+        )  # fmt: skip
 
 
 def framed(figure: Figure, **margins: float) -> None:

@@ -66,14 +66,14 @@ def _unrendered(results: Results, table: Table) -> Iterator[str]:
 def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
     most = {pair: middle(linkage, contacts, pair) for pair in near(linkage, contacts)}
     time, q = table["time"], table[JOINT_COORDINATES]
-    found = [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
+    depths_by_pair = [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
     deep = np.flatnonzero(table[CONTACT_GAP] < -min(most.values()))
     if len(deep):
         chosen = deep[np.linspace(0, len(deep) - 1, min(len(deep), ROWS)).astype(int)]
-        found += [(*item, time[chosen]) for item in depths(linkage, contacts, q[chosen])]
-    if not found:
+        depths_by_pair += [(*item, time[chosen]) for item in depths(linkage, contacts, q[chosen])]
+    if not depths_by_pair:
         return
-    pair, depth, times = max(found, key=lambda item: float(item[1].max()) - most[item[0]])
+    pair, depth, times = max(depths_by_pair, key=lambda item: float(item[1].max()) - most[item[0]])
     if (worst := float(depth.max())) > most[pair]:
         yield (
             f"warning: at {times[depth.argmax()]:.4g} s {pair.body} is {short(worst * 1e3)} mm "

@@ -30,13 +30,13 @@ WRENCHES = {
 
 def wrenches(results: Results, user: str = "") -> dict[str, tuple[Vector, Vector, Vector]]:
     """By name: times (s), force (N) and moment (N.m) of each wrench of a user that the run has."""
-    found = {}
+    wrenches_by_name = {}
     for signal, name in WRENCHES.items():
         signal = signal_of_user(signal, user)
         if (table := of_block(results, signal, 3)) and len(table["time"]):
             F = table[signal]
-            found[name] = table["time"], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
-    return found
+            wrenches_by_name[name] = table["time"], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
+    return wrenches_by_name
 
 
 def all_wrenches(results: Results) -> dict[str, tuple[Vector, Vector, Vector]]:

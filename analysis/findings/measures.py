@@ -63,7 +63,7 @@ class Measures:
     @cached_property
     def tracking(self) -> dict[str, TrackingError]:
         """By the users' names; that of the first one is empty."""
-        found = {}
+        errors = {}
         for user in ("", *further_users(self._results)):
             if not all(of_block(self._results, pose, 3) for pose in poses(user)):
                 continue
@@ -71,14 +71,14 @@ class Measures:
             count = int(np.count_nonzero(error.time_s <= self._until))
             if count:
                 distance, angle = error.distance_mm[:count], error.angle_rad[:count]
-                found[user] = TrackingError(
+                errors[user] = TrackingError(
                     float(distance.max()),
                     rms(distance),
                     float(angle.max()),
                     rms(angle),
                     float(error.time_s[count - 1]),
                 )
-        return found
+        return errors
 
     @cached_property
     def forces(self) -> dict[str, float]:
@@ -90,13 +90,13 @@ class Measures:
     @cached_property
     def motors(self) -> dict[str, float]:
         """The largest motor torque of each user as a share of the torque limit."""
-        found = {}
+        shares = {}
         for user, device in all_devices(self._results).items():
             if driven := torques(self._results, device, user):
                 time, torque = driven
                 largest = np.abs(torque[time <= self._until]).max(initial=0.0)
-                found[user] = float(largest) / device.torque_limit
-        return found
+                shares[user] = float(largest) / device.torque_limit
+        return shares
 
     @cached_property
     def closure_m(self) -> float | None:

@@ -74,10 +74,13 @@ def user(name: str = "") -> User:
 
 def needed(results: Results, users: Iterable[str]) -> set[str]:
     """The signals from which the blocks of these users are found, as far as a run has them."""
-    found: set[str] = set()
-    for each in map(user, users):
-        found |= {*each[:-1], *(source for source, _ in _sources(results, each))}
-    return found
+    signals: set[str] = set()
+    for signals_of_user in map(user, users):
+        signals |= {
+            *signals_of_user[:-1],
+            *(source for source, _ in _sources(results, signals_of_user)),
+        }
+    return signals
 
 
 def by_block(
@@ -97,22 +100,26 @@ def by_block(
             return None
         return works(results, signal, position, time)
 
-    for each, done in ((user(name), done) for name, done in put_in.items()):
+    for of_user, done in ((user(name), done) for name, done in put_in.items()):
         shaping = shaping - done
-        wrenches = {"drift": each.drift, "topology": each.topology, "environment": each.contact}
+        wrenches = {
+            "drift": of_user.drift,
+            "topology": of_user.topology,
+            "environment": of_user.contact,
+        }
         for name, signal in wrenches.items():
-            if found := on(signal, each.handle):
-                add(name, found[1])
-                shaping = shaping - found[1]
-        if motors := on(each.motors, each.handle):
-            add(f"hold of {each.motors}", motors[0] - motors[1])
+            if wrench := on(signal, of_user.handle):
+                add(name, wrench[1])
+                shaping = shaping - wrench[1]
+        if motors := on(of_user.motors, of_user.handle):
+            add(f"hold of {of_user.motors}", motors[0] - motors[1])
             shaping = shaping - (motors[0] - motors[1])
-        if contact := on(each.contact, each.point):
+        if contact := on(of_user.contact, of_user.point):
             add("environment", -contact[1])
             shaping = shaping + contact[1]
-        for name, (held, source) in _into_mechanism(results, each, time).items():
+        for name, (held, source) in _into_mechanism(results, of_user, time).items():
             mechanism = mechanism - held
-            if name == each.drift:
+            if name == of_user.drift:
                 add("drift", source)
                 add(f"hold of {name} on the mechanism", held - source)
             else:
@@ -120,23 +127,25 @@ def by_block(
     return {"shaping": shaping, **blocks, "mechanism": mechanism}
 
 
-def _into_mechanism(results: Results, each: User, time: Vector) -> dict[str, tuple[Vector, Vector]]:
+def _into_mechanism(
+    results: Results, of_user: User, time: Vector
+) -> dict[str, tuple[Vector, Vector]]:
     """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
     from, by that signal."""
-    found = {}
-    for source, target in _sources(results, each):
-        if table_of(results, source) and of_block(results, each.point, 3):
+    ports = {}
+    for source, target in _sources(results, of_user):
+        if table_of(results, source) and of_block(results, of_user.point, 3):
             sign = -1.0 if target.endswith("F_drift") else 1.0
             name = f"{source} -> {target}"
-            found[source] = works(results, source, each.point, time, sign, name)
-    return found
+            ports[source] = works(results, source, of_user.point, time, sign, name)
+    return ports
 
 
-def _sources(results: Results, each: User) -> Iterator[tuple[str, str]]:
+def _sources(results: Results, of_user: User) -> Iterator[tuple[str, str]]:
     """Where F_hand and F_drift of the mechanism come from, and that input."""
     for name in results.record.meters:
         source, _, target = name.partition(" -> ")
-        if target in (f"{each.inputs}F_hand", f"{each.inputs}F_drift"):
+        if target in (f"{of_user.inputs}F_hand", f"{of_user.inputs}F_drift"):
             yield source, target
 
 
@@ -144,11 +153,11 @@ def works(
     results: Results,
     signal: str,
     position: str,
-    at: Vector,
+    times: Vector,
     sign: float = 1.0,
     connection: str | None = None,
 ) -> tuple[Vector, Vector]:
-    """The work (J) of a wrench at a position until the times `at`: as it acts, and that of its
+    """The work (J) of a wrench at a position until `times` (s): as it acts, and that of its
     source. `connection` is that with which it acts; by default one from the signal to the FMU of
     the position, without which the newest sample acts."""
     table, moved = table_of(results, signal), table_of(results, position)
@@ -159,15 +168,15 @@ def works(
     name = connection or next((n for n in booked if n.startswith(start)), None)
     if name is None:
         return (
-            work(force, stamps, moved, position, at),
-            ideal(force, stamps, moved, position, at),
+            work(force, stamps, moved, position, times),
+            ideal(force, stamps, moved, position, times),
         )
     known = known_from(results, name, stamps, table is moved)
     meter = booked[name]
     until = meter.until
-    to = np.union1d(at, until)  # where the meter stops may be beside or after the times
+    to = np.union1d(times, until)  # where the meter stops may be beside or after the times
     acts, source = (
-        _passing(series, to, until, energy)[np.searchsorted(to, at)]
+        _passing(series, to, until, energy)[np.searchsorted(to, times)]
         for energy, series in (
             (meter.held, work(force, known, moved, position, to)),
             (meter.ideal, ideal(force, stamps, moved, position, to)),
@@ -176,33 +185,33 @@ def works(
     return acts, source
 
 
-def _passing(series: Vector, at: Vector, until: float, value: float) -> Vector:
-    """`series` at the times `at`, changed in proportion to its own path so that it passes `value`
+def _passing(series: Vector, times: Vector, until: float, value: float) -> Vector:
+    """`series` at `times`, changed in proportion to its own path so that it passes `value`
     at the time `until`."""
     path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
-    to, reached = (float(np.interp(until, at, y)) for y in (path, series))
+    to, reached = (float(np.interp(until, times, y)) for y in (path, series))
     if not to:
-        path, to = at - at[0], max(until - float(at[0]), 1e-300)
+        path, to = times - times[0], max(until - float(times[0]), 1e-300)
     changed: Vector = series + (value - reached) * path / to
     return changed
 
 
-def work(force: Vector, known: Vector, moved: Table, position: str, at: Vector) -> Vector:
+def work(force: Vector, known: Vector, moved: Table, position: str, times: Vector) -> Vector:
     """The work (J) of the newest of the forces (n, 3), known from the times `known` on, over the
-    steps of a position until the times `at`. A force that comes after a newer one does not act."""
+    steps of a position until `times` (s). A force that comes after a newer one does not act."""
     x, time = moved[position], moved["time"]
     order = np.argsort(known, kind="stable")
     newest = np.maximum.accumulate(order)
     rows = np.searchsorted(known[order], time[:-1] + 1e-12, "right") - 1
     held = force[newest[np.maximum(rows, 0)]]
     done = np.concatenate([[0.0], (held * np.diff(x, axis=0)).sum(axis=1).cumsum()])
-    return np.interp(at, time, done)
+    return np.interp(times, time, done)
 
 
-def ideal(force: Vector, stamps: Vector, moved: Table, position: str, at: Vector) -> Vector:
+def ideal(force: Vector, stamps: Vector, moved: Table, position: str, times: Vector) -> Vector:
     """The work (J) of forces (n, 3) that are linear in the displacement between their stamps."""
     x, time = moved[position], moved["time"]
     at_stamps = np.stack([np.interp(stamps, time, column) for column in x.T], axis=1)
     mean = (force[:-1] + force[1:]) / 2
     done = np.concatenate([[0.0], (mean * np.diff(at_stamps, axis=0)).sum(axis=1).cumsum()])
-    return np.interp(at, stamps, done)
+    return np.interp(times, stamps, done)

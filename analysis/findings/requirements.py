@@ -72,10 +72,10 @@ def _contacts(scene: Scene) -> Iterator[Need]:
     if scene.contacts is None:
         yield Need("contacts", False, "no [contacts]: no contact port, no detection")
         return
-    found = near(scene.linkage, scene.contacts)
-    places = sum(pair.places for pair in found)
-    pairs = f"{len(found)} pair{'s' * (len(found) != 1)}"
+    close_pairs = near(scene.linkage, scene.contacts)
+    places = sum(pair.places for pair in close_pairs)
+    pairs = f"{len(close_pairs)} pair{'s' * (len(close_pairs) != 1)}"
     text = f"{pairs}, {places} place{'s' * (places != 1)}, detected by {scene.contacts.detection}"
-    yield Need("contacts", bool(found), text)
+    yield Need("contacts", bool(close_pairs), text)
     for pair in out_of_reach(scene.linkage, scene.contacts):
         yield Need(f"{pair.body} on {pair.obstacle}", False, "out of reach: no narrow phase")

@@ -57,10 +57,11 @@ from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 
 class UserPort(NamedTuple):
-    """Energy generated (J) at times (s), the mechanism's samples; that of each block, of which it
-    is the sum; and the works of single wrenches at the end (J), by name."""
+    """Work of the hands and energy generated (J) at times (s), the mechanism's samples; that of
+    each block, of which the latter is the sum; and the works of single wrenches at the end (J)."""
 
     time_s: Vector
+    put_in_J: Vector
     generated_J: Vector
     blocks_J: dict[str, Vector]
     works: dict[str, float]
@@ -117,7 +118,9 @@ def user_port(results: Results) -> UserPort | None:
     generated = stored - further - sum(put_in.values())
     lacks = needed(results, put_in) & {*results.record.not_recorded}
     blocks = {} if lacks else by_block(results, time, stored - further, put_in)
-    return UserPort(time, generated, blocks, _works(results, device, time))
+    return UserPort(
+        time, further + sum(put_in.values()), generated, blocks, _works(results, device, time)
+    )
 
 
 def pushed_by_others(results: Results) -> list[str]:
@@ -140,19 +143,19 @@ def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
         "F_T": TOPOLOGY_WRENCH,
         "F_env": ENVIRONMENT_WRENCH,
     }
-    found = {
-        f"{user}: {name}" if user else name: float(works(results, at, handle, time)[0][-1])
+    joules = {
+        f"{user}: {name}" if user else name: float(works(results, signal_name, handle, time)[0][-1])
         for user in ("", *further_users(results))
         for name, signal in signals.items()
-        if of_block(results, at := signal_of_user(signal, user), 3)
+        if of_block(results, signal_name := signal_of_user(signal, user), 3)
         and of_block(results, handle := signal_of_user(HANDLE_POSE, user), 3)
     }
     if contact := of_block(results, ENVIRONMENT_WRENCH, 3):
         on = ideal(contact[ENVIRONMENT_WRENCH], contact["time"], contact, POINT_POSE, time)
-        found["F_env on the mechanism"] = float(on[-1])
+        joules["F_env on the mechanism"] = float(on[-1])
     if (added := _held_mobility(results, device)) is not None:
-        found["held mobility"] = float(work(added, device["time"], device, HANDLE_POSE, time)[-1])
-    return found
+        joules["held mobility"] = float(work(added, device["time"], device, HANDLE_POSE, time)[-1])
+    return joules
 
 
 def _held_mobility(results: Results, device: Table) -> Vector | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from hapticlink.orchestrator.base.loop_names import (
     CONTROLLER,
     DEVICE,
@@ -30,31 +32,41 @@ SIGNALS = {
     "x": "pose",
     "v": "velocity",
     "q": "joint coordinates",
-    "q_dot": "joint rates",
+    "qd": "joint rates",
 }
 """By the last part of a port's name; all others stand as they are."""
 
 
 def signal(name: str) -> str:
     """A signal `block.port`, or `block.user.port`, in words: `mobility`, `left: coupling force`."""
-    block, _, port = name.partition(".")
+    fmu, _, port = name.partition(".")
     user, _, last = port.rpartition(".")
-    users = (user_of_block(block, own) for own in BLOCKS)
+    users = (user_of_block(fmu, own) for own in BLOCKS)
     user = user or next((found for found in users if found), "")
-    words = SIGNALS.get(last, last) if _block(block) else name
+    words = SIGNALS.get(last, last) if block(fmu) else name
     return f"{user}: {words}" if user else words
 
 
 def connection(name: str) -> str:
-    """A connection `source -> target` in words: `coupling force on the mechanism`."""
+    """A connection `source -> target` in words: `coupling force on the mechanism`, `pose of the
+    mechanism to the controller`."""
     source, arrow, target = name.partition(" -> ")
     if not arrow:
         return name
-    block = target.partition(".")[0]
-    to = f"the {known}" if (known := _block(block)) else block
-    return f"{signal(source)} {'on' if '.F' in target else 'to'} {to}"
+    of, to = (end.partition(".")[0] for end in (source, target))
+    at = f"the {known}" if (known := block(to)) else to
+    if ".F" in target:
+        return f"{signal(source)} on {at}"
+    return f"{signal(source)} of the {block(of)} to {at}" if block(of) else f"{source} to {at}"
 
 
-def _block(name: str) -> str:
+def connections(names: Iterable[str]) -> dict[str, str]:
+    """Connections in words, by name; as they are where the words would be those of another."""
+    said = {name: connection(name) for name in names}
+    every = [*said.values()]
+    return {name: text if every.count(text) == 1 else name for name, text in said.items()}
+
+
+def block(name: str) -> str:
     """A block in words, "" for an FMU that is none of the loop's."""
     return next((w for b, w in BLOCKS.items() if user_of_block(name, b) is not None), "")

@@ -24,12 +24,12 @@ def lines(device: Device, start: Pose) -> Iterator[str]:
         yield f"at {which} theta: {where}"
     turns = space.turns
     yield f"theta: {'any' if turns == [_TURN] else ', '.join(map(_range, turns)) + ' rad'}"
-    found = float(margin(device, np.array([start]))[0])
-    if found < 0:
-        yield f"warning: {outside(start, found)}"
+    distance = float(margin(device, np.array([start]))[0])
+    if distance < 0:
+        yield f"warning: {outside(start, distance)}"
     else:
         pose = ", ".join(f"{value:.4g}" for value in start)
-        yield f"the handle starts at ({pose}), {found:.3g} m from the nearest stop"
+        yield f"the handle starts at ({pose}), {distance:.3g} m from the nearest stop"
 
 
 _TURN = (-math.pi, math.pi)

@@ -1,7 +1,7 @@
 """The virtual environment (the report's graphics block): a copy of the linkage at graphics rate.
 
 It takes the mechanism's coordinates, projected onto the closures, or is pulled by a PD graphics
-controller as in section 4.2.2 (`follow_mechanism`).
+controller as in section 4.2.2.
 
 It computes what would take too long at the haptic rate: Lambda^-1 (B.13), the projector on the
 constrained directions (in place of B.14) and their number, the contact geometry, and whether it is

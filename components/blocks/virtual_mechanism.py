@@ -3,10 +3,9 @@
     D qdd + C qd = Q + J_h' (F_hand - F_drift) + W' lambda,   W qdd + w_stab = 0   (B.6)
     w_stab = w + 2 alpha beta W qd + alpha^2 h                                  (B.5) as corrected
 
-Contacts and joint limits add Q = sum_i J_i' F_i (contact_forces.py, joint_limits.py), and steps
-locate where they begin and end (located_events.py). The scene chooses how the closures are
-stabilised: not at all, by Baumgarte's method, or by projection of position and velocity after each
-step. The start pose is assembled in initialisation mode.
+Contacts and joint limits add Q = sum_i J_i' F_i, and steps locate where they begin and end. The
+scene chooses how the closures are stabilised: not at all, by Baumgarte's method, or by projection
+of position and velocity after each step. The start pose is assembled in initialisation mode.
 """
 
 from __future__ import annotations

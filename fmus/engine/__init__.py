@@ -82,8 +82,9 @@ def entries(
         "resources/engine.json": json.dumps(about).encode(),
     }
     module = Path(__file__).with_name("mujoco_functions.py").read_bytes()
-    told = {"engine": True, "n_shared": 0}
-    return packed(reduced, functions, told, stop_time=stop_time, step_size=step_size, engine=module)
+    return packed(
+        reduced, functions, {"n_shared": 0}, stop_time=stop_time, step_size=step_size, engine=module
+    )
 
 
 def _misfits(component: Component, settings: Mapping[str, Any]) -> Iterator[str]:

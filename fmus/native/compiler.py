@@ -40,7 +40,7 @@ _ARITHMETIC = ("-ffp-contract=off", "-fno-slp-vectorize")
 FLAGS = ("-fPIC", "-std=gnu11", "-O2", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
 LINK = ("-shared", "-s")
 WEBASSEMBLY = "wasm32-wasi"
-WEBASSEMBLY_FLAGS = ("-std=gnu11", "-O2", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
+WEBASSEMBLY_FLAGS = ("-std=gnu11", "-Os", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 

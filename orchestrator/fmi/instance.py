@@ -4,6 +4,7 @@ own (`isolated`)."""
 from __future__ import annotations
 
 import ctypes
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -49,7 +50,7 @@ class Instance(ABC):
         self.starts, self.policy, self.held = starts, policy or Faults(), 0
         self.good: Vector | None = None
         self.place = Place()
-        self._waiting: list[Callable[[], object]] = []
+        self._waiting: list[tuple[float, Callable[[float], object]]] = []
         self.seldom: frozenset[str] = frozenset()
         self.due = ctypes.c_int64(1)
         self._counted = False
@@ -93,17 +94,20 @@ class Instance(ABC):
 
     # --- settings while it runs -----------------------------------------------------------
 
-    def before_step(self, setting: Callable[[], object]) -> None:
-        """Have a function that sets inputs or parameters called before the next step: FMI allows no
-        output to be read between such a call and a step (FMI 2.0.5 section 4.2.4)."""
-        self._waiting.append(setting)
-        self.place.waiting = 1
+    def before_step(self, setting: Callable[[float], object], time: float = -math.inf) -> None:
+        """Have a function that sets inputs or parameters called before the next step, or the first
+        that begins at `time` (s) or later, with the time (s) of that step: FMI allows no output to
+        be read between such a call and a step (FMI 2.0.5 section 4.2.4)."""
+        self._waiting.append((time, setting))
+        self.place.waiting = min(self.place.waiting, time)
 
-    def settle(self) -> None:
-        """Call what waits for the step that comes now."""
-        waiting, self._waiting, self.place.waiting = self._waiting, [], 0
-        for setting in waiting:
-            setting()
+    def settle(self, time: float) -> None:
+        """Call what waits for the step that begins now, at `time` (s)."""
+        ready = [setting for due, setting in self._waiting if due <= time]
+        self._waiting = [(due, setting) for due, setting in self._waiting if due > time]
+        self.place.waiting = min((due for due, _ in self._waiting), default=math.inf)
+        for setting in ready:
+            setting(time)
 
     # --- what each kind does in its way, every call of which may raise FmuFault -----------
 

@@ -82,6 +82,8 @@ class RunSetup:
     power_across_rates: list[str]
     not_recorded: list[str]
     """The outputs `fmu.port` of which an entry is not written."""
+    events: list[tuple[float, str]] = field(default_factory=list)
+    """Times (s) and texts of what `[[at]]` does, each with the first step that it acts on."""
 
 
 @dataclass(frozen=True)
@@ -255,10 +257,10 @@ class RunRecord(RunEnding, RunSetup):
 
 def content(section: RunSetup | RunEnding | PortEnergy) -> dict[str, Any]:
     """A section as run.json has it, in the same order; its end without what is not known."""
-    found = asdict(section)
-    if "end" in found:
-        found["end"] = {k: v for k, v in found["end"].items() if v not in (None, "")}
-    return found
+    values = asdict(section)
+    if "end" in values:
+        values["end"] = {k: v for k, v in values["end"].items() if v not in (None, "")}
+    return values
 
 
 def read(run: Mapping[str, Any], folder: Path | None) -> RunRecord:

@@ -28,7 +28,7 @@ def _table(name: str, table: Mapping[str, Any]) -> Iterator[str]:
 def _value(key: str, value: Any) -> str:
     if not _tables(value):
         return toml(value, key)
-    return "[\n" + "".join(f"  {toml(each, key)},\n" for each in value) + "]"
+    return "[\n" + "".join(f"  {toml(row, key)},\n" for row in value) + "]"
 
 
 def _tables(value: Any) -> bool:
@@ -43,4 +43,4 @@ def _without_none(value: Any) -> Any:
     if isinstance(value, Mapping):
         # A key that is a word of Python has an underscore in its record: `from_`.
         return {k.removesuffix("_"): _without_none(v) for k, v in value.items() if v is not None}
-    return [_without_none(each) for each in value] if isinstance(value, list) else value
+    return [_without_none(entry) for entry in value] if isinstance(value, list) else value

@@ -42,20 +42,20 @@ class Table(Mapping[str, Vector]):
             return self.rows[:, self.columns.index(name)]
         if name not in self._arrays:
             there = [other for other, table in self.others.items() if name in table]
-            found = f"; it is in tables[{there[0]!r}]" if there else ""
-            raise KeyError(f"no signal {name!r}{found}; there are {', '.join(self.columns)}")
+            hint = f"; it is in tables[{there[0]!r}]" if there else ""
+            raise KeyError(f"no signal {name!r}{hint}; there are {', '.join(self.columns)}")
         indices, places = zip(*sorted(self._arrays[name]), strict=True)
         return self.rows[:, places].reshape(-1, *_shape(indices))
 
     @cached_property
     def _arrays(self) -> dict[str, list[tuple[tuple[int, ...], int]]]:
         """The indices and columns of the entries of each vector and matrix."""
-        found: dict[str, list[tuple[tuple[int, ...], int]]] = {}
+        columns: dict[str, list[tuple[tuple[int, ...], int]]] = {}
         for place, column in enumerate(self.columns):
             name, indices = entry_of(column)
             if indices:
-                found.setdefault(name, []).append((indices, place))
-        return found
+                columns.setdefault(name, []).append((indices, place))
+        return columns
 
     def __contains__(self, name: object) -> bool:
         return name in self.columns or name in self._arrays
@@ -152,14 +152,14 @@ def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
             columns = tuple(next(csv.reader([file.readline()])))
             first = file.readline()
             lines = chain([first], file)  # the text of all of them would take twice what they take
-            found = np.loadtxt(lines, delimiter=",", ndmin=2) if first else None
+            numbers = np.loadtxt(lines, delimiter=",", ndmin=2) if first else None
     except OSError as error:
         raise InputFault(f"{path}: {error.strerror}: run the scene again") from error
     except csv.Error as error:  # a line without end
         raise InputFault(f"{path}: {error}: run the scene again") from error
     except ValueError as error:
         raise InputFault(f"{path}: {_malformed(path) or error}: run the scene again") from error
-    values = np.zeros((0, len(columns))) if found is None else found
+    values = np.zeros((0, len(columns))) if numbers is None else numbers
     why = "" if values.shape[1] == len(columns) else _malformed(path)
     if columns[:1] != ("time",):
         why = f"line 1: its first column is {columns[0] if columns else ''!r}, not 'time'"

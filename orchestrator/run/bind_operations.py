@@ -6,6 +6,7 @@ resolved once, when an operation is bound, so that the event loop calls no more 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 
@@ -176,15 +177,17 @@ class Binder:
         return lambda tick: step(seconds(tick), seconds(tick + valid), size)
 
     def _live(self, fmu: str, step: Call) -> Call:
-        """In real time an FMU takes settings that wait for it before its step; beside the loop, the
-        step is begun only."""
+        """An FMU takes settings that wait for it before its step; beside the loop, in real time,
+        the step is begun only."""
         simulation, instance = self._simulation, self._simulation.instances[fmu]
-        if not simulation.pace:
+        if not simulation.pace and instance.place.waiting == math.inf:
             return step
+        place, seconds = instance.place, simulation.seconds
         side = simulation.sides[simulation.beside[fmu]] if fmu in simulation.beside else None
 
         def live(tick: int) -> None:
-            instance.settle()
+            if place.waiting <= (time := seconds(tick)):
+                instance.settle(time)
             if side:
                 side.start(instance, lambda: step(tick))
             else:

@@ -68,7 +68,7 @@ def document(
     if not isinstance(base, str):
         raise refuse(f"{base!r}: write a scene's name or path")
     try:
-        _, found = find(base, folder)
+        _, base_text = find(base, folder)
     except InputFault as fault:
         raise refuse(f"{fault}; a path is relative to this file") from None
     if len(above) >= MAX_EXTENDED:
@@ -78,7 +78,7 @@ def document(
     so_far = (*(above or (name,)), str(FilePath(base).resolve()) if where else base)
     if so_far[-1] in above:
         raise refuse(f"runs in a circle: {' -> '.join(so_far)}")
-    below, below_places = document(found, base, where, so_far, base)
+    below, below_places = document(base_text, base, where, so_far, base)
     below = dropping.taken(below, dropped, lambda message: refuse(message, "drop"))
     replaced = set(_replaced(below, data))
     inherited = {
@@ -90,14 +90,14 @@ def document(
     return _merged(below, data), inherited | places
 
 
-def _replaced(base: Mapping[str, Any], top: Mapping[str, Any], at: Path = ()) -> Iterator[Path]:
+def _replaced(base: Mapping[str, Any], top: Mapping[str, Any], above: Path = ()) -> Iterator[Path]:
     """The paths at which the value of `top` replaces that of `base` instead of merging."""
     for key, value in top.items():
         below = base.get(key)
         if isinstance(below, dict) and isinstance(value, dict) and _alike(below, value):
-            yield from _replaced(below, value, (*at, key))
+            yield from _replaced(below, value, (*above, key))
         else:
-            yield (*at, key)
+            yield (*above, key)
 
 
 def with_family(

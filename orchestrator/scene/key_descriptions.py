@@ -28,8 +28,8 @@ def vector(path: Path, data: Any) -> str:
 
 def expected(path: Path, data: Any) -> str:
     """What the value at `path` may be, in words."""
-    found = [pair for kind in annotations_at(path, data) for pair in measured(kind)]
-    units = {_word(k, q): _beside(q.unit if q else unit(k)) for k, q in found}
+    kinds = [pair for kind in annotations_at(path, data) for pair in measured(kind)]
+    units = {_word(k, q): _beside(q.unit if q else unit(k)) for k, q in kinds}
     if "a number" in units:
         units.pop("a whole number", None)
     return _either([word + unit for word, unit in units.items() if word])
@@ -52,10 +52,10 @@ def _beside(unit: str) -> str:
 
 def words(kind: Any) -> str:
     """The type of a value in words: `a number`, `three numbers`, `"a" or "b"`, `a table`."""
-    found = [_word(branch, quantity) for branch, quantity in measured(kind)]
-    if "a number" in found:
-        found = [word for word in found if word != "a whole number"]
-    return _either([word for word in dict.fromkeys(found) if word])
+    words = [_word(branch, quantity) for branch, quantity in measured(kind)]
+    if "a number" in words:
+        words = [word for word in words if word != "a whole number"]
+    return _either([word for word in dict.fromkeys(words) if word])
 
 
 _WORDS = {
@@ -98,28 +98,28 @@ def limits(kind: Any) -> str:
 
 
 def _of_numbers(kind: Any, what: Callable[[Quantity], str]) -> str:
-    found = []
+    texts = []
     for branch, quantity in measured(kind):
         if quantity:
-            found.append(what(quantity))
+            texts.append(what(quantity))
         elif typing.get_origin(branch) in (tuple, Mapping):
             entries = [_of_numbers(entry, what) for entry in typing.get_args(branch)]
             entries = [text for text in entries if text]
-            found.append(entries[0] if len({*entries}) == 1 else ", ".join(entries))
-    return "; ".join(text for text in dict.fromkeys(found) if text)
+            texts.append(entries[0] if len({*entries}) == 1 else ", ".join(entries))
+    return "; ".join(text for text in dict.fromkeys(texts) if text)
 
 
 @cache
 def meanings(record: Any) -> dict[str, str]:
     """The meaning of each key of a record, from the docstrings under its fields."""
-    found = {}
+    texts = {}
     for kind in reversed(as_written(record).__mro__[:-1]):
         (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
         for field, text in pairwise(typing.cast("ast.ClassDef", body).body):
             if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
                 name = typing.cast("ast.Name", field.target).id.rstrip("_")
-                found[name] = " ".join(ast.literal_eval(text.value).split())
-    return found
+                texts[name] = " ".join(ast.literal_eval(text.value).split())
+    return texts
 
 
 def about(record: Any) -> str:

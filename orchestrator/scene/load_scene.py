@@ -60,13 +60,13 @@ def from_source(source: Source) -> Scene:
     wrong += unread
     try:
         # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
-        found = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
+        scene = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
     except pydantic.ValidationError as error:
         wrong += problems(error.errors(include_url=False), data)
     if wrong:
         wrong += beyond(wrong, data)[: COUNTED - len(wrong)]
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
-    if wrong := checks.check(found):
+    if wrong := checks.check(scene):
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
-    found = read_parts.put(found, parts)
-    return WrittenScene(**vars(found), origin=origin, written=found)
+    scene = read_parts.put(scene, parts)
+    return WrittenScene(**vars(scene), origin=origin, written=scene)

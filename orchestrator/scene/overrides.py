@@ -138,7 +138,7 @@ def _entry(entries: list[Any], name: str, option: str) -> int:
     own = [
         e.get("name", e.get("replaces", i)) for i, e in enumerate(entries) if isinstance(e, dict)
     ]
-    known = [str(each) for each in own]
+    known = [str(entry) for entry in own]
     if name in known:
         return known.index(name)
     raise InputFault(f"--set {shortened(option)}: {unknown('entry', name, known)}")

@@ -24,8 +24,8 @@ def tables(data: Any) -> Iterator[tuple[Path, Any]]:
 
 
 def _list(data: Any, *path: str) -> list[Any]:
-    found = value(data, path)
-    return found if isinstance(found, list) else []
+    entries = value(data, path)
+    return entries if isinstance(entries, list) else []
 
 
 def record_of(path: Path, data: Any) -> Any:

@@ -20,7 +20,7 @@ from hapticlink.orchestrator.scene.validation_errors import problems
 
 def read(data: Any) -> tuple[dict[Path, Any], list[Problem]]:
     """The records of such tables in a scene's `data`, by path, and the problems found in them."""
-    found: dict[Path, Any] = {}
+    records: dict[Path, Any] = {}
     errors: list[Any] = []
     names: set[Any] = set()
     wrong: list[Problem] = []
@@ -32,11 +32,11 @@ def read(data: Any) -> tuple[dict[Path, Any], list[Problem]]:
             continue
         try:
             text = to_json({"table": table}, inf_nan_mode="constants")
-            found[path] = _reader(record).validate_json(text).table
+            records[path] = _reader(record).validate_json(text).table
         except pydantic.ValidationError as error:
-            each = error.errors(include_url=False)
-            errors += [{**e, "loc": (*path, *e["loc"][1:])} for e in each]
-    return found, wrong + problems(errors, data)
+            problems_of_part = error.errors(include_url=False)
+            errors += [{**e, "loc": (*path, *e["loc"][1:])} for e in problems_of_part]
+    return records, wrong + problems(errors, data)
 
 
 def _of_a_force(path: Path, table: Any, names: set[Any]) -> Iterator[Problem]:
@@ -73,16 +73,16 @@ def _reader(record: Any) -> pydantic.TypeAdapter[Any]:
         raise InputFault(message) from error
 
 
-def put(scene: Scene, found: Mapping[Path, Any]) -> Scene:
+def put(scene: Scene, records: Mapping[Path, Any]) -> Scene:
     """The scene with such tables replaced by the records that `read` returned."""
 
     def settings(i: int) -> dict[str, Any]:
-        record = found["fmu", i, "settings"]
+        record = records["fmu", i, "settings"]
         return {f.name: getattr(record, f.name) for f in fields(record)}
 
     fmus = (replace(f, settings=settings(i)) if f.block else f for i, f in enumerate(scene.fmu))
     scene = replace(scene, fmu=tuple(fmus))
     if scene.linkage and scene.linkage.force:
-        forces = (found["linkage", "force", i] for i in range(len(scene.linkage.force)))
+        forces = (records["linkage", "force", i] for i in range(len(scene.linkage.force)))
         scene = replace(scene, linkage=replace(scene.linkage, force=tuple(forces)))
     return scene

@@ -141,6 +141,29 @@ class Latency:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TimedEvent:
+    """What happens at a time of a run ([scenarios](scenarios.md)): values that are set, and inputs
+    that are disturbed for a while, in place of what their connections bring."""
+
+    time: Elapsed
+    """When: an FMU takes it with its first step from then on."""
+    until: Elapsed | None = None
+    """End of `override`, `freeze` and `noise`; by default that of the run. What is `set` stays."""
+    set: Mapping[str, Value] = field(default_factory=dict)
+    """Values of tunable parameters and of inputs that nothing feeds, `fmu.port`, in the FMU's
+    units; or `graphics.rate`, a number (Hz): steps then end on haptic ticks."""
+    override: Mapping[str, Value] = field(default_factory=dict)
+    """Values of inputs that a connection feeds, `fmu.port`, in the FMU's units."""
+    freeze: tuple[str, ...] = ()
+    """Inputs, `fmu.port`, that keep the value that they have at that time."""
+    noise: Mapping[str, Annotated[float, Quantity(OWN, gt=0)]] = field(default_factory=dict)
+    """Standard deviation of normal noise on each entry of an input, `fmu.port`, in the source's
+    units, drawn at each step by numpy's PCG64."""
+    seed: Seed = 0
+    """Seed of the noise."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class PowerPort:
     """A power port: the power into a plant is sign * effort . d(displacement)/dt."""
 

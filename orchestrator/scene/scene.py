@@ -39,6 +39,7 @@ from hapticlink.orchestrator.scene.records import (
     PowerPort,
     Record,
     SetSpring,
+    TimedEvent,
     Wire,
 )
 from hapticlink.orchestrator.scene.scene_source import Origin, Source
@@ -170,6 +171,8 @@ class Scene:
     """Further FMUs: [foreign FMUs](foreign-fmus.md)."""
     connection: tuple[Wire, ...] = ()
     """Connections to and from them."""
+    at: tuple[TimedEvent, ...] = ()
+    """What happens at given times: [scenarios](scenarios.md)."""
     record: Record = field(default_factory=Record)
     """What is written, and how often."""
     faults: Faults = field(default_factory=Faults)

@@ -93,14 +93,14 @@ def is_needed(path: Path, of: Any = None) -> bool:
 
 def default(kind: Any, key: str) -> Any:
     """The default of a record's key, MISSING where it is required."""
-    found = next(f for f in fields(as_written(kind)) if f.name.rstrip("_") == key)
-    return found.default_factory() if found.default_factory is not MISSING else found.default
+    entry = next(f for f in fields(as_written(kind)) if f.name.rstrip("_") == key)
+    return entry.default_factory() if entry.default_factory is not MISSING else entry.default
 
 
 @cache
 def hints(kind: Any) -> dict[str, Any]:
-    found = typing.get_type_hints(as_written(kind), include_extras=True)
-    return {name.rstrip("_"): hint for name, hint in found.items() if name[0] != "_"}  # `from_`
+    typed = typing.get_type_hints(as_written(kind), include_extras=True)
+    return {name.rstrip("_"): hint for name, hint in typed.items() if name[0] != "_"}  # `from_`
 
 
 def _records(kinds: list[Any]) -> list[Any]:

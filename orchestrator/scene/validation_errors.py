@@ -25,16 +25,16 @@ def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
         path = _path(error, data)
         if path is not None:
             by_path.setdefault(path, []).append(error)
-    found: list[tuple[Path, str]] = []
+    messages_by_path: list[tuple[Path, str]] = []
     above = {path[:i] for path in by_path for i in range(len(path))}
-    for at, group in islice(by_path.items(), COUNTED):
-        if at in above and all(e["type"].endswith(("_type", "literal_error")) for e in group):
+    for where, group in islice(by_path.items(), COUNTED):
+        if where in above and all(e["type"].endswith(("_type", "literal_error")) for e in group):
             continue  # branches of a union that do not apply; the one that does has deeper errors
         limited = [e for e in group if e["type"] in _RANGE]
-        messages = {_message(e, at, data) for e in limited or group}
-        expected = f"{_shown(group[0]['input'])} should be {key_descriptions.expected(at, data)}"
-        found.append((at, messages.pop() if len(messages) == 1 else expected))
-    return found
+        messages = {_message(e, where, data) for e in limited or group}
+        expected = f"{_shown(group[0]['input'])} should be {key_descriptions.expected(where, data)}"
+        messages_by_path.append((where, messages.pop() if len(messages) == 1 else expected))
+    return messages_by_path
 
 
 _RANGE = {
@@ -87,10 +87,10 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
             node[path[-1]] = filled
     try:
         document = to_json(whole, inf_nan_mode="constants")
-        found = checks.check(adapter().validate_json(document))
+        faults = checks.check(adapter().validate_json(document))
     except pydantic.ValidationError:
         return []
-    return [problem for problem in found if problem[0] not in reported]
+    return [problem for problem in faults if problem[0] not in reported]
 
 
 def _is_kind(path: Path) -> bool:

@@ -28,30 +28,30 @@ def read(path: FilePath, root: Element) -> dict[str, Any]:
     for annotation in root.iterfind(f"{{{SSD}}}Annotations/{{{SSC}}}Annotation"):
         if annotation.get("type") == ANNOTATION:
             try:
-                found = json.loads(annotation.findtext(f"{{{RUN}}}Scene") or "")
+                tables = json.loads(annotation.findtext(f"{{{RUN}}}Scene") or "")
             except (ValueError, RecursionError) as error:
                 raise InputFault(f"{path}: annotation {ANNOTATION}: {error}") from error
-            for where, message in _problems(found):
+            for where, message in _problems(tables):
                 problem = ": ".join((".".join(map(str, where)), message))
                 raise InputFault(f"{path}: annotation {ANNOTATION}: {problem}")
-            assert isinstance(found, dict)
-            return found
+            assert isinstance(tables, dict)
+            return tables
     return {}
 
 
-def _problems(found: Any) -> Iterator[Problem]:
+def _problems(tables: Any) -> Iterator[Problem]:
     """What is wrong, the first of which is reported: later ones may presume it."""
-    yield from unsound(found)
+    yield from unsound(tables)
     own = {f.name for f in fields(Scene)} - NOT_IN_ANNOTATION
-    yield from _table(found, (), own | {"graphics", "fmu", "connection"})
-    yield from _table(found.get("graphics", {}), ("graphics",), OF_GRAPHICS)
-    fmus = found.get("fmu", {})
+    yield from _table(tables, (), own | {"graphics", "fmu", "connection"})
+    yield from _table(tables.get("graphics", {}), ("graphics",), OF_GRAPHICS)
+    fmus = tables.get("fmu", {})
     yield from _table(fmus, ("fmu",), fmus)
     for name, fmu in fmus.items():
         yield from _table(fmu, ("fmu", name), OF_AN_FMU)
-    if not isinstance(found.get("connection", []), list):
+    if not isinstance(tables.get("connection", []), list):
         yield ("connection",), "should be a list"
-    for where, _ in traced({"graphics": found.get("graphics"), "fmu": [*fmus.values()]}):
+    for where, _ in traced({"graphics": tables.get("graphics"), "fmu": [*fmus.values()]}):
         yield (*where, "rate"), "a trace is a file outside the SSP: name it with --set yourself"
 
 

@@ -112,8 +112,8 @@ class Wires:
         steps = [self._step(relative, *each) for each in around]
         for i, node in enumerate(nodes):
             if node[0] in self._systems:
-                found = Reach(*sink, units[i], _all(steps[i:]), relative)
-                self.reach.setdefault(node, []).append(found)
+                sink_reach = Reach(*sink, units[i], _all(steps[i:]), relative)
+                self.reach.setdefault(node, []).append(sink_reach)
         if nodes[0][0] in self.described:
             own = len(lines) == 1 and all(self._unit_is_of_fmu(n) for n in nodes)
             linear = lines[0].linear if own else _all(steps)

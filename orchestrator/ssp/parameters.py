@@ -69,26 +69,26 @@ class Parameters:
     def starts(self) -> dict[Place, dict[str, Value]]:
         """Start values by component and variable. Values whose names match nothing are ignored, as
         SSP 1.0 requires, and logged. Raises InputFault for what cannot be read."""
-        found = self.values()
+        starts = self.values()
         if self.unused:
             names = printable(", ".join(self.unused[:SHOWN]))
             more = f" and {n} more" if (n := len(self.unused) - SHOWN) > 0 else ""
             message = "%s: parameters that match nothing are ignored: %s%s"
             logging.getLogger(__name__).warning(message, self.path, names, more)
-        return found
+        return starts
 
     def values(self) -> dict[Place, dict[str, Value]]:
         """As `starts`; names that match nothing are in `unused`."""
-        found: dict[Place, dict[str, Value]] = {place: {} for place in self.wires.described}
+        starts: dict[Place, dict[str, Value]] = {place: {} for place in self.wires.described}
         for part in self.wires.root:
             for given in self._given(part):
                 targets = [*self._targets(part, given.name)]
                 for target in targets:
                     value = self._converted(part, given, target)
-                    found[target.component][target.variable] = value
+                    starts[target.component][target.variable] = value
                 if not targets:
                     self.unused.append(dotted(part.place, given.name))
-        return found
+        return starts
 
     def _given(self, part: Part) -> Iterator[Given]:
         for binding in part.bindings:

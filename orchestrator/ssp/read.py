@@ -54,22 +54,22 @@ def tables(path: Path) -> dict[str, Any]:
         wires = Wires(path, system, described, defined)
         starts = Parameters(path, archive, wires).starts()
     rest = annotation.read(path, root)
-    found: dict[str, Any] = {
+    tables: dict[str, Any] = {
         "title": root.get("description") or root.get("name") or path.stem,
         **rest,
     }
     about = rest.get("fmu", {})
-    found["fmu"] = [
+    tables["fmu"] = [
         {"path": str(fmu.path), "start": starts[place], "name": names[place]}
         | about.get(dotted(place), {})
         for place, fmu in described.items()
     ]
-    found["connection"] = [
+    tables["connection"] = [
         {"from": f"{names[a]}.{p}", "to": f"{names[b]}.{q}", **how}
         for (a, p), (b, q), how in _grouped(wires.rows, described)
     ] + rest.get("connection", [])
-    _experiment(path, found, root, described.values())
-    return found
+    _experiment(path, tables, root, described.values())
+    return tables
 
 
 @contextmanager
@@ -85,19 +85,19 @@ def _room() -> Iterator[Path]:
 
 
 def _experiment(
-    path: Path, found: dict[str, Any], root: Element, described: Iterable[Description]
+    path: Path, tables: dict[str, Any], root: Element, described: Iterable[Description]
 ) -> None:
     """Adds duration and rate where there is no annotation: the SSP's default experiment, and the
     shortest step size of the FMUs' default experiments. `open_scene` reports those that remain
     missing."""
     experiment = root.find(f"{{{SSD}}}DefaultExperiment")
-    if "duration" not in found and experiment is not None and experiment.get("stopTime"):
+    if "duration" not in tables and experiment is not None and experiment.get("stopTime"):
         if float(experiment.get("startTime", "0")):
             raise InputFault(f"{path}: starts at {experiment.get('startTime')} s; runs start at 0")
-        found["duration"] = float(experiment.get("stopTime", ""))
+        tables["duration"] = float(experiment.get("stopTime", ""))
     steps = [_seconds(d.step_size) for d in described if d.step_size]
-    if "haptics" not in found and steps and all(steps):
-        found["haptics"] = {"rate": str(1 / min(steps))}
+    if "haptics" not in tables and steps and all(steps):
+        tables["haptics"] = {"rate": str(1 / min(steps))}
 
 
 def _seconds(text: str) -> Fraction:
@@ -110,15 +110,15 @@ def _seconds(text: str) -> Fraction:
 
 def _names(places: Iterable[Place]) -> dict[Place, str]:
     """The name of each component in [[fmu]]: its own, numbered where it is not unique."""
-    found: dict[Place, str] = {}
+    names: dict[Place, str] = {}
     counts: dict[str, int] = {}  # by the names that are taken
     for place in places:
         name = wanted = re.sub(r"\W", "_", "_".join(place))
         while name in counts:
             counts[wanted] += 1
             name = f"{wanted}_{counts[wanted]}"
-        counts[name], found[place] = 1, name
-    return found
+        counts[name], names[place] = 1, name
+    return names
 
 
 def _described(
@@ -126,14 +126,14 @@ def _described(
 ) -> dict[Place, Description]:
     """The FMU of each component; an entry that several of them have is read once."""
     known: dict[str, Description] = {}
-    found = {}
+    fmus = {}
     for part in system:
         if part.source is None:
             continue
         if part.source not in known:
             known[part.source] = describe(_unpacked(path, archive, part, part.source, room))
-        found[part.place] = known[part.source]
-    return found
+        fmus[part.place] = known[part.source]
+    return fmus
 
 
 def _unconnected(part: Part) -> Part:
@@ -145,12 +145,12 @@ def _resized(
     described: Mapping[Place, Description], starts: Mapping[Place, Mapping[str, Value]]
 ) -> dict[Place, Description]:
     """The FMUs with arrays of the sizes that their structural parameters get."""
-    found = {}
+    fmus = {}
     for place, description in described.items():
         structural = {s.name for s in description.scalars if s.structural}
         sizes = {n: int(v) for n, v in starts[place].items() if n in structural}
-        found[place] = describe(description.path, sizes) if sizes else description
-    return found
+        fmus[place] = describe(description.path, sizes) if sizes else description
+    return fmus
 
 
 def _unpacked(path: Path, archive: zipfile.ZipFile, part: Part, source: str, room: Path) -> Path:

@@ -85,14 +85,14 @@ def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
 
 def units(root: Element, space: str = SSD) -> dict[str, Unit]:
     """The units that a file defines, by name."""
-    found = {}
+    units = {}
     for unit in root.iterfind(f"{{{space}}}Units/{{{SSC}}}Unit"):
         base = unit.find(f"{{{SSC}}}BaseUnit")
         assert base is not None  # required by the schema
         powers = tuple(int(base.get(b, "0")) for b in BASES)
         factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
-        found[unit.get("name", "")] = Unit(unit.get("name", ""), powers, factor, offset)
-    return found
+        units[unit.get("name", "")] = Unit(unit.get("name", ""), powers, factor, offset)
+    return units
 
 
 def tree(path: Path, element: Element, place: Place = ()) -> Part:

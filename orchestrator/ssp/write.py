@@ -161,29 +161,31 @@ def _units(root: Element, system: System) -> None:
 def _rest(scene: Scene, system: System) -> dict[str, Any]:
     """The content of the annotation, with the keys of a scene."""
     keys = {f.name for f in fields(Scene)} - NOT_IN_ANNOTATION
-    found = pydantic.TypeAdapter(Scene).dump_python(
+    tables = pydantic.TypeAdapter(Scene).dump_python(
         scene, mode="json", by_alias=True, exclude_none=True, include=keys
     )
-    found["stop_when"] = scene.ends_when
+    tables["stop_when"] = scene.ends_when
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
-    found["holds"] = {**scene.holds, **own}
+    tables["holds"] = {**scene.holds, **own}
     rates = blocks(scene).rates
     if scene.graphics and "graphics" in rates.values():
         graphics = pydantic.TypeAdapter(type(scene.graphics))
-        found["graphics"] = graphics.dump_python(
+        tables["graphics"] = graphics.dump_python(
             scene.graphics, mode="json", exclude_none=True, include={"rate", "align", "phase"}
         )
     as_json = partial(pydantic.TypeAdapter(AnyRate).dump_python, mode="json")
     derivatives = {f.name: dict(f.derivatives) for f in scene.fmu if f.derivatives}
-    found["fmu"] = {
+    tables["fmu"] = {
         u.name: {"rate": as_json(rates[u.name]), "timing": u.description.timing}
         | ({"isolate": True} if u.isolate else {})
         | ({"derivatives": derivatives[u.name]} if u.name in derivatives else {})
         for u in system.fmus
     }
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
-    found["connection"] = [_row(c, wires.get(c.name)) for c in system.connections if c.to_parameter]
-    return found
+    tables["connection"] = [
+        _row(c, wires.get(c.name)) for c in system.connections if c.to_parameter
+    ]
+    return tables
 
 
 def _row(c: Connection, wire: Wire | None) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.assign_holds import misfit
+from hapticlink.orchestrator.system.ports import power_across_rates
 from hapticlink.orchestrator.system.springs import limited_fmus
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -65,3 +66,12 @@ def choices_of_slower(system: System) -> dict[str, list[str]]:
     fast = system.timeline.clocks[0].name
     slower = (c for c in system.connections if c.hold and system.fmu[c.source].clock != fast)
     return {c.name: choices(system, c) for c in slower}
+
+
+def choices_between_rates(system: System) -> dict[str, list[str]]:
+    """`choices_of_slower`, and those of connections to slower clocks that carry power."""
+    power = power_across_rates(system)
+    carrying = {
+        n: choices(system, c) for n, c in system.connection.items() if n in power and c.hold
+    }
+    return choices_of_slower(system) | carrying

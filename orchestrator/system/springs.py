@@ -30,10 +30,15 @@ def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
 def limited_gains(system: System) -> set[str]:
     """The gains, `fmu.parameter`, of springs whose energy a hold limits: its tank has their values
     at the start, so that they may not change while the scene runs."""
-    held = {_end(c) for c in system.connections if c.hold and HOLDS[c.hold].needs == "spring"}
+    return gains_of_held(system.fmus, system.connections)
+
+
+def gains_of_held(fmus: Iterable[Fmu], connections: Iterable[Connection]) -> set[str]:
+    """As `limited_gains`, before there is a system."""
+    held = {_end(c) for c in connections if c.hold and HOLDS[c.hold].needs == "spring"}
     return {
         f"{fmu.name}.{gain}"
-        for fmu in system.fmus
+        for fmu in fmus
         for spring in fmu.description.springs
         if f"{fmu.name}.{spring.set_position}" in held
         for gain in (spring.stiffness, spring.damping)

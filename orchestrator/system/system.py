@@ -115,6 +115,24 @@ class Recording:
 
 
 @dataclass(frozen=True)
+class Change:
+    """What the steps of an FMU from `begin` on get (s): `values` of `inputs` once, or before each
+    step that begins before `end` if that is given. Without values, the inputs keep what `held`
+    brings them at `begin`; `noise` is the standard deviation that adds to it, with a seed. text:
+    for the record of a run. Without inputs it is only for that record."""
+
+    begin: float
+    text: str
+    fmu: str = ""
+    inputs: tuple[Scalar, ...] = ()
+    values: tuple[float, ...] = ()
+    end: float | None = None
+    held: Connection | None = None
+    noise: float = 0.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class System:
     """What is simulated, on which timeline, with which coupling."""
 
@@ -131,6 +149,8 @@ class System:
     """Holds that did not fit."""
     replacements: Mapping[str, Replacement] = field(default_factory=dict)
     """The FMUs in the place of the loop's blocks, by name."""
+    changes: tuple[Change, ...] = ()
+    """What happens at given times, in their order."""
 
     @cached_property
     def fmu(self) -> Mapping[str, Fmu]:

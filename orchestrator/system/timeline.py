@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -49,8 +50,38 @@ def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
                     starts = tuple(frame * a_tick for frame in frames)
             except ValueError as error:
                 raise SceneFault(scene.title, [scene.place(pace.path, str(error))]) from error
+        if name == "graphics":
+            starts = _changed(scene, starts, base, a_tick, steps * a_tick)
         stepped.append(Clock(name, starts, pace.path))
     return Timeline(base, steps * a_tick, tuple(stepped), given.of)
+
+
+GRAPHICS_RATE = "graphics.rate"
+"""What `[[at]]` sets of a clock."""
+
+
+def _changed(
+    scene: Scene, starts: Sequence[int], base: Fraction, a_tick: int, end: int
+) -> Sequence[int]:
+    """The starts of graphics steps with the rates that `[[at]]` sets: from the first one at or
+    after its time on, steps end on the first haptic tick (`a_tick` ticks) at or after whole
+    periods."""
+    for i, event in sorted(enumerate(scene.at), key=lambda pair: pair[1].time):
+        if (rate := event.set.get(GRAPHICS_RATE)) is None:
+            continue
+        where = ("at", i, "set", GRAPHICS_RATE)
+        number = isinstance(rate, int | float) and not isinstance(rate, bool)
+        least = a_tick * base
+        if not number or not float(rate) >= 1e-3 or 1 / exact(rate) < least:  # type: ignore[arg-type]
+            message = f"{rate!r}: give a rate (Hz) from 0.001 to that of the haptics, {1 / least}"
+            raise SceneFault(scene.title, [scene.place(where, message)])
+        period = 1 / (exact(rate) * base)  # type: ignore[arg-type]
+        kept = starts[: bisect_left(starts, exact(event.time) / base) + 1]
+        begin = kept[-1]
+        count = max(math.ceil((end - begin) / period), 0) + 3
+        later = (math.ceil((begin + k * period) / a_tick) * a_tick for k in range(1, count))
+        starts = (*kept, *later)
+    return starts
 
 
 def _period(pace: Pace) -> Fraction:

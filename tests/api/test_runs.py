@@ -210,7 +210,7 @@ def test_what_a_killed_run_has_written_can_be_looked_at(bar: Path, tmp_path: Pat
     found = hl.load(tmp_path)
     assert same(found, whole)
     assert "not ended" in repr(found)
-    axes = found.figures()["trajectories"].axes[0]
+    axes = found.figures()["mechanism"].axes[0]
     assert "until the last row so far at 0.25 s" in axes.get_title().replace("\n", " ")
 
 

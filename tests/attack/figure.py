@@ -14,7 +14,7 @@ from tests.attack.cases import FOLDER
 NAMES = (
     "signals_of_commands",
     *("scenes", "options", "ssps", "archives", "c_interface", "signals"),
-    *("hostile", "folders", "special_files", "plugins", "misuse", "loops"),
+    *("hostile", "folders", "special_files", "plugins", "misuse", "loops", "page"),
 )
 ENDS = {
     "done": "#0077bb",

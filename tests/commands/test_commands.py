@@ -27,7 +27,7 @@ def test_a_mechanism_alone_runs_at_the_haptic_rate(
     assert found.run["end"] == {"reason": "duration", "time": 0.25}
     assert found.run["energies"] == "none"
     assert found.run["fault"] is None
-    assert imread(tmp_path / "out" / "trajectories.png").min() < 0.5  # ink on it
+    assert imread(tmp_path / "out" / "mechanism.png").min() < 0.5  # ink on it
     assert "done at 0.25 s" in capsys.readouterr().out
 
 

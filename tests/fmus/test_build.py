@@ -18,8 +18,11 @@ import fmpy
 import pytest
 
 from hapticlink.components.component import Block, Variable
+from hapticlink.fmus.blocks import build_block
 from hapticlink.fmus.build import build
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.scene.blocks import blocks
 from tests.fmus import sample_components
 
 
@@ -149,3 +152,11 @@ def test_the_icon_is_a_whole_png(fmus, name):
 def test_the_icon_tells_the_kind(fmus):
     read = {name: zipfile.ZipFile(path).read("model.png") for name, path in fmus.items()}
     assert read["spring"] == read["fragile"] != read["controller"] == read["gain"]
+
+
+@pytest.mark.parametrize("block", ["virtual_mechanism", "virtual_environment"])
+def test_documentation_names_no_file_of_the_sources(block, tmp_path):
+    plan = next(b for b in blocks(open_scene.load("closed-loop")).loop if b.name == block)
+    path = build_block(plan.block, plan.settings, tmp_path)
+    page = zipfile.ZipFile(path).read("documentation/index.html").decode()
+    assert not re.search(r"\w\.py\b|`\w+_\w+`", page)

@@ -130,3 +130,9 @@ def test_timing_and_substeps_for_our_own_tools():
     block = ET.parse(io.BytesIO(text)).find("VendorAnnotations/Tool[@name='hapticlink']/Block")
     assert block is not None
     assert block.attrib == {"timing": "continuous", "substeps": "3"}
+
+
+def test_author_licence_version_and_generation_tool(fmus):
+    described = read(fmus["spring"])
+    assert (described.author, described.license) == ("The hapticlink authors", "MIT")
+    assert described.generationTool == f"hapticlink {described.version}"

@@ -3,6 +3,7 @@ changed in the same way at the same ticks."""
 
 from __future__ import annotations
 
+import base64
 import json
 import subprocess
 import sys
@@ -52,7 +53,7 @@ CHANGES: list[tuple[int, dict[str, Any]]] = [
 """After so many haptic events."""
 EVENTS = 512
 RUN = """
-const module = new WebAssembly.Module(await unpacked(given.program));
+const module = new WebAssembly.Module(Buffer.from(given.program, "base64"));
 const program = new Program(module, given.data);
 const changes = [...given.changes];
 answer = [];
@@ -67,8 +68,9 @@ for (let i = 1; i <= given.events; i++) {
 def under_node(scene: Scene, changes: list[tuple[int, dict[str, Any]]]) -> np.ndarray:
     """The vector of signals after each haptic event."""
     text = page.html(scene, "page")
-    data = json.loads(one_file.element(text, "data"))
-    given = {"data": data, "program": one_file.element(text, "program"), "changes": changes}
+    data = json.loads(one_file.unpacked(text, "data"))
+    program = base64.b64encode(one_file.unpacked(text, "program")).decode()
+    given = {"data": data, "program": program, "changes": changes}
     return np.array(javascript("program.js", RUN, given | {"events": EVENTS}))
 
 

@@ -75,11 +75,11 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
 
 def _force(run: Results) -> tuple[Vector, Vector] | None:
     """The largest force (N) of a kind at each time (s) of the most frequent ones."""
-    found = [(time, force) for time, force, _ in all_wrenches(run).values()]
-    if not found:
+    forces = [(time, force) for time, force, _ in all_wrenches(run).values()]
+    if not forces:
         return None
-    at = max((time for time, _ in found), key=len)
-    return at, np.max([np.interp(at, time, force) for time, force in found], axis=0)
+    times = max((time for time, _ in forces), key=len)
+    return times, np.max([np.interp(times, time, force) for time, force in forces], axis=0)
 
 
 def _figure(title: str, x: str, y: str, curves: Curves, steps: bool = False) -> Figure:

@@ -17,8 +17,8 @@ def differing(runs: Sequence[Results]) -> dict[str, tuple[str, ...]]:
     of tables are named by their `name` or counted from 1."""
     every = [dict(_leaves(run.record.scene)) for run in runs]
     keys = dict.fromkeys(key for leaves in every for key in leaves)
-    found = {key: tuple(leaves.get(key, UNSET) for leaves in every) for key in keys}
-    return {k: v for k, v in found.items() if len(set(v)) > 1 and k not in ABOUT}
+    values = {key: tuple(leaves.get(key, UNSET) for leaves in every) for key in keys}
+    return {k: v for k, v in values.items() if len(set(v)) > 1 and k not in ABOUT}
 
 
 def other_scenes(runs: Sequence[Results]) -> str:

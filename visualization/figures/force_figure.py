@@ -24,13 +24,13 @@ STYLES = ("-", "--", ":", "-.")
 def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     """Forces, moments and, against their limits, motor torques of a run that has wrenches.
     devices: of each user by point; the first one's name is empty. Further users are dashed."""
-    found = all_wrenches(results)
+    wrenches = all_wrenches(results)
     driven = {
         user: (*moved, device.torque_limit)
         for user, device in devices.items()
         if (moved := torques(results, device, user))
     }
-    largest, (_, force, _) = max(found.items(), key=lambda item: item[1][1].max())
+    largest, (_, force, _) = max(wrenches.items(), key=lambda item: item[1][1].max())
     title = f"The largest force is that of the {largest}: {short(force.max())} N"
     labels = ["force (N)", "moment (N.m)", *(["motor torque (N.m)"] if driven else [])]
     if driven:
@@ -39,7 +39,7 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     figure, axes = titled(results, title, "time (s)", *labels)
     styles = dict(zip(["", *further_users(results)], cycle(STYLES)))
     names = [*WRENCHES.values()]
-    for name, (time, force, moment) in found.items():
+    for name, (time, force, moment) in wrenches.items():
         user, _, kind = name.rpartition(": ")
         look = {"lw": 1, "color": f"C{names.index(kind)}", "ls": styles[user]}
         axes[0].plot(time, force, label=name, **look)
@@ -47,11 +47,11 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     legend_above_curves(axes[0], columns=2)
     for user, (time, tau, limit) in driven.items():
         for i, each in enumerate(tau.T):
-            said = None if user else f"motor {i + 1}"
-            axes[2].plot(time, each, lw=1, color=f"C{i}", ls=styles[user], label=said)
+            label = None if user else f"motor {i + 1}"
+            axes[2].plot(time, each, lw=1, color=f"C{i}", ls=styles[user], label=label)
         for sign in (-1, 1):
-            said = None if user or sign < 0 else "limit"
-            axes[2].axhline(sign * limit, color="k", lw=0.8, ls="--", label=said)
+            label = None if user or sign < 0 else "limit"
+            axes[2].axhline(sign * limit, color="k", lw=0.8, ls="--", label=label)
     if driven:
         legend_above_curves(axes[2], columns=5)
     return figure

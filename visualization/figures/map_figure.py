@@ -38,13 +38,13 @@ def draw(made: Map) -> Figure:
     norm = SymLogNorm(linthresh=max(top / 100, 1e-9), vmin=-top, vmax=top)
     mesh = None
     for axes, (values, rows) in zip(all_axes, panels.items(), strict=False):
-        found = _panel(axes, made, rows, norm)
-        mesh = found or mesh
+        panel = _panel(axes, made, rows, norm)
+        mesh = panel or mesh
         if not made.panels:
             continue
         named = zip(made.panels, values, strict=True)
-        said = ", ".join(f"{_short(key)} = {value}" for key, value in named)
-        axes.set_title(plain(fill(said, 36)), fontsize="small")
+        text = ", ".join(f"{_short(key)} = {value}" for key, value in named)
+        axes.set_title(plain(fill(text, 36)), fontsize="small")
     for axes in all_axes[len(panels) :]:
         axes.remove()
     for axes in all_axes[::across]:
@@ -71,7 +71,7 @@ def _finding(made: Map) -> str:
     agree."""
     grid = made.of("grid")
     stable = [row for row in grid if row["verdict"] == "stable"]
-    said = f"{len(stable)} of {len(grid)} points are stable"
+    text = f"{len(stable)} of {len(grid)} points are stable"
     for key in filter(None, (made.y, made.x)):
         others = {float(row[key]) for row in grid if row["verdict"] != "stable"}
         always = sorted({float(row[key]) for row in stable} - others)
@@ -79,12 +79,12 @@ def _finding(made: Map) -> str:
             between = [value for value in others if always[0] < value < always[-1]]
             if not between:
                 last = f" to {always[-1]:g}" if len(always) > 1 else ""
-                said += f", all with {axis(key)} {always[0]:g}{last}"
+                text += f", all with {axis(key)} {always[0]:g}{last}"
                 break
     checks = [row for row in made.of("check") if "agree" in row]
     if checks:
-        said += f"; {sum(bool(r['agree']) for r in checks)} of {len(checks)} runs agree"
-    return said
+        text += f"; {sum(bool(r['agree']) for r in checks)} of {len(checks)} runs agree"
+    return text
 
 
 def _short(key: str) -> str:

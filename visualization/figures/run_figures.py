@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.analysis.findings import summary, words
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
+from hapticlink.analysis.findings.limits import NOTICEABLE_J
 from hapticlink.analysis.findings.tracking import (
     constrained,
     further_users,
@@ -30,6 +32,7 @@ from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.loop_names import (
     ENVIRONMENT_WRENCH,
+    HAND_WRENCH,
     HANDLE_POSE,
     JOINT_COORDINATES,
     POINT_POSE,
@@ -48,6 +51,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+BESIDE = 2.9
+"""Width (in) beside the drawing of the mechanism, of the whole device and the legend."""
+ARROW = 50.0
+"""Length (pt) of the arrow of the hand's force."""
 DRAWN = 0.02
 """Of the largest energy at the user's port, above which a block's is drawn."""
 SOURCES = {
@@ -66,11 +73,11 @@ def figures(results: Results) -> dict[str, Figure]:
 
 def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     """By name, what draws each figure of a run."""
-    found: dict[str, Callable[[], Figure]] = {}
+    drawn_by: dict[str, Callable[[], Figure]] = {}
     with_rows = {name: table for name, table in results.tables.items() if len(table["time"])}
     results = replace(results, tables=with_rows)
     if not last_time(results):
-        return found
+        return drawn_by
     linkage = scene_part(
         results, "linkage", Linkage
     )  # an SSP has the block, but not its description
@@ -78,24 +85,25 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     if linkage and (coordinates := of_block(results, JOINT_COORDINATES, size)):
         q = coordinates[JOINT_COORDINATES]
         if len(q := q[np.isfinite(q).all(axis=1)]):
-            found["mechanism"] = partial(_mechanism, results, linkage, q)
+            drawn_by["mechanism"] = partial(_mechanism, results, linkage, q)
     if of_block(results, POINT_POSE, 3):
-        found["trajectories"] = partial(_trajectories, results)
+        if "mechanism" not in drawn_by:
+            drawn_by["trajectories"] = partial(_trajectories, results)
         if of_block(results, HANDLE_POSE, 3):
-            found["distance"] = partial(_distance, results)
+            drawn_by["distance"] = partial(_distance, results)
     if wrenches(results):
-        found["forces"] = partial(forces, results, all_devices(results))
+        drawn_by["forces"] = partial(forces, results, all_devices(results))
     if contact := touching(results):
-        found["contact"] = partial(_contact, results, *contact)
+        drawn_by["contact"] = partial(_contact, results, *contact)
     if counted := constrained(results):
-        found["constraints"] = partial(_constraints, results, *counted)
+        drawn_by["constraints"] = partial(_constraints, results, *counted)
     if port := user_port(results):
-        found["user_port"] = partial(_port, results, port)
+        drawn_by["user_port"] = partial(_port, results, port)
     if generated := _generated(results):
-        found["energies"] = partial(_energies, results, generated)
+        drawn_by["energies"] = partial(_energies, results, generated)
     if (paced := results.record.real_time) and paced["ticks"]:
-        found["real_time"] = partial(real_time, results)
-    return found
+        drawn_by["real_time"] = partial(real_time, results)
+    return drawn_by
 
 
 def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
@@ -105,16 +113,74 @@ def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
 
 
 def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
-    title = f"{results.run['scene']['title']} at the start and at {short(last_time(results))} s"
-    figure, axes = titled(results, title, "x (mm)", "y (mm)")
+    figure, axes = titled(results, _finding(results), "x (mm)", "y (mm)")
     contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
     for label, style, path in _paths(results):
         axes.plot(*path.T, style, color=marks.RED, lw=0.8, label=plain(f"path of {label}"))
     _mark(results, axes)
-    drawing.draw(axes, linkage, q[0], q[-1], devices, contacts)
-    figure.set_size_inches(7.4, 6.4)
-    figure_axes.legend_below(figure)
+    _arrow(results, axes)
+    limits = drawing.draw(axes, linkage, q[0], q[-1], contacts, devices.get(""))
+    figure.set_size_inches(9.4, 6.4)
+    framed(figure, right=BESIDE)
+    title = fill(axes.get_title().replace("\n", " "), 100)
+    axes.set_title(title, fontsize="medium", x=0, y=1.0, pad=12, ha="left")
+    whole = figure.add_axes((1 - BESIDE / 9.4 + 0.01, 0.5, BESIDE / 9.4 - 0.03, 0.34))
+    if devices:
+        drawing.device(whole, linkage, q[0], devices, limits)
+    else:
+        whole.remove()
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, fontsize="x-small", ncols=1, frameon=False, alignment="left",
+        loc="upper left", bbox_to_anchor=(1 - BESIDE / 9.4 + 0.005, 0.46 if devices else 0.88),
+    )  # fmt: skip
     return figure
+
+
+def _finding(results: Results) -> str:
+    """How far the operational point was led, how far the handle was from it, where the linkage gave
+    way in fewer directions, and what the rendering gave back."""
+    (_, _, path), *_ = _paths(results)
+    reach = np.linalg.norm(path - path[0], axis=1).max()
+    parts = [f"The operational point was led up to {_with('mm', reach)} from its start"]
+    if of_block(results, HANDLE_POSE, 3):
+        time, apart, _ = pose_error(results)
+        at = _with("s", float(time[apart.argmax()]))
+        parts.append(f"the handle was at most {_with('mm', apart.max())} off it, at {at}")
+    if blocked := [e for e in episodes(results) if e.kind == "constraints"]:
+        times = f"{len(blocked)} times" if len(blocked) > 1 else "once"
+        parts.append(f"{times} {blocked[0].said}")
+    if (port := user_port(results)) and (found := port.measured).peak > NOTICEABLE_J:
+        by = _with("s", found.time_of_peak)
+        parts.append(f"{_with('mJ', 1e3 * found.peak)} generated by {by}")
+    return "; ".join(parts)
+
+
+def _with(unit: str, value: float) -> str:
+    """A number that no line break separates from its unit."""
+    return f"{short(float(f'{value:.3g}'))}\N{NO-BREAK SPACE}{unit}"
+
+
+def _arrow(results: Results, axes: Axes) -> None:
+    """The largest force of the hand, where it acted."""
+    force, handle = of_block(results, HAND_WRENCH, 3), of_block(results, HANDLE_POSE, 3)
+    handle = handle or of_block(results, POINT_POSE, 3)
+    if not (force and handle):
+        return
+    most = np.hypot(*force[HAND_WRENCH][:, :2].T)
+    k = int(most.argmax())
+    if not most[k] > 0:
+        return
+    row = int(np.searchsorted(handle["time"], force["time"][k] + 1e-12, "right")) - 1
+    pose = handle[HANDLE_POSE if HANDLE_POSE in handle else POINT_POSE][max(row, 0), :2] * 1e3
+    _, color, _ = marks.FORCES["F_hand"]
+    along = force[HAND_WRENCH][k, :2] / most[k] * ARROW
+    axes.annotate(
+        "", pose, (*along,), textcoords="offset points", zorder=6,
+        arrowprops={"arrowstyle": "<|-", "color": color, "lw": 2.2, "shrinkA": 0, "shrinkB": 0},
+    )  # fmt: skip
+    label = f"largest force of the hand, {short(most[k])} N, at {force['time'][k]:.3g} s"
+    axes.plot([], [], color=color, lw=2.2, marker="<", label=fill(label, 34))
 
 
 def _mark(results: Results, axes: Axes) -> None:
@@ -221,37 +287,51 @@ def _constraints(results: Results, table: Table, name: str) -> Figure:
 
 def _port(results: Results, port: UserPort) -> Figure:
     peak = 1e3 * port.measured.peak
-    title = f"The rendering generates at most {short(peak)} mJ"
+    title = f"The rendering generated at most {short(peak)} mJ"
+    if put_in := float(port.put_in_J[-1]):
+        title += f", where the hand put in {short(1e3 * put_in)} mJ"
     if peak > 0 and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
         title += f"; its largest source is the {SOURCES.get(largest, largest)}"
-    label = "energy generated at the user's port (mJ)"
+    label = "energy at the user's port (mJ)"
     figure, axes = titled(results, title, "time (s)", label)
-    axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="in all")
+    axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="generated in all")
+    axes.plot(port.time_s, 1e3 * port.put_in_J, "k:", lw=1.2, label="put in by the hand")
     for name, energy in port.blocks_J.items():
         if np.abs(energy).max() > DRAWN * np.abs(port.generated_J).max():
             source = plain(fill(SOURCES.get(name, name), 28))
             axes.plot(port.time_s, 1e3 * energy, lw=1.0, label=source)
+    low, high = axes.get_ylim()
+    axes.axhspan(min(low, 0), 0, color="#228833", alpha=0.06, lw=0, label="normal: 0 or less")
+    axes.set_ylim(min(low, 0), high)
     axes.axhline(0, color="0.4", lw=0.8)
     figure_axes.legend_below(figure)
     return figure
 
 
 def _generated(results: Results) -> dict[str, float]:
-    """Energy (J) that the hold of each connection generated, connections across rates first."""
-    return {name: energy.generated for name, energy in results.record.meters.items()}
+    """Energy (J) that the hold of each connection between rates generated, of all connections where
+    none is between rates; none that is rounding."""
+    meters = results.record.across or results.record.meters
+    said = words.connections(meters)
+    return {
+        said[name]: energy.generated
+        for name, energy in meters.items()
+        if abs(energy.generated) > summary.SMALLEST_J
+    }
 
 
 def _energies(results: Results, generated: dict[str, float]) -> Figure:
     total = sum(generated.values())
     unit, per = ("mJ", 1e3) if max(map(abs, generated.values())) < 0.1 else ("J", 1.0)
     verb = "generate" if total >= 0 else "dissipate"
-    title = f"The holds {verb} {short(abs(total) * per)} {unit} in all"
+    which = "between the rates " if results.record.across else ""
+    title = f"The holds {which}{verb} {short(abs(total) * per)} {unit} in all"
     label = f"energy generated by the hold ({unit}; negative: dissipated)"
     figure, axes = titled(results, title, label, "")
     framed(figure, left=2.3)
     values = [value * per for value in generated.values()]
-    bars = axes.barh([plain(fill(name, 28)) for name in generated], values, height=0.5)
+    bars = axes.barh([plain(fill(name, 30)) for name in generated], values, height=0.5)
     axes.bar_label(bars, [short(value) for value in values], padding=3)
     axes.margins(x=0.35, y=0.2)
     axes.axvline(0, color="0.4", lw=0.8)

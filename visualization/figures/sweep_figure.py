@@ -78,8 +78,8 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
     best = min((r for r in rows if _shown(r, metric)), key=lambda r: r[metric], default=None)
     if best:
         lost = sum(not _shown(r, metric) for r in rows)
-        found = title(best, best[metric], NAMES.get(metric, metric), keys, lost, len(rows))
-        axes.set_title(plain(fill(found, 80)), fontsize="medium")
+        text = title(best, best[metric], NAMES.get(metric, metric), keys, lost, len(rows))
+        axes.set_title(plain(fill(text, 80)), fontsize="medium")
     return figure
 
 
@@ -116,10 +116,10 @@ def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric
     drawn = []
     for i, (label, group) in enumerate(groups.items()):
         group.sort(key=lambda r: float(r[x]))
-        at = np.array([float(r[x]) for r in group])
+        positions = np.array([float(r[x]) for r in group])
         value = np.array([r[metric] if _shown(r, metric) else np.nan for r in group])
         colour, dash = colours[i % FEW], ("-", "--", ":", "-.")[i // FEW % 4]
-        axes.plot(at, value, dash, color=colour, marker=".", label=label or None)
+        axes.plot(positions, value, dash, color=colour, marker=".", label=label or None)
         drawn += [v for v in value if np.isfinite(v)]
         bad = [float(r[x]) for r in group if not _shown(r, metric)]
         # Ended early: on the upper edge, a little apart for each line.
@@ -147,8 +147,8 @@ def _map(figure: Any, axes: Any, rows: Sequence[Row], x: str, y: str, metric: st
             values[ys.index(float(r[y])), xs.index(float(r[x]))] = r[metric]
     axes.set_facecolor("0.85")  # where a run ended early or failed
     axes.grid(False)
-    found = values[np.isfinite(values)]
-    wide = found.size and found.min() > 0 and found.max() > 30 * found.min()
+    finite = values[np.isfinite(values)]
+    wide = finite.size and finite.min() > 0 and finite.max() > 30 * finite.min()
     mesh = axes.pcolormesh(xs, ys, values, shading="nearest", norm="log" if wide else "linear")
     figure.colorbar(mesh, label=f"{NAMES.get(metric, metric)}; grey: ended early or failed")
     axes.set(xlabel=axis(x), ylabel=axis(y))

@@ -26,6 +26,6 @@ def title(best: Row, value: float, quantity: str, keys: Sequence[str], ended: in
     the row `best` that has it, and how many of the `of` runs ended early or failed."""
     name, _, measured = quantity.partition(" (")
     where = ", ".join(f"{k} = {best.get(k, 'as in the scene')} {unit(k)}".rstrip() for k in keys)
-    found = f"{name[:1].upper()}{name[1:]} down to {short(value)} {measured.rstrip(')')}".rstrip()
+    text = f"{name[:1].upper()}{name[1:]} down to {short(value)} {measured.rstrip(')')}".rstrip()
     few = f"; {ended} of {of} runs ended early or failed" if ended else ""
-    return f"{found} at {where}{few}"
+    return f"{text} at {where}{few}"

@@ -43,7 +43,7 @@ def _felt(axes: Axes, tuned: Tuned) -> None:
 
 
 def _margins(axes: Axes, tuned: Tuned) -> None:
-    names = [fill(NAMES.get(at, at), 24) for at in tuned.margins]
+    names = [fill(NAMES.get(pose, pose), 24) for pose in tuned.margins]
     bars = axes.barh(names, list(tuned.margins.values()), 0.6, color="0.6")
     clear = {"facecolor": "white", "edgecolor": "none", "pad": 1}  # of the lines
     axes.bar_label(bars, fmt="%.3g", fontsize="small", padding=3, bbox=clear)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.analysis.findings import words
 from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.changes import choices_of_slower
+from hapticlink.orchestrator.system.changes import choices_between_rates, choices_of_slower
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import System
 from hapticlink.visualization.live import messages
@@ -43,9 +45,14 @@ class Offered:
     """What can be changed of a scene that runs: `gains`, values and units by parameter; `holds` by
     connection, the present one first; the graphics `rate`, None where there is none."""
 
-    def __init__(self, scene: Scene, system: System) -> None:
-        self.gains, self.holds = _gains(scene, system), choices_of_slower(system)
+    def __init__(
+        self, scene: Scene, system: System, holds: Mapping[str, list[str]] | None = None
+    ) -> None:
+        self.gains = _gains(scene, system)
+        self.holds = choices_of_slower(system) if holds is None else holds
         fmus = [f for f in system.fmus if f.clock == CLOCK]
+        of = dict.fromkeys(words.block(f.name) or f.name for f in fmus)
+        self._of = " and ".join(of)
         self.rate = scene.graphics.rate if scene.graphics and fmus else None
         haptics = system.timeline
         self._most = float(1 / (haptics.clocks[0].longest * haptics.base))
@@ -56,9 +63,11 @@ class Offered:
         return {
             "rate": None
             if self.rate is None
-            else {"value": s.rate or fixed, "max": self._most, "jitter": s.jitter},
+            else {"value": s.rate or fixed, "max": self._most, "jitter": s.jitter}
+            | {"of": _titled(self._of)},
             "holds": [
-                {"connection": name, "hold": s.holds.get(name, choices[0]), "choices": choices}
+                {"connection": name, "words": _titled(words.connection(name))}
+                | {"hold": s.holds.get(name, choices[0]), "choices": choices}
                 | {"delay": s.delays.get(name, 0.0)}
                 for name, choices in self.holds.items()
             ],
@@ -82,7 +91,7 @@ class Controls:
 
     def __init__(self, live: LiveRun, settings: Settings) -> None:
         self._live, self._settings = live, settings
-        self._offered = Offered(live.scene, live.system)
+        self._offered = Offered(live.scene, live.system, choices_between_rates(live.system))
         self._gains, self._holds = self._offered.gains, self._offered.holds
         self._rate, self._topology = self._offered.rate, self._offered.topology
         self._pulling = {user: False for user in users(live.scene)}
@@ -173,6 +182,10 @@ class Controls:
                 self._set(stiffness(user))
             else:
                 self._live.set(stiffness(user), (0.0, 0.0, 0.0))
+
+
+def _titled(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def users(scene: Scene) -> tuple[str, ...]:

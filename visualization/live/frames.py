@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from hapticlink.analysis.findings import words
 from hapticlink.orchestrator.base.loop_names import (
     CONTROLLER,
     DEVICE,
@@ -53,9 +54,9 @@ class Frames:
 
 
 def power(system: System, connections: Iterable[str]) -> list[dict[str, Any]]:
-    """Of each connection that carries power, whether a `hand` does work there on its handle or on a
-    further point, and whether what is put in there `counts`: what a controller passes on was not
-    put in by it."""
+    """Of each connection that carries power, its `words`, whether a `hand` does work there on its
+    handle or on a further point, and whether what is put in there `counts`: what a controller
+    passes on was not put in by it."""
     on = [system.connection[name] for name in connections]
     handles = {c.source for c in on if system.block(c.target) == DEVICE}
 
@@ -65,7 +66,12 @@ def power(system: System, connections: Iterable[str]) -> list[dict[str, Any]]:
         return system.block(c.target) == DEVICE or c.source not in handles
 
     return [
-        {"name": c.name, "hand": hand(c), "counts": system.block(c.source) != CONTROLLER}
+        {
+            "name": c.name,
+            "words": words.connection(c.name),
+            "hand": hand(c),
+            "counts": system.block(c.source) != CONTROLLER,
+        }
         for c in on
     ]
 

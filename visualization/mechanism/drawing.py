@@ -53,25 +53,46 @@ def draw(
     linkage: Linkage,
     q: Sequence[float],
     end: Sequence[float] | None,
-    devices: Mapping[str, Device],
     contacts: Contacts | None = None,
-) -> None:
+    held: Device | None = None,
+) -> Points:
     """The linkage at joint coordinates q, in mm; its pose at `end` as thin lines; what the links
-    can touch; the arms of the devices, each with its handle at its user's point, and the border of
-    the first one's workspace, as far as they reach into the picture."""
-    picture = Picture(linkage, devices, contacts)
+    can touch, and where the device that holds it cannot reach. Returns the limits of x and y."""
+    picture = Picture(linkage, {}, contacts)
     frame = picture.at_rest(q)
     if end is not None:
         at_end = {"end": picture.drawn({"q": end})["poses"]}
-        paint(axes, outlined(linkage, "end", "#8c8c8c", "at the end"), at_end, zorder=2)
-    paint(axes, (mark for mark in picture.marks if mark.role != "device"), frame)
+        paint(axes, outlined(linkage, "end", "#8c8c8c", "the linkage at the end"), at_end, zorder=2)
+    paint(axes, picture.marks, frame)
     _names(axes, linkage, frame)
     limits = _limits(axes)
-    if devices:
-        paint(axes, (mark for mark in picture.marks if mark.role == "device"), frame)
-        workspace_drawing.beneath(axes, devices[""], limits)
+    if held:
+        workspace_drawing.beneath(axes, held, limits)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", xlim=limits[0], ylim=limits[1])
     axes.set_aspect("equal", adjustable="box")
+    return limits
+
+
+def device(
+    axes: Axes,
+    linkage: Linkage,
+    q: Sequence[float],
+    devices: Mapping[str, Device],
+    limits: Points,
+) -> None:
+    """The devices in whole where they start, with the linkage that they hold; a frame is the
+    drawing within `limits` (mm)."""
+    picture = Picture(linkage, devices, None)
+    shown = (m for m in picture.marks if m.role in ("device", "body", "ground", "point"))
+    paint(axes, shown, picture.at_rest(q))
+    (left, right), (low, high) = limits
+    axes.plot([left, right, right, left, left], [low, low, high, high, low], "k:", lw=0.6)
+    axes.set_aspect("equal", adjustable="box")
+    axes.margins(0.06)
+    axes.set(xticks=[], yticks=[])
+    axes.set_xlabel("the whole device; dotted: the drawing", fontsize="x-small", color="0.3")
+    for spine in axes.spines.values():
+        spine.set_visible(False)
 
 
 def figure(scene: Scene, q: Sequence[float]) -> Figure:
@@ -81,7 +102,10 @@ def figure(scene: Scene, q: Sequence[float]) -> Figure:
     drawn = Figure(figsize=(6.4, 5.6), layout="constrained")
     axes = drawn.add_subplot()
     assert scene.linkage is not None
-    draw(axes, scene.linkage, q, None, by_user(scene.device, scene.devices), scene.contacts)
+    draw(axes, scene.linkage, q, None, scene.contacts, scene.device)
+    picture = Picture(scene.linkage, by_user(scene.device, scene.devices), None)
+    arms = (mark for mark in picture.marks if mark.role == "device")
+    paint(axes, arms, picture.at_rest(q))
     axes.set_title(plain(fill(f"{scene.title} at the start", 70)), fontsize="medium")
     axes.grid(alpha=0.3)
     drawn.legend(fontsize="x-small", ncols=3, loc="outside lower center")
@@ -103,8 +127,8 @@ def paint(axes: Axes, marks: Iterable[Mark], frame: Frame, zorder: float | None 
 
 def place(frame: Frame, of: Place) -> Points | None:
     """The place (mm) of a point in the frame, (2,)."""
-    found = reach(frame, of.path)
-    return None if found is None else (np.array(found[:2]) + _turned(found, of.point)) * MM
+    pose = reach(frame, of.path)
+    return None if pose is None else (np.array(pose[:2]) + _turned(pose, of.point)) * MM
 
 
 def _turned(pose: Sequence[float], at: Any, by: float = 0.0) -> Points:
@@ -206,10 +230,10 @@ PAINTERS = {
 def _limits(axes: Axes) -> Points:
     """Limits of x and y (mm) that contain what is drawn with a margin for names, (2, 2), in a ratio
     between 3/4 and 4/3; 100 mm about a single point."""
-    found = np.array([axes.dataLim.intervalx, axes.dataLim.intervaly])
-    size = 1.3 * np.ptp(found, axis=1)
+    limits = np.array([axes.dataLim.intervalx, axes.dataLim.intervaly])
+    size = 1.3 * np.ptp(limits, axis=1)
     half = np.maximum(size, 0.75 * size.max() if size.max() > 1e-6 else 100.0) / 2
-    return found.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
+    return limits.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
 
 
 def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:

@@ -157,14 +157,14 @@ def attached(linkage: Linkage, body: str) -> Iterator[Point]:
 def outline(points: Sequence[Point | Points] | Points) -> Points:
     """The corners of the convex hull of points, (k, 2): two for points on a line, one for a single
     point."""
-    found = np.unique(np.round(np.array(points, float), 9), axis=0)
-    if len(found) <= 2:
-        return found
-    _, sizes, (direction, _) = np.linalg.svd(found - found.mean(axis=0), full_matrices=False)
+    corners = np.unique(np.round(np.array(points, float), 9), axis=0)
+    if len(corners) <= 2:
+        return corners
+    _, sizes, (direction, _) = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
     if sizes[1] > 1e-6 * sizes[0]:
-        return _hull(found)
-    along = found @ direction
-    return found[[along.argmin(), along.argmax()]]
+        return _hull(corners)
+    along = corners @ direction
+    return corners[[along.argmin(), along.argmax()]]
 
 
 def contact_shape(body: Body) -> Points:

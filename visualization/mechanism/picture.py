@@ -119,8 +119,8 @@ class Picture:
         return frame
 
 
-def _without_raw(found: Mapping[str, Any]) -> dict[str, Any]:
-    return {k: v for k, v in found.items() if k not in RAW}
+def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in values.items() if k not in RAW}
 
 
 def _cut(linkage: Linkage, names: list[str], poses: ca.Function) -> Part:

@@ -12,14 +12,25 @@ export function fitted(canvas) {
   return { context, width, height };
 }
 
-// Magnitudes below which a value is rounding error: charts do not magnify it, numbers show 0.
-export const ROUNDING = { mm: 1e-6, N: 1e-6, m: 1e-15, mJ: 1e-6 };
+// Magnitudes that nobody feels: charts do not magnify less, and of less than a hundredth numbers show 0.
+export const FELT = { mm: 1, N: 0.5, mJ: 1, m: 1e-9, count: 2 };
 
 // A number with its unit, in three digits; a count, without a unit, as it is.
 export function text(value, unit) {
-  const size = Math.abs(value) < (ROUNDING[unit] ?? 0) ? 0 : Math.abs(value);
+  const size = Math.abs(value) < (FELT[unit] ?? 0) / 100 ? 0 : Math.abs(value);
   if (unit === "count" || !size) return unit === "count" ? String(value) : `0 ${unit}`;
   if (unit === "1") return value.toFixed(2);
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
   return `${size && size < 0.01 ? value.toExponential(0) : value.toFixed(digits)} ${unit}`;
 }
+
+// A colour of the page, which differs in the dark.
+export const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
+
+// Colours of marks and curves in the dark: greys change places, hues are lighter.
+const DARK = {
+  "#000000": "#f0f2f6", "#333333": "#c4c8d2", "#666666": "#9aa0ac", "#8c8c8c": "#8a909c", "#bfbfbf": "#596070", "#d9d9d9": "#3b4150",
+  "#ffffff": "#1d2129", "#4477aa": "#7aa7d9", "#b85c00": "#f0964a", "#228833": "#5cc46e", "#aa3377": "#e07ab5", "#cc3311": "#ff7a5c",
+};
+const dark = globalThis.matchMedia?.("(prefers-color-scheme: dark)");
+export const inTheme = (color) => (dark?.matches && color && color.slice(0, 7) in DARK ? DARK[color.slice(0, 7)] + color.slice(7) : color);

@@ -1,16 +1,17 @@
 // Strip charts: of the last 10 s of a run that goes on, or of whole runs that are recorded.
-import { ROUNDING, fitted, text } from "./canvas.js";
+import { FELT, fitted, inTheme, text, themed } from "./canvas.js";
 
-const SPAN = 10, LEFT = 44, COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee"];
+const SPAN = 10, LEFT = 44, ENERGIES = 4; // s, px, and the most lines of energies
+const COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee"], DASHES = [[], [5, 3], [2, 3], [7, 3, 2, 3]];
 const size = (v) => v && Math.hypot(v[0], v[1]);
 // `each`: series of every user, from that user's part of a frame; `series`: from the whole frame.
 const CHARTS = [
   { title: "tracking error", unit: "mm", each: { error: (u) => u.arms && 1e3 * Math.hypot(u.x[0] - u.handle[0], u.x[1] - u.handle[1]) } },
-  { title: "force", unit: "N", colors: ["#b85c00", "#aa3377", "#cc3311", "#4477aa", "#66ccee", "#228833"], each: { hand: (u) => size(u.F_hand), topology: (u) => size(u.F_constraint), others: (u) => size(u.F_env) } },
-  { title: "closure error", unit: "m", series: { gap: (f) => f.closure_error?.[0] } },
-  { title: "constrained directions", unit: "count", each: { number: (u) => u.n?.[0] } },
+  { title: "force", unit: "N", colors: ["#b85c00", "#aa3377", "#cc3311"], each: { hand: (u) => size(u.F_hand), constraints: (u) => size(u.F_constraint), contacts: (u) => size(u.F_env) } },
+  { title: "blocked directions", unit: "count", each: { number: (u) => u.n?.[0] } },
   { title: "energy generated", unit: "mJ", energies: true },
-  { title: "deadlines missed", unit: "count", series: { missed: (f) => f.missed } },
+  { title: "closure error", unit: "m", series: { gap: (f) => f.closure_error?.[0] }, expert: true },
+  { title: "deadlines missed", unit: "count", series: { missed: (f) => f.missed }, expert: true },
 ];
 
 export class Charts {
@@ -22,9 +23,13 @@ export class Charts {
   begin(energies, users, runs = 1) {
     this.charts = CHARTS.map((chart) => {
       const series = chart.series ?? ofUsers(chart.each, users);
-      return new Chart({ ...chart, series }, energies, runs);
+      return new Chart({ ...chart, series, users: chart.each ? users : [""] }, energies, runs);
     });
-    this.host.replaceChildren(...this.charts.map((chart) => chart.figure));
+    const fold = document.createElement("details"), title = document.createElement("summary");
+    title.textContent = "Expert: closure error, deadlines";
+    fold.append(title, ...this.charts.filter((chart) => chart.expert).map((chart) => chart.figure));
+    fold.addEventListener("toggle", () => this.host.dispatchEvent(new Event("changed")));
+    this.host.replaceChildren(...this.charts.filter((chart) => !chart.expert).map((chart) => chart.figure), fold);
   }
 
   // Of a run, the frames of the newest `kept` seconds are kept.
@@ -50,24 +55,19 @@ function ofUsers(each, users) {
   return Object.fromEntries(users.flatMap(read));
 }
 
-// Short name of an energy: the user's port, or the signal that a connection holds and its target.
-function shortName(connection) {
-  const [source, target] = connection.split(" -> ");
-  if (!target) return source;
-  const signal = source.startsWith("hand") ? "F_hand" : source.split(".")[1];
-  const [fmu, ...port] = target.split("."); // the port of a further user has that one's name first
-  const user = port.length > 1 ? ` ${port[0]}` : "";
-  return `${signal} to ${fmu.replace("virtual_", "").replace("haptic_", "").replace("_", " ")}${user}`;
-}
-
 class Chart {
-  constructor({ title, unit, series, energies, colors = COLORS }, connections, runs) {
+  constructor({ title, unit, series, energies, users, colors = COLORS, expert = false }, connections, runs) {
     this.unit = unit;
-    this.colors = colors;
-    this.names = energies ? connections.map(shortName) : Object.keys(series);
+    this.expert = expert;
+    this.most = energies ? ENERGIES : Infinity;
+    this.names = energies ? connections.map(({ words }) => words) : Object.keys(series);
     this.read = energies
-      ? connections.map((name) => (f) => f.energy && 1e3 * f.energy[name])
+      ? connections.map(({ name }) => (f) => (name in (f.energy ?? {}) ? 1e3 * f.energy[name] : null))
       : Object.values(series);
+    // Of several users each has a hue, and each series a dash; of one each series has a colour.
+    const of = this.names.length / users.length, several = users.length > 1;
+    this.colors = this.names.map((_, i) => (several ? COLORS[Math.floor(i / of)] : colors[i % colors.length]));
+    this.dashes = this.names.map((_, i) => (several ? DASHES[(i % of) % DASHES.length] : []));
     this.runs = Array.from({ length: runs }, () => ({ times: [], rows: [] }));
     this.figure = document.createElement("figure");
     this.figure.hidden = true;
@@ -95,8 +95,10 @@ class Chart {
     const newest = Math.max(...this.runs.map(({ times }) => times.at(-1) ?? 0));
     const [from, to] = span ?? [newest - SPAN, newest];
     const { context, width, height } = fitted(this.canvas);
-    const all = this.runs.flatMap(({ rows }) => rows.flat()).filter((v) => v !== null);
-    const { low, top } = limits(all, this.unit === "count" ? 1 : ROUNDING[this.unit]), base = height - 4;
+    const drawn = this.largest();
+    const all = this.runs.flatMap(({ rows }) => rows.flatMap((row) => row.filter((v, i) => v !== null && drawn.includes(i))));
+    const { low, top } = limits(all, FELT[this.unit]), base = height - 4;
+    const grid = themed("line"), soft = themed("soft");
     const x = (t) => LEFT + ((width - LEFT - 2) * (t - from)) / (to - from);
     const y = (v) => base - ((base - 12) * (v - low)) / (top - low);
     context.font = "11px system-ui, sans-serif";
@@ -105,8 +107,8 @@ class Chart {
     context.lineWidth = 1;
     const crowded = Math.min(y(low) - y(0), y(0) - y(top)) < 12;
     for (const v of !low || !top ? [low, (low + top) / 2, top] : crowded ? [low, top] : [low, 0, top]) {
-      line(context, "#e4e6ec", [[LEFT, y(v)], [width, y(v)]]);
-      context.fillStyle = "#667";
+      line(context, grid, [[LEFT, y(v)], [width, y(v)]]);
+      context.fillStyle = soft;
       context.fillText(tick(v), LEFT - 4, y(v));
     }
     context.save();
@@ -115,23 +117,33 @@ class Chart {
     context.clip();
     this.runs.forEach(({ times, rows }, run) => {
       context.lineWidth = run ? 1.2 : 1.6;
-      context.setLineDash(run ? [4, 3] : []);
-      this.names.forEach((_, i) => line(context, this.colors[i % this.colors.length],
-        times.flatMap((t, k) => (rows[k][i] === null ? [] : [[x(t), y(rows[k][i])]]))));
+      for (const i of drawn) {
+        context.setLineDash(run ? [4, 3] : this.dashes[i]);
+        line(context, inTheme(this.colors[i]), times.flatMap((t, k) => (rows[k][i] === null ? [] : [[x(t), y(rows[k][i])]])));
+      }
     });
     context.setLineDash([]);
-    if (at !== undefined) line(context, "#222", [[x(at), 0], [x(at), height]]);
+    if (at !== undefined) line(context, themed("ink"), [[x(at), 0], [x(at), height]]);
     context.restore();
-    this.label(at);
+    this.label(at, drawn);
+  }
+
+  // The series that are drawn: all, or the first one and those with the largest values.
+  largest() {
+    const every = this.names.map((_, i) => i);
+    if (every.length <= this.most) return every;
+    const peak = (i) => this.runs.reduce((found, { rows }) => rows.reduce((m, row) => Math.max(m, Math.abs(row[i] ?? 0)), found), 0);
+    const sizes = every.map(peak), [first, ...others] = every;
+    return [first, ...others.sort((a, b) => sizes[b] - sizes[a] || a - b).slice(0, this.most - 1)];
   }
 
   // The values in the caption, at a time or the newest, with their names where there are several.
-  label(at) {
-    const shown = this.names.map((_, i) => this.runs.some(({ rows }) => rows.some((row) => row[i] !== null)));
+  label(at, drawn) {
+    const shown = this.names.map((_, i) => drawn.includes(i) && this.runs.some(({ rows }) => rows.some((row) => row[i] !== null)));
     const several = shown.filter(Boolean).length > 1;
     this.values.forEach((value, i) => {
       value.hidden = !shown[i];
-      value.style.color = several ? this.colors[i % this.colors.length] : "";
+      value.style.color = several ? inTheme(this.colors[i]) : "";
       const found = this.runs.map(({ times, rows }) => {
         const after = at === undefined ? -1 : times.findIndex((t) => t > at + 1e-9);
         return (after < 0 ? rows.at(-1) : rows[Math.max(after - 1, 0)])?.[i] ?? null;

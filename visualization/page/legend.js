@@ -1,13 +1,12 @@
 // The legend of a drawing, with the newest forces, and labels of the current states.
 import { place, reach } from "./painter.js";
-import { text } from "./canvas.js";
-
-const LOOKS = { "operational point": "cross", point: "cross", ring: "ring", pin: "dot", centre: "cross" };
+import { inTheme, text } from "./canvas.js";
 
 export class Legend {
   constructor(host) { this.host = host; }
 
-  begin(marks, frame) {
+  begin(marks, frame, shapes) {
+    this.shapes = shapes;
     this.entries = new Map(); // by label: marks, and where their largest force is written
     for (const mark of marks) {
       const there = mark.label && !mark.when && mark.at.some((each) => place(frame, each));
@@ -27,12 +26,16 @@ export class Legend {
     }
   }
 
+  // The chip is the mark as it is drawn.
   entry(mark) {
-    const item = document.createElement("li"), chip = document.createElement("i");
-    const value = document.createElement("b");
-    chip.style.color = mark.stroke ?? mark.fill;
-    chip.className = LOOKS[mark.kind] ?? (mark.dash.length ? "dashed" : "");
-    item.append(chip, `${mark.label} `, value);
+    const item = document.createElement("li"), value = document.createElement("b"), shape = this.shapes[mark.kind];
+    item.innerHTML = shape ? '<svg viewBox="-9 -7 18 14"><polygon/></svg>' : '<svg viewBox="0 -4 18 14"><path d="M1 3H17"/></svg>';
+    const drawn = item.firstChild.firstChild;
+    if (shape) drawn.setAttribute("points", shape.map(([x, y]) => `${x},${-y}`).join(" "));
+    const look = { stroke: mark.stroke ?? "none", fill: (shape && mark.fill) || "none", "stroke-width": shape ? mark.width : 2.5 };
+    if (mark.dash.length) look["stroke-dasharray"] = "4 2";
+    for (const [key, color] of Object.entries(look)) drawn.setAttribute(key, inTheme(color));
+    item.append(` ${mark.label} `, value);
     return value;
   }
 }
@@ -42,7 +45,15 @@ export function tags(host, shown) {
   host.replaceChildren(...shown.map(([color, label]) => {
     const tag = document.createElement("li");
     tag.style.background = color;
+    tag.style.color = luminance(color) > 0.3 ? "#111" : "#fff";
     tag.textContent = label;
     return tag;
   }));
+}
+
+// Of a colour #rrggbb, as the contrast of a text on it needs it (WCAG 2.2).
+function luminance(color) {
+  const parts = [1, 3, 5].map((i) => parseInt(color.slice(i, i + 2), 16) / 255);
+  const [r, g, b] = parts.map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }

@@ -1,17 +1,24 @@
 // The page: messages from and to the run, the buttons, and who draws what.
 import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
+import { Ending } from "./ending.js";
 import { Energies } from "./energies.js";
 import { tags } from "./legend.js";
 import { asked, differing, written } from "./links.js";
 import { loudness } from "./loudness.js";
+import { presets, restored } from "./presets.js";
 import { connected } from "./socket.js";
 import { Sound } from "./sound.js";
 import { Stage } from "./stage.js";
 import { started } from "./worker_run.js";
 
 const $ = (id) => document.getElementById(id);
-const stage = new Stage($("scene"), $("legend"), (at, user) => send({ type: "hand", at, user }));
+const stage = new Stage($("scene"), $("legend"), (at, user) => {
+  $("door").hidden = true;
+  ending.hide();
+  send({ type: "hand", at, user });
+});
+const ending = new Ending($("ended"), () => act("reset"));
 const charts = new Charts($("charts"));
 const controls = new Controls($("controls"), send);
 const SECOND = "#dd6600"; // of run B, where two settings are compared
@@ -30,7 +37,8 @@ const HANDLERS = {
     view.kinds = message.kinds;
     const runs = message.runs ?? 1;
     energies = Array.from({ length: runs }, () => new Energies(message));
-    charts.begin([message.port, ...message.power.map(({ name }) => name)], message.users, runs);
+    charts.begin([{ name: message.port, words: message.port }, ...message.power], message.users, runs);
+    ending.begin();
     view.frame = null;
     view.levels = [];
     view.marks = message.marks;
@@ -39,6 +47,7 @@ const HANDLERS = {
   controls(message) {
     const begins = !start;
     start ??= message;
+    if (begins) offer();
     shown = message;
     acts_on_b &&= Boolean(message.b);
     $("acts").textContent = acts_on_b ? "Controls: B" : "Controls: A";
@@ -49,10 +58,11 @@ const HANDLERS = {
     else note_address();
   },
   state(message) {
+    if (message.ended && !view.state.ended) ending.show(message.ended);
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));
-    if (message.ended && view.energy === "green") show({ energy: null }); // a run that diverged at once never turned red
+    if (message.ended) show({ energy: "red" }); // a run that diverged at once never turned red
     $("record").textContent = message.recording ? "End recording" : "Record";
     note();
   },
@@ -60,7 +70,9 @@ const HANDLERS = {
     const first = !view.frame;
     view.frame = message;
     view.frames += 1;
+    ending.add(message);
     if (first) note();
+    if (first && !message.directions) $("resists").hidden = true;
     [message, message.b].forEach((frame, i) => {
       if (!frame || !energies[i]) return;
       energies[i].add(frame);
@@ -71,6 +83,7 @@ const HANDLERS = {
     if (sound.signal) sound.feel(loudness(sound.signal, message));
   },
   map: (message) => show({ map: message }),
+  building({ said }) { view.building = said; note(); },
   refused(message) {
     view.refused = message.why;
     refusedUntil = performance.now() + 4000;
@@ -91,15 +104,30 @@ function show(change) {
 }
 
 function note() {
-  const { ended, recording } = view.state;
+  const { recording } = view.state;
   const refused = performance.now() < refusedUntil && view.refused;
-  $("note").textContent = refused || (ended && `${ended}. Reset begins anew.`) ||
-    (recording && `recording to ${recording}`) || (!view.frame && "the FMUs are being built ...") || "";
+  $("note").textContent = refused || (ending.frame && "slow motion of the last 0.2 s") ||
+    (recording && `recording to ${recording}`) || (!view.frame && (view.building ?? "the FMUs are being built ...")) || "";
 }
 
 function received(message) { HANDLERS[message.type]?.(message); }
 
 function lost(why) { $("note").textContent = why; }
+
+// The presets of the scene, each a button that says what it changes.
+function offer() {
+  const found = presets(start);
+  $("presets").hidden = !found.length;
+  $("presets").replaceChildren(...found.map(({ name, about, messages }) => {
+    const button = document.createElement("button"), small = document.createElement("small");
+    button.append(name, small);
+    small.textContent = about;
+    button.onclick = () => { restore(); messages.forEach(send); };
+    return button;
+  }));
+}
+
+function restore() { restored(acts_on_b ? shown.b : shown, start).forEach(send); }
 
 // Does what the page's address asks for, of run A and, where it has settings of B, of both.
 function follow() {
@@ -124,18 +152,24 @@ function note_address() {
 }
 window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== address) follow(); });
 
+const PULLS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const act = (what) => send({ type: "time", do: what });
 $("pause").onclick = () => act(view.state.paused ? "resume" : "pause");
 for (const what of ["step", "reset", "record"]) $(what).onclick = () => act(what);
+$("restore").onclick = restore;
 $("compare").onclick = () => run.compare(!shown.b);
 $("acts").onclick = () => { acts_on_b = !acts_on_b; HANDLERS.controls(shown); };
 $("hear").onchange = () => sound.hear($("hear").value || null);
 document.addEventListener("keydown", (event) => {
-  if (event.target.closest("input, select, button")) return;
+  if (event.target.closest("input, select, button, summary")) return;
+  if (event.key in PULLS) { event.preventDefault(); stage.pullBy(PULLS[event.key]); return; }
+  if (event.key === "+" || event.key === "-") stage.zoom(event.key === "+" ? 0.8 : 1.25);
   const button = { " ": "pause", ".": "step", r: "reset" }[event.key];
   if (event.key === "f") stage.refit();
   if (button && !event.ctrlKey && !event.metaKey) { event.preventDefault(); $(button).click(); }
 });
+
+document.addEventListener("keyup", (event) => { if (event.key in PULLS) stage.letGo(); });
 
 function label(state) {
   const [kind, user] = state.split(" "), [color, meaning] = view.kinds[kind];
@@ -151,14 +185,14 @@ function second() {
 function draw() {
   if (view.frame) {
     const { b } = view.frame;
-    stage.draw(view.frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
+    stage.draw(ending.frame ?? view.frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
     tags($("tags"), [...view.frame.states.map(label), ...(b ? [[SECOND, second()]] : [])]);
     $("time").textContent = `${view.frame.t.toFixed(2)} s`;
   }
   charts.draw();
   requestAnimationFrame(draw);
 }
-// The run is in this file, as its data, or behind the server that the page is from.
-const run = ($("data") ? started : connected)({ received, opened: note, lost });
+// The run is in this file, as its program, or behind the server that the page is from.
+const run = ($("program") ? started : connected)({ received, opened: note, lost });
 for (const id of ["compare", "hear"]) $(id).hidden = !run.compare;
 draw();

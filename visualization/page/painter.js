@@ -1,5 +1,7 @@
 // Paints marks (visualization/mechanism/marks.py) on a canvas: `frame` has what they name, `toScreen` turns places
 // of the plane (m) into pixels, `scale` is pixels to a metre. Sizes of marks are in points.
+import { inTheme } from "./canvas.js";
+
 const PX = 96 / 72, MIN_ARROW = 4, MAX_ARROW = 160; // px
 
 export const reach = (frame, keys) => keys.reduce((found, key) => found?.[key], frame);
@@ -25,8 +27,8 @@ export function paint(context, marks, frame, { shapes, toScreen, scale }) {
     const at = mark.at.map((each) => place(frame, each)).filter(Boolean).map(toScreen);
     if (!at.length || !shown(mark, frame)) continue;
     context.save();
-    context.strokeStyle = mark.stroke;
-    context.fillStyle = mark.fill;
+    context.strokeStyle = inTheme(mark.stroke);
+    context.fillStyle = inTheme(mark.fill);
     context.lineWidth = mark.width * PX;
     context.setLineDash(mark.dash.map((length) => length * PX));
     const angle = mark.angle === null ? 0 : (reach(frame, mark.at.at(-1)[0])[2] ?? 0) + mark.angle;

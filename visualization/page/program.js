@@ -2,13 +2,6 @@
 
 import { loudness } from "./loudness.js";
 
-// The bytes of a module, which the page has compressed and as text.
-export const unpacked = async (text) => {
-  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-};
-
 // What a page has changed, as a run that begins anew gets it again.
 export const settings = () => ({ rate: null, jitter: 0, holds: {}, delays: {}, gains: {}, topology: true });
 

@@ -1,4 +1,6 @@
 // Sound and vibration of a signal, off until asked for.
+import { unpackedText } from "./packed.js";
+
 const GAINS = { force: 0.5, error: 0.5 }; // to a newton, and to a millimetre
 const STRONGEST = { force: 2, error: 2 }; // N, mm: a full vibration
 const can_vibrate = () => matchMedia("(pointer: coarse)").matches && "vibrate" in navigator;
@@ -20,7 +22,7 @@ export class Sound {
     this.context = null;
     if (!signal) { this.listen(null, null); return; }
     const context = this.context = new AudioContext();
-    const source = encodeURIComponent(document.getElementById("sound").textContent);
+    const source = encodeURIComponent(await unpackedText("sound"));
     await context.audioWorklet.addModule(`data:text/javascript,${source}`); // of a file, no blob is taken
     const node = this.node = new AudioWorkletNode(context, "heard", {
       numberOfInputs: 0, outputChannelCount: [2], processorOptions: { rate: this.rate, gain: GAINS[signal] },

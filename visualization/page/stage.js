@@ -1,11 +1,12 @@
 // The mechanism on its canvas, and where `pull` is given the pointers that pull the handles: each
 // that of the user whose handle is nearest when it is pressed.
-import { fitted } from "./canvas.js";
+import { fitted, themed } from "./canvas.js";
 import { Legend } from "./legend.js";
 import { paint, place, zigzag } from "./painter.js";
 
 const HAND = "#b85c00";
 const SEND_INTERVAL = 8; // ms, the least between two targets that are sent; frames are slower
+const KEYS = "keys", STEP = 0.004; // who pulls where keys do, and how far each time (m)
 const FITTED = ["obstacle", "body", "handle"]; // roles of marks that the picture contains
 
 export class Stage {
@@ -25,6 +26,7 @@ export class Stage {
       pull(pulling.target, pulling.user);
     };
     const release = ({ pointerId }) => {
+      if (pointerId === this.panning) this.panning = null;
       const pulling = this.pulls.get(pointerId);
       if (!pulling) return;
       clearTimeout(pulling.later);
@@ -32,8 +34,16 @@ export class Stage {
       canvas.classList.toggle("held", this.pulls.size > 0);
       pull(null, pulling.user);
     };
+    this.sendTarget = sendTarget;
+    this.release = release;
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+    canvas.addEventListener("pointerdown", (event) => {
+      if (!this.limits || !(event.shiftKey || event.button)) return;
+      canvas.setPointerCapture(event.pointerId);
+      this.panning = event.pointerId;
+    });
     if (pull) canvas.addEventListener("pointerdown", (event) => {
-      if (!this.limits || event.button) return;
+      if (!this.limits || event.button || event.shiftKey) return;
       const target = pointAt(event), user = this.nearest(target);
       if (user === undefined) return;
       canvas.setPointerCapture(event.pointerId);
@@ -43,6 +53,10 @@ export class Stage {
       sendTarget(pulling);
     });
     canvas.addEventListener("pointermove", (event) => {
+      if (event.pointerId === this.panning) {
+        const by = [-event.movementX / this.scale, event.movementY / this.scale];
+        this.limits = this.limits.map((axis, i) => axis.map((v) => v + by[i]));
+      }
       const pulling = this.pulls.get(event.pointerId);
       if (!pulling) return;
       pulling.target = pointAt(event);
@@ -53,8 +67,7 @@ export class Stage {
     });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
-      const factor = Math.exp(event.deltaY / 500);
-      this.limits = this.limits?.map(([a, b]) => [a + b - factor * (b - a), a + b + factor * (b - a)].map((v) => v / 2));
+      if (this.limits) this.zoom(Math.exp(event.deltaY / 500), pointAt(event));
     }, { passive: false });
     window.addEventListener("resize", () => this.refit());
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(end, release);
@@ -70,6 +83,22 @@ export class Stage {
   }
 
   refit() { this.limits = null; }
+
+  // Scales what is shown about a place, by default the middle.
+  zoom(factor, about = this.limits?.map(([a, b]) => (a + b) / 2)) {
+    this.limits = this.limits?.map((axis, i) => axis.map((v) => about[i] + factor * (v - about[i])));
+  }
+
+  // A key pulls the first user's handle further in a direction, until all are let go.
+  pullBy([dx, dy]) {
+    if (!this.limits || !this.frame) return;
+    const pulling = this.pulls.get(KEYS) ?? { user: "", target: this.frame.handle.slice(0, 2) };
+    pulling.target = [pulling.target[0] + STEP * dx, pulling.target[1] + STEP * dy];
+    this.pulls.set(KEYS, pulling);
+    this.sendTarget(pulling);
+  }
+
+  letGo() { this.release({ pointerId: KEYS }); }
 
   // The user whose handle is nearest to a place, of those that no pointer here pulls.
   nearest([x, y]) {
@@ -106,7 +135,7 @@ export class Stage {
   // `others` are runs in the same picture: marks, frame and color of each.
   draw(frame, others = []) {
     const { context, width, height } = fitted(this.canvas);
-    if (!this.frame) this.legend.begin(this.marks, frame);
+    if (!this.frame) this.legend.begin(this.marks, frame, this.shapes);
     this.frame = frame;
     this.limits ??= this.bounds ?? this.frameLimits(frame);
     this.fit(width, height);
@@ -135,7 +164,7 @@ export class Stage {
   drawScale(context, height) {
     const length = [0.5, 1, 2, 5].flatMap((m) => [1e-3, 1e-2, 1e-1, 1].map((p) => m * p))
       .sort((a, b) => a - b).find((l) => l * this.scale > 60) ?? 5;
-    context.strokeStyle = context.fillStyle = "#556";
+    context.strokeStyle = context.fillStyle = themed("soft");
     context.lineWidth = 1.5;
     context.beginPath();
     context.moveTo(14, height - 18);

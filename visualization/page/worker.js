@@ -1,6 +1,6 @@
 // The worker of a page that needs nothing else: runs the scene beside the clock, once or with two settings beside each
 // other, and answers the page's messages as the server does.
-import { Program, settings, unpacked } from "./program.js";
+import { Program, settings } from "./program.js";
 
 const BEHIND = 0.1; // s, by which a run may be late before time is moved
 const LONGEST = 600; // s, of a recording
@@ -69,9 +69,9 @@ function save() {
 }
 
 const HANDLERS = {
-  async begin(message) {
+  begin(message) {
     data = message.data;
-    module = new WebAssembly.Module(await unpacked(message.program));
+    module = new WebAssembly.Module(message.program);
     begin();
     setInterval(turn, 2);
   },

@@ -1,19 +1,27 @@
 // A run in a worker of the page's own file: the same messages as with a server. A frame is asked for whenever the
 // screen is drawn. Beyond what a server can, it compares two settings, and sends samples to be heard.
+import { unpacked, unpackedText } from "./packed.js";
+
 export function started({ received, opened, lost }) {
-  const element = (id) => document.getElementById(id).textContent;
-  const worker = new Worker(URL.createObjectURL(new Blob([element("worker")], { type: "text/javascript" })));
-  worker.onmessage = ({ data }) => (data.type === "file" ? save(data) : received(data));
-  worker.onerror = (event) => lost(`The run has ended: ${event.message}`);
-  worker.postMessage({ type: "begin", data: JSON.parse(element("data")), program: element("program") });
+  const ready = begun(received, lost);
+  const send = (message, moved = []) => ready.then((worker) => worker.postMessage(message, moved));
+  const ask = () => { send({ type: "frame" }); requestAnimationFrame(ask); };
   opened();
-  const ask = () => { worker.postMessage({ type: "frame" }); requestAnimationFrame(ask); };
   ask();
   return {
-    send: (message) => worker.postMessage(message),
-    compare: (on) => worker.postMessage({ type: "compare", on }),
-    listen: (signal, port) => worker.postMessage({ type: "sound", signal, port }, port ? [port] : []),
+    send: (message) => send(message),
+    compare: (on) => send({ type: "compare", on }),
+    listen: (signal, port) => send({ type: "sound", signal, port }, port ? [port] : []),
   };
+}
+
+async function begun(received, lost) {
+  const [source, data, program] = await Promise.all([unpackedText("worker"), unpackedText("data"), unpacked("program")]);
+  const worker = new Worker(URL.createObjectURL(new Blob([source], { type: "text/javascript" })));
+  worker.onmessage = ({ data: message }) => (message.type === "file" ? save(message) : received(message));
+  worker.onerror = (event) => lost(`The run has ended: ${event.message}`);
+  worker.postMessage({ type: "begin", data: JSON.parse(data), program });
+  return worker;
 }
 
 function save({ name, text }) {

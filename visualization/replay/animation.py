@@ -27,8 +27,14 @@ MAX_FRAMES, MIN_PERIOD = 60, 1 / 20
 MIN_DURATION, LAST_FRAME = 2.0, 1.0
 """Times (s) that an animation takes at least, and for which its last frame stays."""
 COLORS = 64
-SIZE, DPI = (4.6, 5.0), 80
-"""Of the picture of one run (in)."""
+WIDTH, DPI = 4.6, 80
+"""Of the picture of one run (in); its height is that of what moves, with TEXT (in) for the
+title and the legend."""
+TEXT = (0.6, 0.35)
+LEGEND = (
+    "dashed: the linkage as the graphics block has it; dotted: from the handle (circle) to the "
+    "point that it should be at (cross); arrow: force of the hand"
+)
 ARROW = 60.0
 """Length (pt) of the largest force of the hand."""
 LEFT_OUT = ("centre", "directions", "cut")
@@ -46,10 +52,10 @@ def write(runs: Sequence[Recorded], names: Sequence[str], path: Path) -> None:
     times = np.linspace(0.0, end, int(np.clip(np.ceil(end / MIN_PERIOD) + 1, 2, MAX_FRAMES)))
     panels = [_Panel(run, name, times) for run, name in zip(runs, names, strict=True)]
     first, *others = _with_palette(list(_pictures(panels, times)))
-    each = round(1e3 * max(end, MIN_DURATION) / len(times))
+    milliseconds = round(1e3 * max(end, MIN_DURATION) / len(times))
     first.save(
         path, save_all=True, append_images=others, loop=0, optimize=True, lossless=True,
-        duration=[each] * (len(times) - 1) + [round(1e3 * LAST_FRAME)],
+        duration=[milliseconds] * (len(times) - 1) + [round(1e3 * LAST_FRAME)],
     )  # fmt: skip
 
 
@@ -73,11 +79,11 @@ class _Panel:
     def limits(self) -> Array:
         """Least and largest x and y (mm) of all that moves, (2, 2)."""
         fixed = [mark for mark in self._marks if mark.role in FITTED]
-        found = [self._x]
+        points = [self._x]
         for row in self._rows:
             at = (place(self._frames[row], each) for mark in fixed for each in mark.at)
-            found.append(np.array([each for each in at if each is not None]))
-        every = np.vstack(found)
+            points.append(np.array([each for each in at if each is not None]))
+        every = np.vstack(points)
         return np.array([every.min(axis=0), every.max(axis=0)]).T
 
     def draw(self, axes: Axes, k: int, limits: Array) -> None:
@@ -96,19 +102,19 @@ class _Panel:
 
     def _said(self, k: int, row: int) -> tuple[str, str]:
         """Time and tracking error, and what happens."""
-        told = f"{self.run.times[row]:.2f} s"
+        text = f"{self.run.times[row]:.2f} s"
         if self._handle is not None:
             apart = np.hypot(*(self._handle[row, :2] * MM - self._x[row]))
-            told += f", handle {short(round(float(apart), 1))} mm away"
-        return told, fill(self._now(k)[0], 46)
+            text += f", handle {short(round(float(apart), 1))} mm away"
+        return text, fill(self._now(k)[0], 46)
 
     def _now(self, k: int) -> tuple[str, str]:
         """The first episode at the k-th frame, or how the run has ended; and its colour."""
         time, end = self.times[k], self.run.times[-1]
         if time > end:
             return summary.ending(self.run.results), "k"
-        found = [e for e in self._episodes if e.begin <= time <= e.end]
-        return (found[0].said, KINDS[found[0].kind][0]) if found else ("", "k")
+        episodes = [e for e in self._episodes if e.begin <= time <= e.end]
+        return (episodes[0].said, KINDS[episodes[0].kind][0]) if episodes else ("", "k")
 
 
 def _pictures(panels: Sequence[_Panel], times: Array) -> Iterator[Image]:
@@ -116,14 +122,17 @@ def _pictures(panels: Sequence[_Panel], times: Array) -> Iterator[Image]:
     from matplotlib.figure import Figure
     from PIL import Image
 
-    figure = Figure(figsize=(SIZE[0] * len(panels), SIZE[1]), dpi=DPI)
-    canvas = FigureCanvasAgg(figure)
-    every = figure.subplots(1, len(panels), squeeze=False)[0]
-    figure.subplots_adjust(0.01, 0.01, 0.99, 0.89, wspace=0.03)
     both = np.array([panel.limits() for panel in panels])
     low, high = both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)
-    half = 0.56 * max(float((high - low).max()), 20.0)
-    limits = ((low + high) / 2)[:, None] + half * np.array([[-1.0, 1.0]])
+    half = 0.6 * np.maximum(high - low, 0.6 * float((high - low).max()) + 10.0)
+    limits = ((low + high) / 2)[:, None] + half[:, None] * np.array([[-1.0, 1.0]])
+    height = 0.98 * WIDTH * half[1] / half[0] + sum(TEXT)
+    figure = Figure(figsize=(WIDTH * len(panels), height), dpi=DPI)
+    canvas = FigureCanvasAgg(figure)
+    every = figure.subplots(1, len(panels), squeeze=False)[0]
+    figure.subplots_adjust(0.01, TEXT[1] / height, 0.99, 1 - TEXT[0] / height, wspace=0.03)
+    legend = fill(LEGEND, int(17 * figure.get_figwidth()))
+    figure.text(0.01, 0.08 / height, legend, fontsize="x-small", color="0.3")
     for k in range(len(times)):
         for axes, panel in zip(every, panels, strict=True):
             panel.draw(axes, k, limits)

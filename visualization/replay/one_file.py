@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
@@ -18,22 +19,17 @@ IMPORT = re.compile(r'^import \{ (.+?) \} from "\./(\w+\.js)";$', re.MULTILINE)
 EXPORT = re.compile(r"^export (?=(?:class|function|const) (\w+))", re.MULTILINE)
 
 
-def page(
-    name: str, data: Any, texts: Mapping[str, str] = MappingProxyType({}), policy: str = POLICY
-) -> str:
-    """The page `name` of the folder `page`, with `data` as JSON in its element `data`, and further
-    `texts`, scripts of a worker among them, in elements by these names."""
+def page(name: str, texts: Mapping[str, str], policy: str = POLICY) -> str:
+    """The page `name` of the folder `page`, with `texts` in elements by these names."""
     html = (PAGE / name).read_text(encoding="utf-8")
     tag = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">'
     html = html.replace('<meta charset="utf-8">', f'<meta charset="utf-8">\n{tag}', 1)
     html = re.sub(r'<link rel="icon" href="(.+?)">', _icon, html)
     html = re.sub(r'<link rel="stylesheet" href="(.+?)">', _style, html)
-    # "<" could end the element, or begin a comment in it.
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    kept = f'<script type="application/json" id="data">{text}</script>\n'
-    for element, text in texts.items():
-        assert "</" not in text
-        kept += f'<script type="text/plain" id="{element}">{text}</script>\n'
+    kept = "".join(
+        f'<script type="application/json" id="{element}">{text}</script>\n'
+        for element, text in texts.items()
+    )
     return re.sub(
         r'<script type="module" src="(.+?)"></script>',
         lambda found: f'{kept}<script type="module">\n{bundle(found[1])}</script>',
@@ -41,10 +37,21 @@ def page(
     )
 
 
-def element(html: str, name: str) -> str:
-    """The text in an element of a page that `page` has written."""
-    _, _, rest = html.partition(f'id="{name}">')
-    return rest.partition("</script>")[0]
+def as_json(data: Any) -> str:
+    """Text that an element can have: "<" could end it, or begin a comment in it."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")
+
+
+def packed(content: bytes) -> str:
+    """Compressed bytes as text; packed.js unpacks them."""
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+
+
+def unpacked(html: str, element: str) -> bytes:
+    """The packed bytes in an element of a page."""
+    _, _, rest = html.partition(f'id="{element}">')
+    return gzip.decompress(base64.b64decode(rest.partition("</script>")[0]))
 
 
 def bundle(name: str) -> str:
@@ -85,9 +92,9 @@ def _text(name: str) -> str:
     return (PAGE / name).read_text(encoding="utf-8")
 
 
-def _style(found: re.Match[str]) -> str:
-    return f"<style>\n{_text(found[1])}</style>"
+def _style(match: re.Match[str]) -> str:
+    return f"<style>\n{_text(match[1])}</style>"
 
 
-def _icon(found: re.Match[str]) -> str:
-    return f'<link rel="icon" href="data:image/svg+xml,{quote(_text(found[1]))}">'
+def _icon(match: re.Match[str]) -> str:
+    return f'<link rel="icon" href="data:image/svg+xml,{quote(_text(match[1]))}">'

@@ -49,16 +49,16 @@ class Recorded:
         self.name = folder = str(results.folder or results.record.scene["title"])
         linkage: Linkage | None = scene_part(results, "linkage", Linkage)
         if linkage is None:
-            said = f"there is nothing to draw; `hapticlink report {folder}` has its figures"
-            raise InputFault(f"{folder}: the run has no [linkage]: {said}")
+            message = f"there is nothing to draw; `hapticlink report {folder}` has its figures"
+            raise InputFault(f"{folder}: the run has no [linkage]: {message}")
         self.linkage = linkage
         device = scene_part(results, "device", Device)
         self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)
         for signal, size in zip(NEEDED, (len(coordinate_units(linkage)), 3), strict=True):
             table = of_block(results, signal, size)
             if table is None:
-                said = "is not recorded: run the scene with record.signals = 'all'"
-                raise InputFault(f"{folder}: {signal} {said}")
+                message = "is not recorded: run the scene with record.signals = 'all'"
+                raise InputFault(f"{folder}: {signal} {message}")
             if not len(table["time"]):
                 raise InputFault(f"{folder}: the run ended before its first row")
         self.signals, self.missing = _shown(results)
@@ -83,14 +83,14 @@ class Recorded:
 
     def values(self) -> dict[str, NDArray[np.float64]]:
         """By name in a frame, the newest sample at each frame's time, (k, n)."""
-        found = {}
+        values = {}
         for key, signal in self.signals.items():
             table = table_of(self.results, signal)
             assert table
             if len(table["time"]):
                 rows = newest(table, self.times)
-                found[key] = table[signal][rows].reshape(len(rows), -1)
-        return found
+                values[key] = table[signal][rows].reshape(len(rows), -1)
+        return values
 
     def frames(self) -> list[dict[str, Any]]:
         """The frames as the live page gets them, without their time and what is not finite."""
@@ -99,8 +99,8 @@ class Recorded:
         energy = np.interp(self.times, port.time_s, port.generated_J) if port else None
         made = []
         for i in range(len(self.times)):
-            found = {k: v[i].tolist() for k, v in values.items() if np.isfinite(v[i]).all()}
-            frame = _by_user(found)
+            row = {k: v[i].tolist() for k, v in values.items() if np.isfinite(v[i]).all()}
+            frame = _by_user(row)
             if energy is not None and np.isfinite(energy[i]):
                 frame["energy"] = {PORT: float(energy[i])}
             made.append(self.picture.drawn(frame))
@@ -145,7 +145,7 @@ def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
     """The recorded signal of each name of a frame, and those that are not recorded although the
     scene has them. A signal that stands in for another one does so only where there is no other."""
     left_out = results.record.not_recorded
-    found, missing = dict[str, str](), list[str]()
+    signals, missing = dict[str, str](), list[str]()
     asked = shown()
     for user in further_users(results):
         asked |= {f"{user}.{key}": names for key, names in shown_of_user(user).items()}
@@ -155,9 +155,9 @@ def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
                 missing.append(name)
                 break
             if of_any_shape(results, name):
-                found[key] = name
+                signals[key] = name
                 break
-    return found, missing
+    return signals, missing
 
 
 def _changes(values: Sequence[Any]) -> dict[str, list[Any]]:

@@ -20,7 +20,8 @@ WRITTEN = (".html", ".gif", ".webp", ".png")
 def html(runs: Sequence[Recorded]) -> str:
     """The page. The same runs give the same bytes."""
     told = [run.told() | {"short": name} for run, name in zip(runs, _names(runs), strict=True)]
-    return one_file.page("replay.html", {"runs": told, "kinds": KINDS, "shapes": SHAPES})
+    data = {"runs": told, "kinds": KINDS, "shapes": SHAPES}
+    return one_file.page("replay.html", {"data": one_file.as_json(data)})
 
 
 def _names(runs: Sequence[Recorded]) -> list[str]:

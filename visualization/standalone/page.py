@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -53,13 +51,14 @@ def html(scene: Scene, name: str) -> str:
         module = _compiled(files, room)
     verdict = predicted(scene, Settings(), description.parameters)
     description.data["map"] = {"type": "map"} | verdict
-    packed = base64.b64encode(gzip.compress(module, 9, mtime=0)).decode()
-    extra = {
-        "worker": one_file.bundle("worker.js"),
-        "sound": one_file.bundle("sound_worklet.js"),
-        "program": packed,
+    contents = {
+        "data": one_file.as_json(description.data).encode(),
+        "worker": one_file.bundle("worker.js").encode(),
+        "sound": one_file.bundle("sound_worklet.js").encode(),
+        "program": module,
     }
-    return one_file.page("index.html", description.data, extra, POLICY)
+    texts = {name: one_file.packed(content) for name, content in contents.items()}
+    return one_file.page("index.html", texts, POLICY)
 
 
 def _compiled(files: Mapping[str, str], room: Path) -> bytes:

@@ -19,11 +19,11 @@
 /* --- FMUs ------------------------------------------------------------------------------------- */
 
 /* Where an instance stands (s), and how often its functions were called; shared with its Python
- * object. waiting: settings that it is to take before its next step. setter: the Setter whose values
+ * object. waiting: from when on settings wait for a step. setter: the Setter whose values
  * its inputs have, 0 where that is not known. altered: calls that changed how numbers are rounded. */
 typedef struct {
-    double time, begin, size, end, step_time;
-    int64_t ended, waiting, setter, altered, gets, sets, steps, saves, rollbacks;
+    double time, begin, size, end, step_time, waiting;
+    int64_t ended, setter, altered, gets, sets, steps, saves, rollbacks;
 } Place;
 
 /* What kind of number a call moves, of which version of FMI, and whether the FMU holds a Python

@@ -47,7 +47,7 @@ static void compare(Check *c, const double *outputs, double time, double end, do
  * where there is no room left, or the FMU can be asked to repeat a step. */
 int fmu_checked_step(Fmu *f, double time, double end, double size, At *at) {
     Check *c = f->check;
-    if (f->place->waiting) return CALL;
+    if (f->place->waiting <= time) return CALL;
     const int regular = (*c->steps + 1) % c->every == c->first, jumped = moved(c, f->outputs);
     const int due = regular || jumped;
     if (due && (f->get_state || f->place->ended || *c->count == c->room)) return CALL;

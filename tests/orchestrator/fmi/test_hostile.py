@@ -151,7 +151,7 @@ def test_a_crash_at_the_end_is_recorded_at_the_time_of_its_rows(tmp_path: Path) 
     """The tables are whole by then, and nothing is recovered."""
     hostile_fmu(tmp_path)
     scene, out = hostile_scene(tmp_path, "end_null_9"), tmp_path / "out"
-    subprocess.run([*COMMAND, "run", scene, "--no-figures", "--out", out], check=False)
+    subprocess.run([*RUN, scene, "--out", out], check=False)
     until = time.monotonic() + 30
     while (end := tables.load(out).run["end"])["reason"] == "running" and time.monotonic() < until:
         time.sleep(0.05)

@@ -127,7 +127,7 @@ def test_links_are_replaced_not_followed(bar: Path, tmp_path: Path) -> None:
     out, other = tmp_path / "out", tmp_path / "other"
     out.mkdir()
     other.write_text("mine")
-    files = ("haptics.csv", "run.json", "plan.txt", "trajectories.png", "mechanism.png")
+    files = ("haptics.csv", "run.json", "plan.txt", "mechanism.png")
     for name in (*files, f".haptics.csv.{os.getpid()}"):
         (out / name).symlink_to(other)
     assert status("run", bar, "--out", out) == 0

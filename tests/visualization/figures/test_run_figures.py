@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import hapticlink as hl
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
@@ -36,7 +37,6 @@ def test_an_early_end_stands_in_every_title(tmp_path: Path) -> None:
     found = drawn(run("closed-loop", tmp_path, "stop_when='virtual_mechanism.x[1]<0.044'"))
     drawings = {
         "mechanism",
-        "trajectories",
         "distance",
         "forces",
         "constraints",
@@ -46,15 +46,51 @@ def test_an_early_end_stands_in_every_title(tmp_path: Path) -> None:
     assert drawings == set(found)
     for axes in found.values():
         assert "until stop_when ended the run at 0." in axes.get_title().replace("\n", " ")
-    names = [text.get_text() for text in found["trajectories"].get_legend().get_texts()]
-    assert names == ["operational point x_S", "handle x_D", "start"]
+    names = [line.get_label() for line in found["mechanism"].lines]
+    assert {"path of operational point x_S", "path of handle x_D", "operational point"} <= {*names}
+
+
+def test_the_drawing_says_what_happened_and_shows_the_device_whole(tmp_path: Path) -> None:
+    """The numbers are those of the tables; the arrow points along the wrench of the hand."""
+    options = "graphics.rate=10", "controller.topology=false"
+    found = run("closed-loop", tmp_path, *options)
+    figure = run_figures.figures(found)["mechanism"]
+    axes, whole = figure.axes
+    x = found.haptics["virtual_mechanism.x"][:, :2] * 1e3
+    gap = np.linalg.norm(x - found.haptics["haptic_device.x_true"][:, :2] * 1e3, axis=1)
+    title = " ".join(axes.get_title().split())
+    assert f"led up to {np.linalg.norm(x - x[0], axis=1).max():.3g} mm" in title
+    assert f"at most {gap.max():.3g} mm off it" in title
+    assert title.endswith("until the device left its workspace at 2.08 s")
+    (arrow,) = (text for text in axes.texts if text.arrow_patch)
+    assert arrow.xyann == pytest.approx((-run_figures.ARROW, 0.0))
+    device = hl.scene("closed-loop").device
+    assert device
+    arms = [line for line in whole.lines if line.get_label() == "arms of the device"]
+    assert arms
+    (low, high), drawn_y = whole.get_ylim(), [axes.get_ylim()]
+    assert low < 1e3 * device.base_y_a < 1e3 * device.base_y_b < high
+    assert min(y for y, _ in drawn_y) > 1e3 * device.base_y_a
+
+
+def test_the_energy_at_the_port_stands_beside_the_work_of_the_hand(tmp_path: Path) -> None:
+    found = run("closed-loop", tmp_path, "duration=0.6")
+    axes = drawn(found)["user_port"]
+    curves = {line.get_label(): line.get_ydata() for line in axes.lines}
+    F, pose = found.haptics["hand.F"], found.haptics["haptic_device.x_true"]
+    work = 1e3 * np.cumsum((F[:-1] * np.diff(pose, axis=0)).sum(axis=1))
+    assert curves["put in by the hand"][1:] == pytest.approx(work, rel=1e-9)
+    assert f"the hand put in {work[-1]:.3g} mJ" in " ".join(axes.get_title().split())
+    low, high = axes.get_ylim()
+    assert low <= min(map(np.min, curves.values()))
+    assert high >= max(map(np.max, curves.values()))
 
 
 def test_obstacles_and_the_force_of_contacts_are_drawn(tmp_path: Path) -> None:
     found = run("obstacles", tmp_path, "duration=0.7")
     axes = drawn(found)
-    patches = axes["trajectories"].patches
-    assert [type(p).__name__ for p in patches] == ["Circle", "Circle", "Polygon"]
+    patches = axes["mechanism"].patches
+    assert [type(p).__name__ for p in patches][:3] == ["Circle", "Circle", "Polygon"]
     assert patches[0].center == pytest.approx((72, 12))  # mm, of the disc `pin`
     assert patches[0].radius == pytest.approx(8)
     force = axes["contact"].lines[0].get_ydata()
@@ -62,14 +98,13 @@ def test_obstacles_and_the_force_of_contacts_are_drawn(tmp_path: Path) -> None:
     assert force == pytest.approx((F[:, 0] ** 2 + F[:, 1] ** 2) ** 0.5)
     assert force.max() > 0
     enclosed = drawn(run("enclosure", tmp_path, "duration=0.2"))
-    walls = enclosed["trajectories"].lines[-1]
+    (walls,) = (line for line in enclosed["mechanism"].lines if line.get_label() == "enclosure")
     assert walls.get_xydata().min(axis=0) == pytest.approx((-30, -45))
 
 
 def test_every_hand_s_point_is_drawn(tmp_path: Path) -> None:
     found = run("two-hands", tmp_path, "duration=0.5")
-    left = drawn(found)["trajectories"].lines[1]
-    assert left.get_label() == "point left"
+    (left,) = (x for x in drawn(found)["mechanism"].lines if x.get_label() == "path of point left")
     expected = found.haptics["virtual_mechanism.left.x"][:, 0] * 1e3
     assert left.get_xdata() == pytest.approx(expected)
 

@@ -19,10 +19,8 @@ def javascript(module: str, statements: str, given: Any) -> Any:
     given."""
     if not NODE:
         pytest.skip("node is not installed")
-    whole = (
-        f"let answer;\nconst given = {json.dumps(given)};\n{one_file.bundle(module)}\n{statements}\n"
-        "console.log(JSON.stringify(answer));"
-    )
+    begin = f"let answer;\nconst given = {json.dumps(given)};\n{one_file.bundle(module)}"
+    whole = f"{begin}\n{statements}\nconsole.log(JSON.stringify(answer));"
     done = subprocess.run(
         [NODE, "--input-type=module", "-"], input=whole, capture_output=True, text=True, check=False
     )

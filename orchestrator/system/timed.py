@@ -1,0 +1,188 @@
+"""What a scene has happen at given times, against its FMUs, connections and clocks."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Mapping
+
+from hapticlink.orchestrator.base.faults import shortened, unknown
+from hapticlink.orchestrator.base.ticks import Timeline, exact
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.scene.records import TimedEvent, Value
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Path as Keys
+from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.system.assign_holds import Rules
+from hapticlink.orchestrator.system.ports import carries_power
+from hapticlink.orchestrator.system.springs import gains_of_held
+from hapticlink.orchestrator.system.system import Change, Connection, Fmu
+from hapticlink.orchestrator.system.timeline import GRAPHICS_RATE
+
+
+def changes(
+    scene: Scene,
+    fmus: tuple[Fmu, ...],
+    connections: tuple[Connection, ...],
+    timeline: Timeline,
+    rules: Rules,
+    problems: list[Problem],
+) -> tuple[Change, ...]:
+    """The changes in the order of their times, without those after the end of the run. Findings are
+    appended to `problems`."""
+    if scene.at and scene.coupling == "iterated":
+        problems.append((("at",), 'steps are repeated with coupling = "iterated": take another'))
+    events = _Events(scene, {u.name: u for u in fmus}, connections, timeline, rules)
+    found: list[Change] = []
+    for i, event in enumerate(scene.at):
+        for key, asked in (("set", event.set), ("override", event.override)):
+            for name, value in asked.items():
+                _take(found, problems, ("at", i, key, name), events.given, event, key, name, value)
+        for name in event.freeze:
+            _take(found, problems, ("at", i, "freeze"), events.brought, event, name, 0.0)
+        for name, noise in event.noise.items():
+            _take(found, problems, ("at", i, "noise", name), events.brought, event, name, noise)
+        problems += ((("at", i, key), why) for key, why in _times(event))
+    end = timeline.seconds(timeline.end)
+    return tuple(sorted((c for c in found if c.begin < end), key=lambda change: change.begin))
+
+
+def _take(
+    found: list[Change],
+    problems: list[Problem],
+    path: Keys,
+    make: Callable[..., Change],
+    *arguments: object,
+) -> None:
+    """Append the change, or why there is none."""
+    try:
+        found.append(make(*arguments))
+    except ValueError as error:
+        problems.append((path, str(error)))
+
+
+def _times(event: TimedEvent) -> Iterator[tuple[str, str]]:
+    if event.until is not None and event.until <= event.time:
+        yield "until", f"{event.until:g} s is not after time = {event.time:g} s"
+    if not (event.set or event.override or event.freeze or event.noise):
+        yield "time", "nothing happens then: give set, override, freeze or noise"
+
+
+class _Events:
+    """Makes changes; all methods raise ValueError, with the remedy, for what cannot be done."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        fmus: Mapping[str, Fmu],
+        connections: tuple[Connection, ...],
+        timeline: Timeline,
+        rules: Rules,
+    ) -> None:
+        self._scene, self._fmus, self._timeline, self._rules = scene, fmus, timeline, rules
+        self._connections = [c for c in connections if not c.initial]
+
+    def given(self, event: TimedEvent, key: str, name: str, value: Value) -> Change:
+        """A value that is set once, or that overrides a connection."""
+        if name == GRAPHICS_RATE and key == "set":
+            begin = self._begin("graphics", event.time)
+            return Change(begin, f"{name} = {value} Hz")
+        scalars = self._scalars(name)
+        feeding = self._feeding(name)
+        text = f"{name} = {shortened(str(value))}"
+        if key == "override":
+            self._require_disturbable(name, feeding)
+            return self._change(event, name, f"{text} instead of its connection",
+                                inputs=scalars, values=_numbers(name, value, scalars),
+                                end=self._end(event))  # fmt: skip
+        if feeding:
+            raise ValueError(f"{name} is fed by {feeding[0].name}: take override")
+        for scalar in scalars:
+            if scalar.causality == "parameter" and scalar.variability != "tunable":
+                raise ValueError(f"{name} is not tunable: it keeps its start value")
+        if name in gains_of_held(self._fmus.values(), self._connections):
+            raise ValueError(f"{name} is a gain of a spring whose energy `pspm` limits")
+        return self._change(
+            event, name, text, inputs=scalars, values=_numbers(name, value, scalars)
+        )
+
+    def brought(self, event: TimedEvent, name: str, noise: float) -> Change:
+        """An input that is frozen, or gets noise."""
+        self._scalars(name)
+        feeding = self._feeding(name)
+        self._require_disturbable(name, feeding)
+        if len(feeding) > 1:
+            raise ValueError(f"{name} is fed by {len(feeding)} connections: name one entry")
+        text = f"noise of {noise:g} on {name}" if noise else f"{name} frozen"
+        return self._change(event, name, text, inputs=feeding[0].inputs, end=self._end(event),
+                            held=feeding[0], noise=noise, seed=event.seed)  # fmt: skip
+
+    def _change(self, event: TimedEvent, name: str, text: str, **parts: object) -> Change:
+        fmu = name.partition(".")[0]
+        begin = self._begin(self._fmus[fmu].clock, event.time)
+        until = parts.get("end")
+        text += f" until {event.until:g} s" if until is not None and event.until else ""
+        return Change(begin, text, fmu, **parts)  # type: ignore[arg-type]
+
+    def _begin(self, clock: str, time: float) -> float:
+        """The first communication point of a clock at or after a time (s), infinity where there is
+        none in the run."""
+        timeline = self._timeline
+        if clock not in (c.name for c in timeline.clocks):
+            raise ValueError(f"no FMU runs at the rate of {clock}")
+        starts = timeline.clock(clock).starts
+        tick = exact(time) / timeline.base
+        k = bisect_left(starts, tick)
+        return timeline.seconds(starts[k]) if k < len(starts) else math.inf
+
+    def _end(self, event: TimedEvent) -> float:
+        return self._scene.duration + 1.0 if event.until is None else event.until
+
+    def _scalars(self, name: str) -> tuple[Scalar, ...]:
+        fmu, _, port = name.partition(".")
+        if fmu not in self._fmus:
+            raise ValueError(unknown("FMU", fmu, self._fmus))
+        description = self._fmus[fmu].description
+        if found := description.port(port, "input", "parameter"):
+            return found
+        every = dict.fromkeys(
+            s.port for s in description.scalars if s.causality in ("input", "parameter")
+        )
+        raise ValueError(f"{fmu}: {unknown('input or parameter', port, every)}")
+
+    def _feeding(self, name: str) -> list[Connection]:
+        named = {s.name for s in self._scalars(name)}
+        fmu = name.partition(".")[0]
+        into = (c for c in self._connections if c.target == fmu)
+        return [c for c in into if named & {s.name for s in c.inputs}]
+
+    def _require_disturbable(self, name: str, feeding: list[Connection]) -> None:
+        fmu = name.partition(".")[0]
+        if not feeding:
+            raise ValueError(f"{name} is fed by no connection: take set")
+        if carries_power(feeding[0], self._rules.power):
+            raise ValueError(
+                f"{name} carries power, which is measured as its connection brings it: disturb "
+                "what its source gets, or set a parameter of the source"
+            )
+        if fmu in self._scene.get_after_set:
+            raise ValueError(f"{fmu} is in get_after_set: its outputs are read before that is set")
+        if any(c.hold and HOLDS[c.hold].needs == "spring" for c in feeding):
+            raise ValueError(f"{name} is held by `pspm`, which accounts for what it brings")
+
+
+def _numbers(name: str, value: Value, scalars: tuple[Scalar, ...]) -> tuple[float, ...]:
+    def flat(part: object) -> Iterator[float]:
+        if isinstance(part, tuple | list):
+            for entry in part:
+                yield from flat(entry)
+        elif isinstance(part, str):
+            raise ValueError(f"{name} = {part!r}: give numbers")
+        else:
+            yield float(part)  # type: ignore[arg-type]
+
+    numbers = tuple(flat(value))
+    if len(numbers) != len(scalars):
+        raise ValueError(f"{len(numbers)} values for the {len(scalars)} of {name}")
+    return numbers

@@ -1,0 +1,40 @@
+// How a run ended that did not go on: its cause in a line, and the last moments in slow motion.
+const LAST = 0.2, SLOWER = 10; // s that are shown again, and how much slower
+
+export class Ending {
+  constructor(host, again) {
+    this.host = host;
+    this.again = again; // begins anew
+    this.frames = [];
+    this.until = 0;
+  }
+
+  begin() { this.frames = []; }
+
+  add(frame) {
+    this.frames.push(frame);
+    while (frame.t - this.frames[0].t > LAST) this.frames.shift();
+  }
+
+  // Says why; the page goes on when the last moments have been shown.
+  show(why) {
+    const diverged = /not finite|diverge/i.test(why), t = this.frames.at(-1)?.t ?? 0;
+    const word = document.createElement("b");
+    word.textContent = diverged ? `Diverged at ${t.toFixed(2)} s` : `Ended at ${t.toFixed(2)} s`;
+    this.host.replaceChildren(word, ` ${why}`);
+    this.started = performance.now();
+    this.played = this.frames;
+    clearTimeout(this.later);
+    this.later = setTimeout(() => { this.played = null; this.again(); }, 1e3 * LAST * SLOWER);
+  }
+
+  // The frame of the slow motion, null where none is shown.
+  get frame() {
+    if (!this.played?.length) return null;
+    const t = this.played[0].t + (performance.now() - this.started) / 1e3 / SLOWER;
+    return this.played.findLast((frame) => frame.t <= t) ?? this.played[0];
+  }
+
+  // The line stays until somebody acts.
+  hide() { if (!this.played) this.host.replaceChildren(); }
+}
