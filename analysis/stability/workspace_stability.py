@@ -48,7 +48,7 @@ def stability(
     *,
     poses: int = POSES,
     bounds: Bounds = DRIFT,
-    tell: Tell = lambda what, done, of: None,
+    tell: Tell | None = None,
 ) -> WorkspaceStability:
     """The stability of a scene, changed by `options` (see `scene`), in a number of `poses` of its
     run and in hands from soft to firm.
@@ -65,7 +65,11 @@ def stability(
         )
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
         given = overrides.written(options)
-        return _Judgement(scene, given, bounds, tell).made(poses)
+        return _Judgement(scene, given, bounds, tell or _silent).made(poses)
+
+
+def _silent(what: str, done: int, of: int) -> None:
+    """Tells nobody."""
 
 
 def hands_of(hand: Hand) -> dict[str, Hand]:
