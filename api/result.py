@@ -31,10 +31,10 @@ class Run(Results):
     `print(r)` gives the lines of `hapticlink run`; in a notebook a run shows them with its
     mechanism. `tables` are the Tables by rate, `run` is the content of run.json (the scene,
     versions, holds, energies, ages of samples, timings), `folder` is the result folder, None for a
-    run in memory. `numbers` are those of its lines, empty of one that was loaded.
+    run in memory. `numbers` are those of its lines, None of one that was loaded.
     """
 
-    numbers: tuple[str, ...] = ()
+    numbers: tuple[str, ...] | None = None
 
     def __getitem__(self, name: str) -> Any:
         """The Table of a rate, or a signal of any rate. Raises KeyError with a hint for an unknown
