@@ -94,13 +94,13 @@ def run_case(name: str, options: dict[str, Any], found: WorkspaceStability, case
     return "stable" if late < max(MOST * early, QUIET) else "unstable"
 
 
-def judged(seed: int) -> dict[str, Any]:
+def judged(seed: int, poses: int = 3) -> dict[str, Any]:
     """The row of a scene."""
     name, options = drawn(seed)
     row: dict[str, Any] = {"seed": seed, "scene": name, "options": options}
     begun = time.process_time()
     try:
-        found = hl.stability(name, options)
+        found = hl.stability(name, options, poses=poses)
     except hl.Fault as fault:
         return row | {"refused": str(fault)}
     row["cpu"] = round(time.process_time() - begun, 2)
@@ -126,10 +126,10 @@ def _value(text: str) -> Any:
         return text
 
 
-def rows(seed: int, count: int) -> Iterator[dict[str, Any]]:
+def rows(seed: int, count: int, poses: int = 3) -> Iterator[dict[str, Any]]:
     """`count` rows, of scenes with seeds from `seed` on."""
     for i in range(count):
-        yield judged(seed + i)
+        yield judged(seed + i, poses)
 
 
 def main() -> None:
@@ -137,9 +137,10 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, default=23)
     parser.add_argument("--count", type=int, default=30)
+    parser.add_argument("--poses", type=int, default=3)
     given = parser.parse_args()
     with given.out.open("a", encoding="utf-8") as out:
-        for row in rows(given.seed, given.count):
+        for row in rows(given.seed, given.count, given.poses):
             print(json.dumps(row, default=str), file=out, flush=True)
             print(row["seed"], row.get("finding", row.get("refused")), row.get("run"))
 
