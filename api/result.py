@@ -31,8 +31,10 @@ class Run(Results):
     `print(r)` gives the lines of `hapticlink run`; in a notebook a run shows them with its
     mechanism. `tables` are the Tables by rate, `run` is the content of run.json (the scene,
     versions, holds, energies, ages of samples, timings), `folder` is the result folder, None for a
-    run in memory.
+    run in memory. `numbers` are those of its lines, empty of one that was loaded.
     """
+
+    numbers: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Any:
         """The Table of a rate, or a signal of any rate. Raises KeyError with a hint for an unknown
@@ -94,7 +96,7 @@ class Run(Results):
         return found
 
     def __str__(self) -> str:
-        ending, *lines = summary.told(self, self.run["scene"]["title"])
+        ending, *lines = summary.told(self, self.run["scene"]["title"], self.numbers)
         return "\n".join([ending, *([f"  {self.fault}"] if self.fault else []), *lines])
 
     def _repr_html_(self) -> str:

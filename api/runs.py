@@ -16,16 +16,14 @@ from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import folder_lock, folders, tables
+from hapticlink.orchestrator.results import folder_lock, folders
 from hapticlink.orchestrator.results.run_record import content
 from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.tables import load as read_tables
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_axes
-
-MAX_TABLE_BYTES = 2**30
-"""Larger tables of a run in a folder are not read back; as numbers they take half of that."""
 
 
 class RunInterrupted(Interrupted):
@@ -57,7 +55,7 @@ def run(
     Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
     A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
     results up to then. Ctrl-C raises RunInterrupted, with the results so far as its `run`. Tables
-    of more than 1 GiB in `out` are not read back; use `load` for them. Threads of one process may
+    of more than 16 MiB in `out` are read when they are asked for. Threads of one process may
     run scenes at the same time, each into a folder of its own; the current directory stays as it
     is, and Ctrl-C ends the runs of the main thread.
     """
@@ -92,17 +90,23 @@ def _in_memory(
     tables: bool,
 ) -> Run:
     with temporary_folders.room() as folder:
-        ended = simulate(scene, folder, (), progress, csv=tables, real_time=real_time)
+        ended = simulate(scene, folder, (), progress, csv=False, real_time=real_time)
         if not tables:
             return Run(None, ended.run, {})
-        results = ended.results
-    return Run(None, ended.run | _findings(results), results.tables)
+        results = read_tables(folder, binary=True) if ended.outcome.published else ended.results
+    measures = Measures(results)
+    return _run(None, ended.run | _findings(results, measures), results, measures)
 
 
-def _findings(results: Results) -> dict[str, Any]:
+def _findings(results: Results, measures: Measures) -> dict[str, Any]:
     """What run.json says of the results: warnings, and the energy at the user's port."""
-    port = Measures(results).port
-    return {"user_port": port and content(port), "warnings": list(summary.lines(results))}
+    port = measures.port
+    return {"user_port": port and content(port), "warnings": list(summary.lines(results, measures))}
+
+
+def _run(folder: Path | None, run: dict[str, Any], results: Results, measures: Measures) -> Run:
+    numbers = tuple(summary.numbers(results, measures))
+    return Run(folder, run, results.tables, numbers=numbers)
 
 
 def _in_folder(
@@ -112,15 +116,20 @@ def _in_folder(
     figures: bool,
     real_time: RealTimeRun | None,
 ) -> Run:
-    ended = simulate(scene, folder, (), progress, real_time=real_time)
-    if ended.too_large(MAX_TABLE_BYTES):
-        message = "%s: tables of more than %d bytes are not read back and drawn; load them yourself"
-        logging.getLogger(__name__).warning(message, folder, MAX_TABLE_BYTES)
-        return Run(folder, ended.run, {})
+    ended = simulate(scene, folder, (), progress, real_time=real_time, keep_rows=True)
+    try:
+        return _found(folder, ended, figures)
+    finally:
+        ended.remove_rows()
+
+
+def _found(folder: Path, ended: Experiment, figures: bool) -> Run:
+    """What the rows of a run say of it, in its folder."""
     results = ended.results
     if not ended.outcome.published:
         return Run(None, results.run, results.tables)
-    findings = _findings(results)
+    measures = Measures(results)
+    findings = _findings(results, measures)
     run = results.run | findings
     try:
         run = folders.add(folder, (), findings)
@@ -133,7 +142,7 @@ def _in_folder(
     except OSError as error:  # a full disk; the rows are there, and why the run ended is told
         message = "%s has the results of the run, not all of its figures: %s"
         logging.getLogger(__name__).warning(message, folder, error.strerror or error)
-    return Run(folder, run, results.tables)
+    return _run(folder, run, results, measures)
 
 
 def _explained(ended: Experiment) -> list[str]:
@@ -155,5 +164,5 @@ def _drawn(ended: Experiment, results: Results) -> list[str]:
 
 def load(folder: str | Path) -> Run:
     """Read the results of a run from its folder. Raises InputFault if it contains no run."""
-    results = tables.load(folder)
+    results = read_tables(folder)
     return Run(results.folder, results.run, results.tables)

@@ -85,7 +85,7 @@ def cases() -> list[Case]:
 
 def make(case: Case) -> Made:
     """Runs a case."""
-    verdict = hl.stability(case.scene, case.set).verdict if case.map else ""
+    verdict = hl.equilibrium_stability(case.scene, case.set).verdict if case.map else ""
     try:
         run = hl.run(case.scene, case.set, figures=False)
     except InputFault as fault:

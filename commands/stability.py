@@ -66,7 +66,7 @@ def stability(
     set: Set = None,
     swap: Swap = None,
     map: Map = None,
-    poses: Poses = 4,
+    poses: Poses = 3,
     drift: Drift = (1.0, 0.2),
     figure: Figure = False,
     equilibrium: Equilibrium = False,

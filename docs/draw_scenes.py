@@ -61,6 +61,14 @@ def device(scene: str) -> Path:
     return FIGURES / "device.png"
 
 
+def events(scene: str) -> Path:
+    """Draws the distance over a run of a scene with events, and returns the picture's path."""
+    with tempfile.TemporaryDirectory() as folder:
+        run = hl.run(scene, out=Path(folder) / "run")
+        run.figures()["distance"].savefig(FIGURES / f"{scene}.png", dpi=110, **SAME)
+    return FIGURES / f"{scene}.png"
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         for scene in (*hl.shipped(), *examples(Path(folder))):
@@ -68,3 +76,4 @@ if __name__ == "__main__":
     print(device("closed-loop"))
     print(blocks("closed-loop", "blocks.png"))
     print(blocks("virtual-wall", "blocks-of-a-wall.png"))
+    print(events("scenario"))

@@ -68,7 +68,7 @@ class _Named:
         return self._text
 
 
-class Short(type(Fmi2Slave)):
+class Short(type(Fmi2Slave)):  # type: ignore[misc]
     """Shows pythonfmu 0.7 the two texts that it looks for in the order of a class's bases: for each
     instance it keeps a list of these and a copy of the text of each for ever, 0.6 kB otherwise."""
 

@@ -17,9 +17,11 @@ from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
+from hapticlink.orchestrator.results.files import remove_rows
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import content
-from hapticlink.orchestrator.results.tables import Results, Table, load, size
+from hapticlink.orchestrator.results.tables import Results, Table
+from hapticlink.orchestrator.results.windows import opened
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, beside
 from hapticlink.orchestrator.run.event_loop import Outcome, Progress, run
@@ -45,15 +47,17 @@ class Experiment:
     folder: Path
     run: dict[str, Any]
 
-    def too_large(self, most: int) -> bool:
-        """Whether the tables in `folder` have more than `most` bytes."""
-        return self.outcome.published and size(self.folder, self.run) > most
+    def remove_rows(self) -> None:
+        """Remove the rows of which the CSVs are made, if they were kept for `results`."""
+        for name in self.run["files"] if self.outcome.published else ():
+            if name.endswith(".csv") and (path := self.folder / name).exists():
+                remove_rows(path)
 
     @property
     def results(self) -> Results:
         """The results of the run, with empty tables if it had no row."""
         if self.outcome.published:
-            return load(self.folder)
+            return opened(self.folder)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:
@@ -88,6 +92,7 @@ def simulate(
     progress: Progress | None = None,
     csv: bool = True,
     real_time: RealTimeRun | None = None,
+    keep_rows: bool = False,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
@@ -95,7 +100,7 @@ def simulate(
     Interrupted for a signal before the run. A fault during the run is in the outcome, and its
     results up to then are kept. Results of an earlier run in `folder` are removed once the first
     rows of this one are written. Without `csv` the tables stay in the binary form in which a run
-    writes them.
+    writes them, with `keep_rows` beside the CSVs, until `remove_rows`.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
     read = open_scene.load(scene, options)
@@ -132,4 +137,7 @@ def simulate(
                 results.end_in_place(outcome.ending(build_time))
             outcome.published = results.published
     written = content(before) | content(outcome.ending(build_time))
-    return Experiment(read, system, outcome, folder, written)
+    ended = Experiment(read, system, outcome, folder, written)
+    if not keep_rows:
+        ended.remove_rows()
+    return ended

@@ -247,6 +247,7 @@ def _as_before_the_start(simulation: Simulation, outside: str | None, changing: 
         values[simulation.signals.fmu(outside)] = start[simulation.signals.fmu(outside)]
     for instance in simulation.instances.values():
         ctypes.memset(ctypes.addressof(instance.place), 0, ctypes.sizeof(instance.place))
+        instance.place.waiting = math.inf  # no setting waits for a step
     for check in simulation.step_checks.values():
         check.estimates = check.estimates[:STEP_CHECKS]
         check.times, check.weights = check.times[:STEP_CHECKS], check.weights[:STEP_CHECKS]

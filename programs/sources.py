@@ -173,7 +173,8 @@ def _scene(
 
 def _changes(resolved: Resolved, regions: Regions) -> Iterator[str]:
     """The tables of what a program can be changed to."""
-    system, changes, places, choices = resolved.system, resolved.changes, [], []
+    system, changes = resolved.system, resolved.changes
+    places, choices = list[str](), list[str]()
     clocks = [clock.name for clock in system.timeline.clocks]
     for i, choice in enumerate(changes.choices):
         own = re.compile(rf"alternative_{i}(_|$)")

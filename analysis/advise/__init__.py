@@ -58,7 +58,7 @@ class Method:
         return (*HOLDS[self.hold], *GAINS.get(self.gains, ()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measured:
     """A method on the draws, of which `within` keep the limits: largest distances of handle and
     operational point (mm), and energies at the user's port as shares of what is allowed."""
@@ -158,9 +158,11 @@ def advise(
         for method, drawn in pairs:
             given = (*options, *drawn, *method.options)
             jobs.append(job(scene, given, {"method": method.name, "draw": " ".join(drawn)}))
-        return sweep(
-            jobs, folder, processes, tell=lambda done: tell(done, len(jobs)), measure=measured
-        )
+
+        def told(done: int) -> None:
+            tell(done, len(jobs))
+
+        return sweep(jobs, folder, processes, tell=told, measure=measured)
 
     screened = dict(zip(methods, run([(method, ()) for method in methods]), strict=True))
     ranked = _distinct(sorted(methods, key=lambda m: _rank(screened[m])), screened)
@@ -226,8 +228,7 @@ def _chosen(title: str, ran: Sequence[Measured], screened: Mapping[Method, Row])
         return Advice(title, best, (), tuple(o for o in ran if o is not best), screened)
     logs = [np.log(np.maximum(one.error_mm, 1e-9)) for one in able]
     mean = np.mean(logs, axis=0)
-    order = sorted(range(len(able)), key=lambda i: float(np.median(logs[i] - mean)))
-    best = order[0]
-    ties = [i for i in order[1:] if np.quantile(logs[i] - logs[best], 0.25) <= 0.0]
-    rest = [one for one in ran if one is not able[best] and one not in [able[i] for i in ties]]
-    return Advice(title, able[best], tuple(able[i] for i in ties), tuple(rest), screened)
+    first, *others = sorted(range(len(able)), key=lambda i: float(np.median(logs[i] - mean)))
+    ties = [able[i] for i in others if np.quantile(logs[i] - logs[first], 0.25) <= 0.0]
+    rest = [one for one in ran if one is not able[first] and one not in ties]
+    return Advice(title, able[first], tuple(ties), tuple(rest), screened)

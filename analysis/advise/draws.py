@@ -24,7 +24,7 @@ def draws(scene: Scene, count: int, seed: int) -> Iterator[tuple[str, ...]]:
     """The options of `count` draws; the same for the same seed."""
     generator = np.random.default_rng(seed)
     for _ in range(count):
-        drawn = {"hand": _hand(scene, generator)}
+        drawn: dict[str, Any] = {"hand": _hand(scene, generator)}
         graphics = scene.graphics
         if graphics is not None and isinstance(graphics.rate, int | float | str):
             rate = float(exact(graphics.rate)) * generator.uniform(1 - RATE, 1 + RATE)
@@ -47,8 +47,8 @@ def _hand(scene: Scene, generator: np.random.Generator) -> dict[str, Any]:
     match hand:
         case ConstantHand():
             found["wrench"] = turned(hand.wrench)
-        case ProfileHand(table=tuple()):
-            found["table"] = [[row[0], *turned(row[1:])] for row in hand.table]
+        case ProfileHand(table=tuple() as table):
+            found["table"] = [[row[0], *turned(row[1:])] for row in table]
         case ProfileHand():
             sine = found["table"]
             found["table"] = sine | {key: turned(sine[key]) for key in ("mean", "amplitude")}

@@ -3,7 +3,8 @@ rendered."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from hapticlink.orchestrator.base.loop_names import (
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.scene_part import scene_part
-from hapticlink.orchestrator.results.tables import Results, Table
+from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 ROWS = 500
 """Largest number of rows whose depths are computed."""
@@ -33,14 +34,14 @@ def lines(results: Results) -> Iterator[str]:
     """A line for the deepest contact beyond the middle of a shape, and for the stiffest
     pair that pushes or sticks."""
     record, scene = results.record, results.record.scene
-    table = of_block(results, CONTACT_GAP)
+    table = of_block(next(results.windows()), CONTACT_GAP)
     if table is None or not len(table["time"]) or not scene["linkage"] or not scene["contacts"]:
         return
-    yield from _unrendered(results, table)
+    yield from _unrendered(results)
     linkage = scene_part(results, "linkage", Linkage)
     contacts = scene_part(results, "contacts", Contacts)
     if JOINT_COORDINATES in table:  # both are recorded
-        yield from _deep(linkage, contacts, table)
+        yield from _deep(results, linkage, contacts)
     mechanism = scene_part(results, "mechanism", Mechanism)
     method = METHODS.get(mechanism.integrator, Integrator)  # a plugin's may not be loaded
     if method.bounded_by and len(table["time"]) > 1:
@@ -49,31 +50,50 @@ def lines(results: Results) -> Iterator[str]:
         yield from _stiff(linkage, contacts, step_s, method.bounded_by)
 
 
-def _unrendered(results: Results, table: Table) -> Iterator[str]:
+def _tables(results: Results) -> Iterator[tuple[Vector, Table]]:
+    """The times (s) and the rows of each window."""
+    for window in results.windows():
+        if table := of_block(window, CONTACT_GAP):
+            rows = window.within(table["time"])
+            if len(time := table["time"][rows]):
+                yield time, replace(table, rows=table.rows[rows])
+
+
+def _unrendered(results: Results) -> Iterator[str]:
     """A line where contacts act on the mechanism and its own controller does not pass them on."""
     record = results.record
     sent = any(name.startswith(f"{ENVIRONMENT_WRENCH} -> ") for name in record.connections)
-    closed = table["time"][np.asarray(table[CONTACT_GAP]) < 0]
-    if sent or not len(closed) or not record.scene["controller"] or CONTROLLER in record.replaced:
+    if sent or not record.scene["controller"] or CONTROLLER in record.replaced:
+        return
+    closed = (time[table[CONTACT_GAP] < 0] for time, table in _tables(results))
+    first = next((times[0] for times in closed if len(times)), None)
+    if first is None:
         return
     yield (
-        f"warning: contacts act on the mechanism from {closed[0]:.4g} s on and are not rendered to "
+        f"warning: contacts act on the mechanism from {first:.4g} s on and are not rendered to "
         "the hand: the handle is led to where the mechanism cannot follow; take "
         "controller.contact = true"
     )
 
 
-def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
+def _deep(results: Results, linkage: Linkage, contacts: Contacts) -> Iterator[str]:
     most = {pair: middle(linkage, contacts, pair) for pair in near(linkage, contacts)}
-    time, q = table["time"], table[JOINT_COORDINATES]
-    depths_by_pair = [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
-    deep = np.flatnonzero(table[CONTACT_GAP] < -min(most.values()))
-    if len(deep):
-        chosen = deep[np.linspace(0, len(deep) - 1, min(len(deep), ROWS)).astype(int)]
-        depths_by_pair += [(*item, time[chosen]) for item in depths(linkage, contacts, q[chosen])]
-    if not depths_by_pair:
+    bound = -min(most.values())
+    number = sum(int((table[CONTACT_GAP] < bound).sum()) for _, table in _tables(results))
+    chosen = np.linspace(0, number - 1, min(number, ROWS)).astype(int)
+    found, before = [], 0
+    for time, table in _tables(results):
+        q = table[JOINT_COORDINATES]
+        found += [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
+        deep = np.flatnonzero(table[CONTACT_GAP] < bound)
+        rows = deep[chosen[slice(*np.searchsorted(chosen, (before, before + len(deep))))] - before]
+        if len(rows):
+            found += [(*item, time[rows]) for item in depths(linkage, contacts, q[rows])]
+        before += len(deep)
+        found = [max(found, key=lambda item: _beyond(item, most))] if found else []
+    if not found:
         return
-    pair, depth, times = max(depths_by_pair, key=lambda item: float(item[1].max()) - most[item[0]])
+    ((pair, depth, times),) = found
     if (worst := float(depth.max())) > most[pair]:
         yield (
             f"warning: at {times[depth.argmax()]:.4g} s {pair.body} is {short(worst * 1e3)} mm "
@@ -81,6 +101,11 @@ def _deep(linkage: Linkage, contacts: Contacts, table: Table) -> Iterator[str]:
             f"({short(most[pair] * 1e3)} mm), where it goes through or its side changes, and "
             "energy with it: take a larger contacts.stiffness, or a start at which they are apart"
         )
+
+
+def _beyond(item: tuple[Pair, Vector, Vector], most: Mapping[Pair, float]) -> float:
+    pair, depth, _ = item
+    return float(depth.max()) - most[pair]
 
 
 def _stiff(

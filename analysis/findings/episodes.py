@@ -5,7 +5,7 @@ Each is found in the samples as they are recorded, and lasts until the first sam
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.forces import torques, touching
 from hapticlink.analysis.findings.limits import EPISODES, FULL_TORQUE, NOTICEABLE_J
-from hapticlink.analysis.findings.tracking import COPY_BRANCH_OK, constrained, of_block
-from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.analysis.findings.tracking import (
+    COPY_BRANCH_OK,
+    constrained,
+    constraint_counts,
+    of_block,
+)
+from hapticlink.analysis.findings.user_port import UserPort, ports
 from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results, Vector
@@ -31,16 +36,47 @@ class Episode(NamedTuple):
 
 def episodes(results: Results) -> list[Episode]:
     """The episodes of a run, by kind and then by time. Signals that are not recorded have none."""
-    return [episode for state in _states(results) for episode in _spans(*state)]
+    counts = constraint_counts(results.windows())
+    usual = max(counts, key=lambda number: counts[number], default=0.0)
+    unusual = {number: usual for number in sorted(counts) if number != usual}
+    windows = zip(results.windows(), ports(results), strict=True)
+    return _episodes(_states(window, port, unusual) for window, port in windows)
 
 
 def saturations(results: Results) -> list[Episode]:
     """The episodes of motors at their limit alone."""
-    return [episode for state in _saturated(results) for episode in _spans(*state)]
+    return _episodes(_saturated(window) for window in results.windows())
 
 
-def _spans(kind: str, times: Vector, holds: NDArray[np.bool_], said: str) -> list[Episode]:
-    return [Episode(kind, a, b, said or EPISODES[kind]) for a, b in spans(times, holds)]
+def _episodes(windows: Iterable[Iterable[State]]) -> list[Episode]:
+    changes: dict[tuple[str, str], Changes] = {}
+    for states in windows:
+        for kind, times, holds, said in states:
+            changes.setdefault((kind, said or EPISODES[kind]), Changes()).add(times, holds)
+    return [Episode(k, a, b, said) for (k, said), of in changes.items() for a, b in spans(*of.all)]
+
+
+class Changes:
+    """The samples of a state at which it changes, and the last one: they have its spans."""
+
+    def __init__(self) -> None:
+        self._kept: list[tuple[Vector, NDArray[np.bool_]]] = []
+        self._last: tuple[Vector, NDArray[np.bool_]] | None = None
+
+    def add(self, times: Vector, holds: NDArray[np.bool_]) -> None:
+        """The samples that follow."""
+        if len(times):
+            before = ~holds[:1] if self._last is None else self._last[1]
+            at = np.flatnonzero(np.diff(np.concatenate([before, holds])))
+            self._kept.append((times[at], holds[at]))
+            self._last = times[-1:], holds[-1:]
+
+    @property
+    def all(self) -> tuple[Vector, NDArray[np.bool_]]:
+        """Times (s), and whether it holds from there on."""
+        kept = [*self._kept, *([self._last] if self._last else [])]
+        times, holds = zip(*kept, strict=True) if kept else ([np.zeros(0)], [np.zeros(0, bool)])
+        return np.concatenate(times), np.concatenate(holds)
 
 
 def spans(times: Vector, holds: NDArray[np.bool_]) -> list[tuple[float, float]]:
@@ -54,28 +90,32 @@ State = tuple[str, Vector, NDArray[np.bool_], str]
 """Kind, times (s) of samples, whether each has it, and what is said where it varies."""
 
 
-def _states(results: Results) -> Iterator[State]:
-    if branch := of_block(results, COPY_BRANCH_OK):
-        yield "folded", branch["time"], branch[COPY_BRANCH_OK] == 0, ""
-    yield from _saturated(results)
-    if port := user_port(results):
+def _states(
+    window: Results, port: UserPort | None, unusual: Mapping[float, float]
+) -> Iterator[State]:
+    """unusual: numbers of constrained directions, with the one that is usual."""
+    if branch := of_block(window, COPY_BRANCH_OK):
+        rows = window.within(branch["time"])
+        yield "folded", branch["time"][rows], branch[COPY_BRANCH_OK][rows] == 0, ""
+    yield from _saturated(window)
+    if port:
         yield "energy", port.time_s, port.generated_J > NOTICEABLE_J, ""
-    if counted := constrained(results):
+    if counted := constrained(window):
         table, name = counted
-        values, counts = np.unique(table[name], return_counts=True)
-        usual = values[counts.argmax()] if len(values) else 0
-        for value in values[values != usual]:
+        rows = window.within(table["time"])
+        for value, usual in unusual.items():
             said = f"{value:.0f} constrained directions, not {usual:.0f}"
-            yield "constraints", table["time"], table[name] == value, said
-    if contact := touching(results):
+            yield "constraints", table["time"][rows], table[name][rows] == value, said
+    if contact := touching(window):
         yield "contacts", *contact, ""
-    if margin := of_block(results, WORKSPACE_MARGIN):
-        yield "outside", margin["time"], margin[WORKSPACE_MARGIN] < 0, ""
+    if margin := of_block(window, WORKSPACE_MARGIN):
+        rows = window.within(margin["time"])
+        yield "outside", margin["time"][rows], margin[WORKSPACE_MARGIN][rows] < 0, ""
 
 
-def _saturated(results: Results) -> Iterator[State]:
-    for user, device in all_devices(results).items():
-        if driven := torques(results, device, user):
+def _saturated(window: Results) -> Iterator[State]:
+    for user, device in all_devices(window).items():
+        if driven := torques(window, device, user):
             most = np.abs(driven[1]).max(axis=1)
             said = f"{EPISODES['saturated']}: {user}" if user else ""
             yield "saturated", driven[0], most >= FULL_TORQUE * device.torque_limit, said

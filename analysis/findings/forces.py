@@ -34,8 +34,9 @@ def wrenches(results: Results, user: str = "") -> dict[str, tuple[Vector, Vector
     for signal, name in WRENCHES.items():
         signal = signal_of_user(signal, user)
         if (table := of_block(results, signal, 3)) and len(table["time"]):
-            F = table[signal]
-            wrenches_by_name[name] = table["time"], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
+            rows = results.within(table["time"])
+            F = table[signal][rows]
+            wrenches_by_name[name] = table["time"][rows], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
     return wrenches_by_name
 
 
@@ -55,7 +56,9 @@ def touching(results: Results) -> tuple[Vector, NDArray[np.bool_]] | None:
     force, gap = of_block(results, ENVIRONMENT_WRENCH, 3), of_block(results, CONTACT_GAP)
     if not (force and gap):
         return None
-    return force["time"], (force[ENVIRONMENT_WRENCH] != 0).any(axis=1) & (gap[CONTACT_GAP] < 0)
+    rows = results.within(force["time"])
+    pushes = (force[ENVIRONMENT_WRENCH] != 0).any(axis=1) & (gap[CONTACT_GAP] < 0)
+    return force["time"][rows], pushes[rows]
 
 
 def torques(
@@ -72,4 +75,5 @@ def torques(
         return None
     if not len(table["time"]):
         return None
-    return table["time"], motor_torques(device, table[motor], table[handle])
+    rows = results.within(table["time"])
+    return table["time"][rows], motor_torques(device, table[motor][rows], table[handle][rows])

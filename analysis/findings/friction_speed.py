@@ -14,12 +14,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.base.loop_names import JOINT_RATES
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.tables import Results, Vector
 
 BOUND = 0.1
 
@@ -30,12 +29,16 @@ def coarse(results: Results) -> Iterator[str]:
     if not linkage or not speeds:
         return
     units = [(j["name"], unit) for j in linkage["joint"] for unit in COORDINATE_UNITS[j["type"]]]
-    table = of_block(results, JOINT_RATES, len(units))
-    if not table or not len(table["time"]):
-        return
-    for (name, unit), rate in zip(units, table[JOINT_RATES].T, strict=True):
-        speed = speeds.get(name, 0.0)
-        if (error := _turns(rate, speed) * speed) > BOUND * (most := np.abs(rate).max()):
+    smallest = [speeds.get(name, 0.0) for name, _ in units]
+    largest, turns = np.zeros(len(units)), [Turns(speed) for speed in smallest]
+    for window in results.windows():
+        if table := of_block(window, JOINT_RATES, len(units)):
+            rates = table[JOINT_RATES][window.within(table["time"])]
+            largest = np.maximum(largest, np.abs(rates).max(axis=0, initial=0.0))
+            for joint, rate in zip(turns, rates.T, strict=True):
+                joint.add(rate)
+    for (name, unit), speed, most, turned in zip(units, smallest, largest, turns, strict=True):
+        if (error := turned.count * speed) > BOUND * most:
             yield (
                 f"warning: friction of {name} is Coulomb's beyond {speed:.2g} {unit}/s only, and "
                 f"its rate of up to {most:.2g} {unit}/s may be off by about {error / most:.0%} "
@@ -43,7 +46,14 @@ def coarse(results: Results) -> Iterator[str]:
             )
 
 
-def _turns(rate: NDArray[np.float64], smallest: float) -> int:
-    """How often `rate` changes its sign, counted once it is beyond `smallest`."""
-    signs = np.sign(rate[np.abs(rate) > smallest])
-    return int(np.count_nonzero(signs[1:] != signs[:-1]))
+class Turns:
+    """How often a rate changes its sign, counted once it is beyond `smallest`."""
+
+    def __init__(self, smallest: float) -> None:
+        self._smallest, self._last, self.count = smallest, np.zeros(0), 0
+
+    def add(self, rate: Vector) -> None:
+        """The samples that follow."""
+        signs = np.concatenate([self._last, np.sign(rate[np.abs(rate) > self._smallest])])
+        self.count += int(np.count_nonzero(signs[1:] != signs[:-1]))
+        self._last = signs[-1:]

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.analysis.findings.episodes import Episode, saturations
 from hapticlink.analysis.findings.forces import all_wrenches, torques
 from hapticlink.analysis.findings.tracking import (
     constrained,
+    constraint_counts,
     folded,
     further_users,
     of_block,
     pose_error,
     poses,
 )
-from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.analysis.findings.user_port import measured, ports
 from hapticlink.orchestrator.base.loop_names import CLOSURE_ERROR
 from hapticlink.orchestrator.results.run_record import Energy, PortEnergy
 from hapticlink.orchestrator.results.scene_part import all_devices
 from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.windows import until
 
 
 class TrackingError(NamedTuple):
@@ -54,68 +58,83 @@ class Constrained(NamedTuple):
 
 
 class Measures:
-    """The measures of a run, each computed when it is asked for; those of paths, forces and torques
-    until a time (s). What a scene does not have, or does not record, is missing or None."""
+    """The measures of a run, each computed when it is asked for, window by window; those of paths,
+    forces and torques until a time (s). What a scene does not have, or does not record, is missing
+    or None."""
 
     def __init__(self, results: Results, until: float = math.inf) -> None:
         self._results, self._until = results, until + 1e-12
 
+    def _windows(self) -> Iterator[Results]:
+        return until(self._results, self._until)
+
     @cached_property
     def tracking(self) -> dict[str, TrackingError]:
         """By the users' names; that of the first one is empty."""
-        errors = {}
-        for user in ("", *further_users(self._results)):
-            if not all(of_block(self._results, pose, 3) for pose in poses(user)):
-                continue
-            error = pose_error(self._results, user)
-            count = int(np.count_nonzero(error.time_s <= self._until))
-            if count:
-                distance, angle = error.distance_mm[:count], error.angle_rad[:count]
-                errors[user] = TrackingError(
-                    float(distance.max()),
-                    rms(distance),
-                    float(angle.max()),
-                    rms(angle),
-                    float(error.time_s[count - 1]),
-                )
-        return errors
+        parts: dict[str, list[tuple[float, ...]]] = {}
+        for window in self._windows():
+            for user in ("", *further_users(window)):
+                if not all(of_block(window, pose, 3) for pose in poses(user)):
+                    continue
+                error = pose_error(window, user)
+                if len(error.time_s):
+                    distance, angle = error.distance_mm, error.angle_rad
+                    part = (distance.max(), rms(distance), angle.max(), rms(angle))
+                    parts.setdefault(user, []).append((*part, error.time_s[-1], len(distance)))
+        return {user: _joined(np.array(each)) for user, each in parts.items()}
 
     @cached_property
     def forces(self) -> dict[str, float]:
         """The largest force (N) of each wrench."""
-        every = all_wrenches(self._results).items()
-        acting = {name: force[time <= self._until] for name, (time, force, _) in every}
-        return {name: float(force.max()) for name, force in acting.items() if len(force)}
+        found: dict[str, float] = {}
+        for window in self._windows():
+            for name, (_, force, _) in all_wrenches(window).items():
+                if len(force):
+                    found[name] = max(float(force.max()), found.get(name, 0.0))
+        return found
 
     @cached_property
     def motors(self) -> dict[str, float]:
         """The largest motor torque of each user as a share of the torque limit."""
-        shares = {}
-        for user, device in all_devices(self._results).items():
-            if driven := torques(self._results, device, user):
-                time, torque = driven
-                largest = np.abs(torque[time <= self._until]).max(initial=0.0)
-                shares[user] = float(largest) / device.torque_limit
-        return shares
+        found: dict[str, float] = {}
+        devices = all_devices(self._results)
+        for window in self._windows():
+            for user, device in devices.items():
+                if driven := torques(window, device, user):
+                    largest = float(np.abs(driven[1]).max(initial=0.0)) / device.torque_limit
+                    found[user] = max(largest, found.get(user, 0.0))
+        return found
+
+    @cached_property
+    def saturations(self) -> list[Episode]:
+        """When motors were at their limit, in the whole run."""
+        return saturations(self._results)
 
     @cached_property
     def closure_m(self) -> float | None:
         """The largest closure error of the mechanism's loops (m)."""
-        table = of_block(self._results, CLOSURE_ERROR)
-        if table is None or not len(table["time"]):
-            return None
-        return float(np.abs(table[CLOSURE_ERROR][table["time"] <= self._until]).max(initial=0.0))
+        found = None
+        for window in self._windows():
+            table = of_block(window, CLOSURE_ERROR)
+            if table is not None and len(table["time"]):
+                error = np.abs(table[CLOSURE_ERROR][window.within(table["time"])])
+                found = max(float(error.max(initial=0.0)), found or 0.0)
+        return found
 
     @cached_property
     def constrained(self) -> Constrained | None:
         """The numbers of constrained directions."""
-        if (counted := constrained(self._results)) is None:
+        switches, last = None, np.zeros(0)
+        for window in self._windows():
+            if counted := constrained(window):
+                table, signal = counted
+                count = table[signal][window.within(table["time"])]
+                changes = np.diff(np.concatenate([last, count]))
+                switches = (switches or 0) + int(np.count_nonzero(changes))
+                last = count[-1:] if len(count) else last
+        if switches is None:
             return None
-        table, signal = counted
-        count = table[signal][table["time"] <= self._until]
-        numbers, samples = np.unique(count, return_counts=True)
-        by_number = dict(zip(numbers.tolist(), samples.tolist(), strict=True))
-        return Constrained(by_number, int(np.count_nonzero(np.diff(count))))
+        return Constrained(constraint_counts(self._windows()), switches)
 
     @cached_property
     def folded(self) -> tuple[int, int]:
@@ -125,14 +144,24 @@ class Measures:
     @cached_property
     def port(self) -> PortEnergy | None:
         """The energy generated at the user's port in the whole run."""
-        energy = user_port(self._results)
-        return energy and energy.measured
+        return measured(ports(self._results))
 
     @cached_property
     def held(self) -> dict[str, Energy]:
         """The energies of the connections with a hold, in the whole run."""
         record = self._results.record
         return {name: record.meters[name] for name in record.holds if name in record.meters}
+
+
+def _joined(parts: Vector) -> TrackingError:
+    """Of windows, rows of largest, RMS (mm), largest, RMS (rad), last time (s), samples."""
+    shares = parts[:, 5] / parts[:, 5].sum()
+    (mm, angle) = (
+        float(parts[0, i] if len(parts) == 1 else np.sqrt(shares @ parts[:, i] ** 2))
+        for i in (1, 3)
+    )
+    largest = parts.max(axis=0)
+    return TrackingError(float(largest[0]), mm, float(largest[2]), angle, float(parts[-1, 4]))
 
 
 def rms(values: Vector) -> float:

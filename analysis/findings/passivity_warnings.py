@@ -7,7 +7,8 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import groupby
 from typing import Any
 
-from hapticlink.analysis.findings.episodes import Episode, saturations
+from hapticlink.analysis.findings.episodes import Episode
+from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.control import Passivity
 from hapticlink.orchestrator.base.loop_names import (
@@ -21,10 +22,10 @@ from hapticlink.orchestrator.base.loop_names import (
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.scene_part import all_devices
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.tables import Results, Table
 
 
-def lines(results: Results) -> Iterator[str]:
+def lines(results: Results, measures: Measures) -> Iterator[str]:
     """A line for each late force and pose of a passivity controller or of `pspm`, for motors at
     their limit beside a passivity controller, for one that damps counts of encoders, and for energy
     that was generated outside the premises."""
@@ -45,7 +46,7 @@ def lines(results: Results) -> Iterator[str]:
                 "its force with the motion of that time, and does not bound its energy"
             )
     driven = [name for name in guarded if user_of_block(name, CONTROLLER) is not None]
-    for name, spans in groupby(saturations(results) if driven else (), key=_controller):
+    for name, spans in groupby(measures.saturations if driven else (), key=_controller):
         if name in driven:
             seconds = sum(span.end - span.begin for span in spans)
             yield (
@@ -99,8 +100,12 @@ def _outside(results: Results) -> Iterator[str]:
                 f"where hands put in {short(1e3 * put_in)} mJ: {said}; take a higher rate"
             )
     for user in _laws(record.scene):
-        table = of_block(results, left := signal_of_user(PASSIVITY_ENERGY, user))
-        if table and len(table["time"]) and -(least := float(table[left].min())) > matters:
+        left = signal_of_user(PASSIVITY_ENERGY, user)
+        least = min(
+            (float(t[left].min()) for t in _tables(results, left) if t and len(t["time"])),
+            default=0.0,
+        )
+        if -least > matters:
             yield (
                 f"warning: the motors of {block_of_user(CONTROLLER, user)} gave "
                 f"{short(-1e3 * least)} mJ beyond the budget of its passivity controller, where "
@@ -132,13 +137,15 @@ def _counts(results: Results) -> Iterator[str]:
     from hapticlink.components.device.encoder_count import count_energies  # casadi
 
     record, devices = results.record, all_devices(results)
+    first = next(results.windows())
     for user, law in _laws(record.scene).items():
         handle = signal_of_user(MEASURED_HANDLE_POSE, user)
-        table, device = of_block(results, handle, 3), devices.get(user)
+        table, device = of_block(first, handle, 3), devices.get(user)
         if table is None or device is None or not len(table["time"]):
             continue
-        acted = of_block(results, damping := signal_of_user(PASSIVITY_DAMPING, user))
-        if acted and not acted[damping].any():
+        damping = signal_of_user(PASSIVITY_DAMPING, user)
+        acted = (t is None or t[damping].any() for t in _tables(results, damping))
+        if not any(acted):
             continue
         period = record.clocks[record.fmus[handle.partition(".")[0]].rate].longest
         count = float(count_energies(device, table[handle][0], period).max())
@@ -150,6 +157,10 @@ def _counts(results: Results) -> Iterator[str]:
                 f"no energy; fewer of them, and with a looser bound, from {key}.passivity.noise="
                 f"{1.1 * count:.2g}"
             )
+
+
+def _tables(results: Results, signal: str) -> Iterator[Table | None]:
+    return (of_block(window, signal) for window in results.windows())
 
 
 def _controller(saturated: Episode) -> str:

@@ -20,9 +20,9 @@ a mobility or directions that are held or differ, velocity terms left out, satur
 
 Works on the handle and the mechanism are those of the energy meters, of the wrenches as they act:
 a sample that comes late, by a latency or in the order of Jacobi, or is lost is paired with the
-displacement over which it acts (`arrivals.py`). Where a hold gives other values than samples, the
-work is known at the meter's last sample alone, and reached there in proportion to that of the
-samples.
+displacement over which it acts (`sample_arrivals.py`). Where a hold gives other values than
+samples, the work is known at the meter's last sample alone, and reached there in proportion to that
+of the samples.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.sample_arrivals import known_from
 from hapticlink.analysis.findings.tracking import of_block, poses, table_of
+from hapticlink.analysis.findings.works import Works
 from hapticlink.orchestrator.base.loop_names import (
     DRIFT_WRENCH,
     ENVIRONMENT_WRENCH,
@@ -42,7 +42,7 @@ from hapticlink.orchestrator.base.loop_names import (
     TOPOLOGY_WRENCH,
     signal_of_user,
 )
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.tables import Results, Vector
 
 
 class User(NamedTuple):
@@ -84,11 +84,11 @@ def needed(results: Results, users: Iterable[str]) -> set[str]:
 
 
 def by_block(
-    results: Results, time: Vector, stored: Vector, put_in: Mapping[str, Vector]
+    results: Results, works: Works, time: Vector, stored: Vector, put_in: Mapping[str, Vector]
 ) -> dict[str, Vector]:
-    """The energy (J) that each block has generated at the times (s), those of all users' blocks
-    added up. stored: E - E(0) less the work of hands without a device; put_in: the work of each
-    user's hand on the handle, by the user's name."""
+    """The energy (J) that each block has generated at the times (s) of a window, those of all
+    users' blocks added up. stored: E - E(0) less the work of hands without a device; put_in: the
+    work of each user's hand on the handle, by the user's name."""
     blocks: dict[str, Vector] = {}
     shaping, mechanism = np.zeros(len(time)), stored.copy()
 
@@ -98,7 +98,7 @@ def by_block(
     def on(signal: str, position: str) -> tuple[Vector, Vector] | None:
         if of_block(results, signal, 3) is None or of_block(results, position, 3) is None:
             return None
-        return works(results, signal, position, time)
+        return works.of(results, signal, position, time)
 
     for of_user, done in ((user(name), done) for name, done in put_in.items()):
         shaping = shaping - done
@@ -117,7 +117,7 @@ def by_block(
         if contact := on(of_user.contact, of_user.point):
             add("environment", -contact[1])
             shaping = shaping + contact[1]
-        for name, (held, source) in _into_mechanism(results, of_user, time).items():
+        for name, (held, source) in _into_mechanism(results, works, of_user, time).items():
             mechanism = mechanism - held
             if name == of_user.drift:
                 add("drift", source)
@@ -128,7 +128,7 @@ def by_block(
 
 
 def _into_mechanism(
-    results: Results, of_user: User, time: Vector
+    results: Results, works: Works, of_user: User, time: Vector
 ) -> dict[str, tuple[Vector, Vector]]:
     """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
     from, by that signal."""
@@ -137,7 +137,7 @@ def _into_mechanism(
         if table_of(results, source) and of_block(results, of_user.point, 3):
             sign = -1.0 if target.endswith("F_drift") else 1.0
             name = f"{source} -> {target}"
-            ports[source] = works(results, source, of_user.point, time, sign, name)
+            ports[source] = works.of(results, source, of_user.point, time, sign, name)
     return ports
 
 
@@ -147,71 +147,3 @@ def _sources(results: Results, of_user: User) -> Iterator[tuple[str, str]]:
         source, _, target = name.partition(" -> ")
         if target in (f"{of_user.inputs}F_hand", f"{of_user.inputs}F_drift"):
             yield source, target
-
-
-def works(
-    results: Results,
-    signal: str,
-    position: str,
-    times: Vector,
-    sign: float = 1.0,
-    connection: str | None = None,
-) -> tuple[Vector, Vector]:
-    """The work (J) of a wrench at a position until `times` (s): as it acts, and that of its
-    source. `connection` is that with which it acts; by default one from the signal to the FMU of
-    the position, without which the newest sample acts."""
-    table, moved = table_of(results, signal), table_of(results, position)
-    if not (table and moved):
-        raise KeyError(f"work needs the signals {signal} and {position}")
-    force, stamps, booked = sign * table[signal], table["time"], results.record.meters
-    start = f"{signal} -> {position.partition('.')[0]}."
-    name = connection or next((n for n in booked if n.startswith(start)), None)
-    if name is None:
-        return (
-            work(force, stamps, moved, position, times),
-            ideal(force, stamps, moved, position, times),
-        )
-    known = known_from(results, name, stamps, table is moved)
-    meter = booked[name]
-    until = meter.until
-    to = np.union1d(times, until)  # where the meter stops may be beside or after the times
-    acts, source = (
-        _passing(series, to, until, energy)[np.searchsorted(to, times)]
-        for energy, series in (
-            (meter.held, work(force, known, moved, position, to)),
-            (meter.ideal, ideal(force, stamps, moved, position, to)),
-        )
-    )
-    return acts, source
-
-
-def _passing(series: Vector, times: Vector, until: float, value: float) -> Vector:
-    """`series` at `times`, changed in proportion to its own path so that it passes `value`
-    at the time `until`."""
-    path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
-    to, reached = (float(np.interp(until, times, y)) for y in (path, series))
-    if not to:
-        path, to = times - times[0], max(until - float(times[0]), 1e-300)
-    changed: Vector = series + (value - reached) * path / to
-    return changed
-
-
-def work(force: Vector, known: Vector, moved: Table, position: str, times: Vector) -> Vector:
-    """The work (J) of the newest of the forces (n, 3), known from the times `known` on, over the
-    steps of a position until `times` (s). A force that comes after a newer one does not act."""
-    x, time = moved[position], moved["time"]
-    order = np.argsort(known, kind="stable")
-    newest = np.maximum.accumulate(order)
-    rows = np.searchsorted(known[order], time[:-1] + 1e-12, "right") - 1
-    held = force[newest[np.maximum(rows, 0)]]
-    done = np.concatenate([[0.0], (held * np.diff(x, axis=0)).sum(axis=1).cumsum()])
-    return np.interp(times, time, done)
-
-
-def ideal(force: Vector, stamps: Vector, moved: Table, position: str, times: Vector) -> Vector:
-    """The work (J) of forces (n, 3) that are linear in the displacement between their stamps."""
-    x, time = moved[position], moved["time"]
-    at_stamps = np.stack([np.interp(stamps, time, column) for column in x.T], axis=1)
-    mean = (force[:-1] + force[1:]) / 2
-    done = np.concatenate([[0.0], (mean * np.diff(at_stamps, axis=0)).sum(axis=1).cumsum()])
-    return np.interp(times, stamps, done)

@@ -12,7 +12,7 @@ from hapticlink.analysis.findings import friction_speed
 from hapticlink.analysis.findings.deadlines import finding
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
-from hapticlink.analysis.findings.tracking import folded, of_block
+from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.analysis.findings.user_port import pushed_by_others
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.base.loop_names import (
@@ -70,13 +70,17 @@ def warnings(results: Results) -> Sequence[str]:
     return [*lines(results)] if recorded is None else recorded
 
 
-def told(results: Results, name: str) -> Iterator[str]:
-    """The lines that `hapticlink run` and `print` show of a run: how it ended, its numbers,
-    warnings, time and files."""
+def told(results: Results, name: str, known: Sequence[str] = ()) -> Iterator[str]:
+    """The lines that `hapticlink run` and `print` show of a run: how it ended, its numbers (those
+    that are `known`), warnings, time and files."""
     yield f"{name}: {ending(results)}"
     recorded = warnings(results)
     doubtful = [line for line in recorded if line.startswith("warning: ")]
-    for line in (*doubtful, *numbers(results), *(r for r in recorded if r not in doubtful)):
+    for line in (
+        *doubtful,
+        *(known or numbers(results)),
+        *(r for r in recorded if r not in doubtful),
+    ):
         yield f"  {line}"
     record = results.record
     if record.timings.run and record.end.time:  # a signal may come before the first event
@@ -87,20 +91,19 @@ def told(results: Results, name: str) -> Iterator[str]:
         yield f"  {results.folder}/: {', '.join(files)}"
 
 
-def numbers(results: Results) -> Iterator[str]:
+def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]:
     """What one would open the figures for: tracking error, largest forces, energies, closure of the
-    loops."""
-    measures = Measures(results)
+    loops. measures: those of the results, if they are there."""
+    measures = measures or Measures(results)
     for user, error in measures.tracking.items():
         yield _tracking(user, error)
-        margin = signal_of_user(WORKSPACE_MARGIN, user)
-        if user and (table := of_block(results, margin)) and table[margin].min() < 0:
+        if user and _left(results, signal_of_user(WORKSPACE_MARGIN, user)):
             yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
     if measures.forces:
         peaks = (f"{name} {short(force)} N" for name, force in measures.forces.items())
         yield f"largest forces: {'; '.join(peaks)}"
-        yield from _saturated(results)
-    if port := results.record.user_port:
+        yield from _saturated(measures)
+    if port := measures.port:
         yield _energy(port)
     for name, energy in results.record.across.items():
         if max(energy.peak, abs(energy.generated)) >= SMALLEST_J:
@@ -110,6 +113,11 @@ def numbers(results: Results) -> Iterator[str]:
             )
     if measures.closure_m is not None:
         yield f"loops close within {measures.closure_m:.2g} m"
+
+
+def _left(results: Results, margin: str) -> bool:
+    tables = (of_block(window, margin) for window in results.windows())
+    return any(bool((table[margin] < 0).any()) for table in tables if table)
 
 
 def _tracking(user: str, error: TrackingError) -> str:
@@ -135,22 +143,20 @@ def _energy(port: PortEnergy) -> str:
     )
 
 
-def _saturated(results: Results) -> Iterator[str]:
+def _saturated(measures: Measures) -> Iterator[str]:
     """A line for each user whose motors were at their torque limit, and for how long."""
-    from hapticlink.analysis.findings.episodes import saturations
-
-    for said, spans in groupby(saturations(results), key=lambda episode: episode.said):
+    for said, spans in groupby(measures.saturations, key=lambda episode: episode.said):
         seconds = sum(span.end - span.begin for span in spans)
         yield f"{said} for {short(seconds)} s: the hand felt less than the controller asked for"
 
 
-def lines(results: Results) -> Iterator[str]:
+def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     """One line for each warning, which begins so, and for each note: start poses, folded copy,
     signals that are not recorded, held outputs, repeated steps, contacts, convergence, lost
     samples, stability, and holds that did not fit."""
-    record = results.record
+    record, measures = results.record, measures or Measures(results)
     yield from _start(results)
-    off, frames = folded(results)
+    off, frames = measures.folded
     if off:
         yield (
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
@@ -167,7 +173,7 @@ def lines(results: Results) -> Iterator[str]:
         yield f"no energy at the user's port: {name} is not the force of the handle's own hand"
     yield from _steps(record)
     yield from friction_speed.coarse(results)
-    yield from _passivity(results)
+    yield from _passivity(results, measures)
     yield from _stopped(results)
     yield from _contacts(results)
     for name, link in record.links.items():
@@ -207,17 +213,18 @@ def _refused_holds(record: RunRecord) -> Iterator[str]:
         yield f"zoh instead of the default hold {hold} for {targets}: {'; '.join(reasons)}"
 
 
-def _passivity(results: Results) -> Iterator[str]:
+def _passivity(results: Results, measures: Measures) -> Iterator[str]:
     # casadi, for the torques of motors, which most of the terminal's lines can do without
     from hapticlink.analysis.findings import passivity_warnings
 
-    yield from passivity_warnings.lines(results)
+    yield from passivity_warnings.lines(results, measures)
 
 
 def _stopped(results: Results) -> Iterator[str]:
     """A line if the passive midpoint method had to stop the mechanism, and one if contacts change
     its energy between steps."""
-    table = of_block(results, MECHANISM_STOPS)
+    *_, last = results.windows()
+    table = of_block(last, MECHANISM_STOPS)
     if table and (results.record.scene["contacts"] or {}).get("detection") == "graphics":
         method = results.record.scene["mechanism"]["integrator"]
         yield (
@@ -326,7 +333,8 @@ def replaced(replacements: Mapping[str, Replacement]) -> Iterator[str]:
             yield f"{name}: inputs that nothing feeds: {', '.join(unfed)}"
 
 
-def _start(results: Results) -> Iterator[str]:
+def _start(run: Results) -> Iterator[str]:
+    results = next(run.windows())
     device = of_block(results, WORKSPACE_MARGIN)
     if (
         device

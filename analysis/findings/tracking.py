@@ -3,6 +3,7 @@ graphics copy is folded."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -29,8 +30,9 @@ class Tracking(NamedTuple):
 
 def further_users(results: Results) -> list[str]:
     """The points at which users beside the first one hold a device."""
-    users = (user_of_block(name, DEVICE) for name in results.record.fmus)
-    return [u for u in users if u and all(of_block(results, signal, 3) for signal in poses(u))]
+    users = [u for name in results.record.fmus if (u := user_of_block(name, DEVICE))]
+    first = next(results.windows()) if users else results
+    return [u for u in users if all(of_block(first, signal, 3) for signal in poses(u))]
 
 
 def poses(user: str = "") -> tuple[str, str]:
@@ -64,21 +66,28 @@ def has_tracking(results: Results) -> bool:
 
 
 def pose_error(results: Results, user: str = "") -> Tracking:
-    """Tracking error of a user at the mechanism's samples up to the device's last one; the handle's
-    pose is interpolated linearly where its clock differs. Raises KeyError without these signals."""
+    """Tracking error of a user at the mechanism's samples up to the device's last one, those of a
+    window; the handle's pose is interpolated linearly where its clock differs. Raises KeyError
+    without these signals."""
     point, handle = poses(user)
     mechanism, device = of_block(results, point, 3), of_block(results, handle, 3)
     if mechanism is None or device is None:
         raise KeyError(f"tracking needs the signals {point} and {handle}")
     if not len(device["time"]):  # a fault before the first row
         return Tracking(*np.zeros((3, 0)))
-    time = mechanism["time"]
-    time = time[time <= device["time"][-1]]
+    rows = until_last(results.within(mechanism["time"]), mechanism, device)
+    time = mechanism["time"][rows]
     x, y, theta = (
-        mechanism[point][: len(time), i] - np.interp(time, device["time"], device[handle][:, i])
+        mechanism[point][rows, i] - np.interp(time, device["time"], device[handle][:, i])
         for i in range(3)
     )
     return Tracking(time, np.hypot(x, y) * 1e3, np.abs(theta))
+
+
+def until_last(rows: slice, table: Table, other: Table) -> slice:
+    """Rows of a table up to the last one of another."""
+    last = int(np.searchsorted(table["time"], other["time"][-1], "right"))
+    return slice(rows.start, max(rows.start, min(rows.stop, last)))
 
 
 def tracking(results: Results) -> tuple[Vector, Vector]:
@@ -97,10 +106,24 @@ def constrained(results: Results) -> tuple[Table, str] | None:
     return None
 
 
+def constraint_counts(windows: Iterable[Results]) -> dict[float, int]:
+    """The samples with each number of constrained directions, by number."""
+    found: dict[float, int] = {}
+    for window in windows:
+        if counted := constrained(window):
+            table, signal = counted
+            numbers = table[signal][window.within(table["time"])]
+            for number, samples in zip(*np.unique(numbers, return_counts=True), strict=True):
+                found[float(number)] = found.get(float(number), 0) + int(samples)
+    return dict(sorted(found.items()))
+
+
 def folded(results: Results) -> tuple[int, int]:
     """Number of frames in which the graphics copy is on another assembly of its loops than the
     mechanism, and number of all frames; (0, 0) if the run has no such output."""
-    table = of_block(results, COPY_BRANCH_OK)
-    if table is None:
-        return 0, 0
-    return int((table[COPY_BRANCH_OK] == 0).sum()), len(table[COPY_BRANCH_OK])
+    off = frames = 0
+    for window in results.windows():
+        if (table := of_block(window, COPY_BRANCH_OK)) is not None:
+            kept = table[COPY_BRANCH_OK][window.within(table["time"])]
+            off, frames = off + int((kept == 0).sum()), frames + len(kept)
+    return off, frames

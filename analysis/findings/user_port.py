@@ -19,22 +19,20 @@ mobility modulates power. It needs the mechanism's own (`mechanism.directions`) 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.port_blocks import (
-    by_block,
-    ideal,
-    needed,
-    work,
-    works,
-)
+from hapticlink.analysis.findings.port_blocks import by_block, needed
 from hapticlink.analysis.findings.tracking import (
     further_users,
     of_block,
     table_of,
+    until_last,
 )
+from hapticlink.analysis.findings.works import Works
 from hapticlink.orchestrator.base.loop_names import (
     CONTROLLER,
     DEVICE,
@@ -47,7 +45,6 @@ from hapticlink.orchestrator.base.loop_names import (
     MECHANISM_ENERGY,
     MOBILITIES,
     MOTOR_WRENCH,
-    POINT_POSE,
     TOPOLOGY_WRENCH,
     block_of_user,
     signal_of_user,
@@ -58,7 +55,8 @@ from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 class UserPort(NamedTuple):
     """Work of the hands and energy generated (J) at times (s), the mechanism's samples; that of
-    each block, of which the latter is the sum; and the works of single wrenches at the end (J)."""
+    each block, of which the latter is the sum; and the works of single wrenches at the last of them
+    (J), by name."""
 
     time_s: Vector
     put_in_J: Vector
@@ -82,45 +80,100 @@ class UserPort(NamedTuple):
         )
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
 def user_port(results: Results) -> UserPort | None:
-    """The energy at the user's port; None without hand, handle and mechanism, where something else
-    than its hand pushes a handle, or where the work of another hand is not recorded. Without all
-    signals that its blocks need there are none."""
-    mechanism, device = of_block(results, MECHANISM_ENERGY), of_block(results, HANDLE_POSE, 3)
-    if mechanism is None or device is None or of_block(results, HAND_WRENCH, 3) is None:
+    """The energy at the user's port in the whole run, as `ports`."""
+    found = [port for port in ports(results) if port]
+    if len(found) < 2:
+        return found[0] if found else None
+    *_, last = found
+    return UserPort(
+        np.concatenate([port.time_s for port in found]),
+        np.concatenate([port.put_in_J for port in found]),
+        np.concatenate([port.generated_J for port in found]),
+        {name: np.concatenate([p.blocks_J[name] for p in found]) for name in last.blocks_J},
+        last.works,
+    )
+
+
+def measured(windows: Iterable[UserPort | None]) -> PortEnergy | None:
+    """What run.json says of the energy at the user's port, of the windows of a run."""
+    found: PortEnergy | None = None
+    for port in windows:
+        if port and len(port.time_s):
+            now = port.measured
+            found = now if found is None else _later(found, now)
+    return found
+
+
+def _later(before: PortEnergy, now: PortEnergy) -> PortEnergy:
+    """Of two windows that follow each other."""
+    highest = max(before, now, key=lambda each: each.peak)
+    return replace(
+        now,
+        peak=highest.peak,
+        time_of_peak=highest.time_of_peak,
+        blocks={
+            name: replace(block, peak=max(block.peak, before.blocks[name].peak))
+            for name, block in now.blocks.items()
+        },
+    )
+
+
+def ports(results: Results) -> Iterator[UserPort | None]:
+    """The energy at the user's port, window by window; None without hand, handle and mechanism,
+    where something else than its hand pushes a handle, or where the work of another hand is not
+    recorded. Without all signals that its blocks need there are none."""
+    works, start = Works(), 0.0
+    for i, window in enumerate(results.windows()):
+        start = _energy_at_start(window) if i == 0 else start
+        if _port(window, works, start) is None:
+            yield from (None for _ in results.windows())
+            return
+    works.again()
+    for window in results.windows():
+        yield _port(window, works, start)
+
+
+def _energy_at_start(window: Results) -> float:
+    mechanism = of_block(window, MECHANISM_ENERGY)
+    first = mechanism[MECHANISM_ENERGY][:1] if mechanism else ()
+    return float(first[0]) if len(first) else 0.0
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
+def _port(window: Results, works: Works, start: float) -> UserPort | None:
+    mechanism, device = of_block(window, MECHANISM_ENERGY), of_block(window, HANDLE_POSE, 3)
+    if mechanism is None or device is None or of_block(window, HAND_WRENCH, 3) is None:
         return None
-    if pushed_by_others(results) or not (len(device["time"]) and len(mechanism["time"])):
+    if pushed_by_others(window) or not (len(device["time"]) and len(mechanism["time"])):
         return None
-    time = mechanism["time"]
-    time = time[time <= device["time"][-1]]
-    energy = mechanism[MECHANISM_ENERGY][: len(time)]
-    stored = energy - energy[0]
-    put_in = {"": works(results, HAND_WRENCH, HANDLE_POSE, time)[0]}
+    rows = until_last(window.within(mechanism["time"]), mechanism, device)
+    time = mechanism["time"][rows]
+    stored = mechanism[MECHANISM_ENERGY][rows] - start
+    put_in = {"": works.of(window, HAND_WRENCH, HANDLE_POSE, time)[0]}
     further = np.zeros(len(time))
-    for name in results.record.connections:
+    for name in window.record.connections:
         hand, _, target = name.partition(" -> ")
         point = target.removesuffix(".F_hand").removeprefix(f"{MECHANISM}.")
         if target != f"{MECHANISM}.{point}.F_hand":
             continue
-        if with_device := block_of_user(DEVICE, point) in results.record.fmus:
+        if with_device := block_of_user(DEVICE, point) in window.record.fmus:
             hand, position = signal_of_user(HAND_WRENCH, point), signal_of_user(HANDLE_POSE, point)
         else:
             position = f"{MECHANISM}.{point}.x"
-        moved, pushing = of_block(results, position, 3), table_of(results, hand)
+        moved, pushing = of_block(window, position, 3), table_of(window, hand)
         if moved is None or pushing is None or pushing[hand].shape[1:] != (3,):
             return None
-        done = works(results, hand, position, time)[0]
+        done = works.of(window, hand, position, time)[0]
         if with_device:
             put_in[point] = done
         else:
             further += done
     generated = stored - further - sum(put_in.values())
-    lacks = needed(results, put_in) & {*results.record.not_recorded}
-    blocks = {} if lacks else by_block(results, time, stored - further, put_in)
-    return UserPort(
-        time, further + sum(put_in.values()), generated, blocks, _works(results, device, time)
-    )
+    lacks = needed(window, put_in) & {*window.record.not_recorded}
+    blocks = {} if lacks else by_block(window, works, time, stored - further, put_in)
+    hands = further + sum(put_in.values())
+    return UserPort(time, hands, generated, blocks, _works(window, works, device, time))
 
 
 def pushed_by_others(results: Results) -> list[str]:
@@ -134,28 +187,31 @@ def pushed_by_others(results: Results) -> list[str]:
     ]
 
 
-def _works(results: Results, device: Table, time: Vector) -> dict[str, float]:
-    """The works (J) of single wrenches on the handles, those of further users named by their
-    points, and of contacts on the mechanism."""
+def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[str, float]:
+    """The works (J) of single wrenches on the handles at the last of the times of a window, those
+    of further users named by their points, and of contacts on the mechanism."""
     signals = {
         "hand": HAND_WRENCH,
         "motors": MOTOR_WRENCH,
         "F_T": TOPOLOGY_WRENCH,
         "F_env": ENVIRONMENT_WRENCH,
     }
-    joules = {
-        f"{user}: {name}" if user else name: float(works(results, signal_name, handle, time)[0][-1])
+    found = {
+        f"{user}: {name}" if user else name: _last(works.of(results, signal_name, handle, time)[0])
         for user in ("", *further_users(results))
         for name, signal in signals.items()
         if of_block(results, signal_name := signal_of_user(signal, user), 3)
         and of_block(results, handle := signal_of_user(HANDLE_POSE, user), 3)
     }
     if contact := of_block(results, ENVIRONMENT_WRENCH, 3):
-        on = ideal(contact[ENVIRONMENT_WRENCH], contact["time"], contact, POINT_POSE, time)
-        joules["F_env on the mechanism"] = float(on[-1])
+        found["F_env on the mechanism"] = _last(works.ideal(results, contact, time))
     if (added := _held_mobility(results, device)) is not None:
-        joules["held mobility"] = float(work(added, device["time"], device, HANDLE_POSE, time)[-1])
-    return joules
+        found["held mobility"] = _last(works.added(results, added, device, time))
+    return found
+
+
+def _last(work: Vector) -> float:
+    return float(work[-1]) if len(work) else 0.0
 
 
 def _held_mobility(results: Results, device: Table) -> Vector | None:

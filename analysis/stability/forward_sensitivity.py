@@ -60,6 +60,8 @@ KINK = 1e-3
 SMALL = 1e-3
 """Columns of smaller slopes, in which the rounding of differences would pass for a kink, count as
 of this size."""
+NEARBY = 1e-2
+"""That of a hold on the way to an equilibrium: holds are linear, but for those on manifolds."""
 SAME = 1e-8
 """Largest difference of numbers, relative to max(1, |z|), at which slopes are the same."""
 
@@ -151,7 +153,8 @@ class ForwardSensitivity:
             return self._applied[key]
         owners = tuple(o for o in reach.state.owners if o != SIGNALS)
         before = reach.state.sizes()
-        found, after = self._slopes(tick, operation, call, reach, SAME)
+        of_fmu = isinstance(operation, Get | Set | Step)
+        found, after = self._slopes(tick, operation, call, reach, SAME if of_fmu else NEARBY)
         self._tell(operation, reach, found)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
         self._applied[key] = made = Applied(

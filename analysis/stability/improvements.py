@@ -32,7 +32,7 @@ FINE = 0.1
 """Of the logarithm of the factor on all stiffnesses."""
 FINEST = 2
 """Of a count, the part to which it is found."""
-LATEST, SLOWEST = 16, 32
+LATEST, SLOWEST = 8, 32
 """Haptic periods up to which a further delay, and a frame, are tried."""
 HOLDS = ("zoh", "foh", "lead", "mean")
 """That are tried as a remedy."""
@@ -42,7 +42,7 @@ DAMPINGS = (0.5, 2.0)
 """Factors on the damping of the coupling that are tried."""
 FASTER = (2, 4)
 """Factors on rates that are tried."""
-TRIED = 4
+TRIED = 2
 """Remedies that are judged in all poses."""
 
 
@@ -213,10 +213,8 @@ class _Search:
 
 
 def _worst(found: Sequence[Case]) -> float:
-    """The largest growth rate of the cases that do not only drift; marginal ones count as 0."""
-    rates = [
-        0.0 if case.verdict == "marginal" else case.growth for case in found if not case.drifts
-    ]
+    """The largest growth rate of the cases that do not only drift, and are not marginal."""
+    rates = [case.growth for case in found if case.verdict != "marginal" and not case.drifts]
     return max(rates, default=-float("inf"))
 
 

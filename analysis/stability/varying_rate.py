@@ -19,9 +19,7 @@ from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.lifted_map import behind_start, lifted_map
 from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.switching import (
-    Bounds,
     Edge,
-    joint_spectral_radius,
     lyapunov,
     mean_square,
 )
@@ -49,10 +47,6 @@ class VaryingStability:
     """The periods that may occur (ticks)."""
     tick: float
     """(s)"""
-    bounds: Bounds
-    """Of the joint spectral radius, per frame."""
-    worst: tuple[int, ...]
-    """The periods of the sequence that grows fastest (ticks)."""
     second_moment: float
     """The spectral radius of the map of second moments, per frame."""
     exponent: float
@@ -62,13 +56,6 @@ class VaryingStability:
     seed: int
     frozen: tuple[str, ...]
     """Lines of text on what is removed or stays as at the equilibrium."""
-
-    @property
-    def any_sequence(self) -> str:
-        """stable, unstable, or undecided where the bounds of the joint spectral radius hold 1."""
-        if self.bounds.upper < 1.0:
-            return "stable"
-        return "unstable" if self.bounds.lower > 1.0 else "undecided"
 
     @property
     def mean_square(self) -> str:
@@ -93,9 +80,6 @@ class VaryingStability:
             "verdict": self.verdict,
             "frames": list(self.frames),
             "tick": self.tick,
-            "joint_spectral_radius": [self.bounds.lower, self.bounds.upper],
-            "fastest_sequence": list(self.worst),
-            "any_sequence": self.any_sequence,
             "second_moment_radius": self.second_moment,
             "mean_square": self.mean_square,
             "lyapunov_exponent": self.exponent,
@@ -108,11 +92,6 @@ class VaryingStability:
     def lines(self) -> Iterator[str]:
         """The result as text."""
         yield f"the period varies: {self.frames[0]} to {self.frames[-1]} ticks of {self.tick:.6g} s"
-        yield (
-            f"any sequence: {self.any_sequence}; joint spectral radius a frame "
-            f"{self.bounds.lower:.6g} to {self.bounds.upper:.6g}, fastest by frames of "
-            f"{', '.join(map(str, self.worst))} ticks"
-        )
         yield (
             f"mean square: {self.mean_square}; second moments times {self.second_moment:.6g} a "
             "frame"
@@ -131,11 +110,9 @@ def varies(scene: Scene) -> bool:
     return any(isinstance(pace.rate, VariableRate) for pace in clocks(scene).paces.values())
 
 
-def varying_stability(
-    scene: str | Path | Scene, options: Options = (), *, products: int = 20_000
-) -> VaryingStability:
+def varying_stability(scene: str | Path | Scene, options: Options = ()) -> VaryingStability:
     """The stability of a scene in which one rate is drawn between bounds and all others are the
-    haptic one. `products`: the most that the joint spectral radius takes.
+    haptic one.
 
     Raises InputFault for a scene without an equilibrium, with further rates, and where holds reach
     back by more than two frames.
@@ -147,15 +124,12 @@ def varying_stability(
         # All that may be drawn, not only what this run draws.
         low, high = bounds(exact(rate.min), exact(rate.max), system.timeline.base)
         lengths, seed = range(low, high + 1), rate.seed
-        edges, names = edges_of(read, system, place, list(lengths))
-    growth = joint_spectral_radius(edges, 1e-4, products)
+        edges = edges_of(read, system, place, list(lengths))
     exponent, width = lyapunov(edges, seed)
     return VaryingStability(
         title=read.title,
         frames=tuple(lengths),
         tick=float(system.timeline.base),
-        bounds=growth,
-        worst=tuple(names[i] for i in growth.worst),
         second_moment=mean_square(edges),
         exponent=exponent,
         confidence=width,
@@ -178,11 +152,8 @@ def _clock(system: System) -> int:
     return found[0]
 
 
-def edges_of(
-    scene: Scene | None, system: System, place: int, lengths: list[int]
-) -> tuple[list[Edge], list[int]]:
-    """The matrices of frames of the clock at `place`, of equally probable lengths (ticks), and the
-    length of each."""
+def edges_of(scene: Scene | None, system: System, place: int, lengths: list[int]) -> list[Edge]:
+    """The matrices of frames of the clock at `place`, of equally probable lengths (ticks)."""
     middle = lengths[len(lengths) // 2]
     seconds = system.timeline.seconds
     with lifted_map(alternating(system, place, middle, middle), 0.0, scene) as map_:
@@ -206,13 +177,12 @@ def edges_of(
     acting = np.any([A.any(axis=0) for A in made.values()], axis=0)
     still = np.all([(np.eye(len(A)) == A).all(axis=1) for A in made.values()], axis=0)
     kept = np.flatnonzero(acting & ~still)
-    edges, names = [], []
+    edges = []
     for (p, n), A in made.items():
         A = A[np.ix_(kept, kept)]
         ends = n if remembers else middle
         edges.append(Edge(p, ends, A, 1 / len(lengths), seconds(n)))
-        names.append(n)
-    return edges, names
+    return edges
 
 
 def _close(A: Matrix, B: Matrix) -> bool:

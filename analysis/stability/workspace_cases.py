@@ -26,6 +26,8 @@ from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, user_of_bl
 from hapticlink.orchestrator.scene.scene import Scene
 
 SHARES = 3
+SLIGHT = 0.01
+"""Growth rate (1/s) of a marginal case, which takes more than a minute to double."""
 DAMPINGS = 2.0 ** np.arange(-4, 7)
 """Of a free handle (N.s/m), that are tried."""
 CALMED = 0.1
@@ -92,19 +94,18 @@ class AtRest:
         self._users = [name for name in names if user_of_block(name, HAND) is not None]
 
     def worst(self, hands: Mapping[str, Hand], bounds: Bounds) -> float:
-        """The largest growth rate (1/s) in all hands, 0 where one is marginal, or the first one
-        that is positive; drifts do not count."""
+        """The largest growth rate (1/s) in all hands, or the first one that is positive;
+        drifts and marginal ones do not count."""
         largest = -np.inf
         for hand in hands.values():
             mode, period = self._leading(hand)
             growth = mode.growth
-            said = verdict(abs(mode.z), mode.uncertainty)
-            if said == "unstable":
+            if self._said(mode) == "unstable":
                 hertz = period.traced(mode).omega / (2 * np.pi)
                 if kind(growth, hertz, bounds) != "drift":
                     return growth
-            elif growth > largest:
-                largest = 0.0 if said == "marginal" else growth
+            else:
+                largest = max(largest, min(growth, -SLIGHT))
         return largest
 
     def cases(self, pose: str, hands: Mapping[str, Hand], bounds: Bounds) -> list[Case]:
@@ -113,7 +114,7 @@ class AtRest:
 
     def _case(self, pose: str, name: str, hand: Hand, bounds: Bounds) -> Case:
         mode, period = self._leading(hand)
-        said = verdict(abs(mode.z), mode.uncertainty)
+        said = self._said(mode)
         mode = period.traced(mode)
         hertz = mode.omega / (2 * np.pi)
         uncertainty = float(min(mode.uncertainty, 1.0)) / self._seconds
@@ -127,6 +128,10 @@ class AtRest:
     def _leading(self, hand: Hand) -> tuple[Mode, LinearPeriod]:
         period = self._period.held(dict.fromkeys(self._users, hand_slopes(hand, self._T)))
         return counted(modes(period.linear, self._seconds))[0], period
+
+    def _said(self, mode: Mode) -> str:
+        slight = np.expm1(SLIGHT * self._seconds)
+        return verdict(abs(mode.z), max(mode.uncertainty, slight))
 
     def _damping(self) -> float:
         """The least damping of a free handle with which it comes to rest."""

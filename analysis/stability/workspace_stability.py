@@ -1,8 +1,8 @@
 """The stability of a scene over its workspace and in hands: the one answer of `stability`.
 
-The linearised sampled-data map is judged in poses that the scene's own run visits within SPAN, held
-by a family of hands, the scene's own among them, and free where that has no stiffness; it depends on
-neither the duration of the scene nor on an equilibrium that a search finds.
+The linearised sampled-data map is judged in poses that the scene's own run visits within SPAN,
+held by a family of hands, the scene's own among them, and free where that has no stiffness; it
+depends on neither the duration of the scene nor on an equilibrium that a search finds.
 A constant wrench is judged where it would come to rest, too.
 """
 
@@ -32,7 +32,7 @@ from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
-POSES, SPAN = 4, 3.0
+POSES, SPAN = 3, 3.0
 """Poses, evenly spaced in the first seconds of the scene's run."""
 SETTLING, CALM = 10.0, 0.2
 """Time (s) in which a constant wrench takes a damped handle near rest, and its last part, over

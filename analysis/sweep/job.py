@@ -47,7 +47,6 @@ def jobs(
     """
     checked = []
     for point in points:
-        interrupt.check()  # 100,000 points take minutes
         checked.append(job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point))
     if checked and all(one.scene is None for one in checked):
         raise InputFault(checked[0].refusal)
@@ -55,7 +54,9 @@ def jobs(
 
 
 def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, str]) -> Job:
-    """The job of `scene` with `options`, listed in the table as `point`."""
+    """The job of `scene` with `options`, listed in the table as `point`. Raises Interrupted for a
+    signal."""
+    interrupt.check()  # 100,000 points take minutes
     try:
         loaded = open_scene.load(scene, options)
         return Job(point, loaded, key(loaded), plugins=tuple(plugins.loaded()))

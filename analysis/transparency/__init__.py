@@ -162,7 +162,7 @@ def transparency(
     linkage = _linkage(read)
     found, why = [], ""
     given = tuple(options)
-    for pose in evenly_spaced(simulated(scene, given), linkage, count):  # type: ignore[arg-type]
+    for pose in evenly_spaced(simulated(scene, given), linkage, count):
         try:
             found.append(at_pose(scene, pose.options(whole_frames(read, given)), pose.name))
         except (InputFault, FmuFault) as fault:
@@ -196,7 +196,8 @@ def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Tr
     moves = values > CONSTRAINED * values[-1]
     E, P = vectors[:, moves], vectors[:, ~moves].T
     X = S @ X @ S
-    M = -np.linalg.inv(E.T @ X @ E) / (w * w)[:, None, None]
+    solved = np.linalg.inv(E.T @ X @ E)
+    M = np.asarray(-solved / (w * w)[:, None, None], np.complex128)
     free = [
         _direction(E[:, i], M[:, :, i], i, 1.0 / value) for i, value in enumerate(values[moves])
     ]
@@ -229,7 +230,7 @@ def costs(
 ) -> Iterator[tuple[str, Transparency]]:
     """How the scene feels at its start with other rates, delays and holds, by what is changed."""
     read, given = open_scene.load(scene, options), tuple(options)
-    pose = evenly_spaced(simulated(scene, given), _linkage(read), 1)[0]  # type: ignore[arg-type]
+    pose = evenly_spaced(simulated(scene, given), _linkage(read), 1)[0]
     rate = exact(read.haptics.rate)
     changes: dict[str, dict[str, object]] = {
         "as it is": {},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -20,6 +21,7 @@ def numbers(device: Device) -> dict[str, Any]:
     return {k: v for k, v in asdict(device).items() if isinstance(v, float | int)}
 
 
+@cache
 def torque_function(device: Device) -> ca.Function:
     """Torques (N.m), (4,), of a wrench (N, N, N.m) at a pose (m, m, rad) of the handle, both (3,),
     as the device's motors give them: of least norm, and limited."""

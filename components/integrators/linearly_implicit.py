@@ -65,7 +65,7 @@ class LinearlyImplicit(Integrator):
         return x + h * (1.5 * k1 + 0.5 * k2)
 
 
-def _alone(J: ca.SX, first: int) -> list[int]:
+def _alone(J: ca.SX | ca.DM, first: int) -> list[int]:
     """The states from `first` on whose rates depend, of these, on themselves alone, as those of
     springs that slip do: such rates fall with their state, so that 1 - gamma h J is 1 or more."""
     import casadi as ca
@@ -86,7 +86,8 @@ def _solver(A: ca.SX, alone: list[int]) -> Callable[[ca.SX], ca.SX]:
     own = ca.vertcat(ca.SX(0, 1), *(A[i, i] for i in alone))
     back = A[alone, others] / ca.repmat(own, 1, len(others))
     # QR needs no pivoting and hence no branch.
-    factors = ca.qr(ca.densify(A[others, others] - A[others, alone] @ back))
+    reduced: ca.SX = A[others, others] - A[others, alone] @ back
+    factors = ca.qr(ca.densify(reduced))
 
     def solved(b: ca.SX) -> ca.SX:
         x, of_own = ca.SX(b.numel(), 1), b[alone, 0] / own

@@ -333,6 +333,6 @@ class InProcess(WithStates):
             if self.place.altered:
                 said = "%s changed how this process rounds numbers, in %d calls; it is restored"
                 logging.getLogger(__name__).warning(said, self.name, self.place.altered)
-            # pythonfmu puts resources/ on sys.path for good.
-            sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]
-            process_cache.leave(self._folder)
+            if self._folder and not process_cache.leave(self._folder):
+                # pythonfmu puts resources/ on sys.path for good.
+                sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import Diverged, Fault, FmuFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
@@ -44,7 +43,7 @@ class Instance(ABC):
         outputs: Vector,
         starts: Starts = (),
         policy: Faults | None = None,
-        folder: str | None = None,
+        folder: str = "",
     ) -> None:
         self.name, self.description, self.outputs = name, description, outputs
         self.starts, self.policy, self.held = starts, policy or Faults(), 0
@@ -55,7 +54,7 @@ class Instance(ABC):
         self.due = ctypes.c_int64(1)
         self._counted = False
         self.bounds = Bounds(description, outputs)
-        self._folder = folder or temporary_folders.new()
+        self._folder = folder
 
     def __enter__(self) -> Instance:
         try:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
@@ -43,6 +43,7 @@ class Isolated(Instance):
     def _load(self) -> None:
         self._pending: list[tuple[int, bytes]] = []
         self._saved_time: dict[int, float] = {}
+        self._folder = temporary_folders.new()
         self._process = Process("hapticlink.orchestrator.fmi.worker")
         self._process.interruptible = True
         what = (self.name, self.description, len(self.outputs), self.starts, self.policy)
@@ -205,5 +206,6 @@ class Isolated(Instance):
             self._process = None
             if process is not None:
                 process.end()
-            shutil.rmtree(self._folder, ignore_errors=True)
+            if self._folder:
+                shutil.rmtree(self._folder, ignore_errors=True)
         return self._lost

@@ -1,17 +1,19 @@
-"""What a process that runs many scenes keeps of their FMUs: descriptions, and those of this project
-unpacked. Files of others are unpacked for each run, which may write beside its resources."""
+"""What a process keeps of FMUs: descriptions, and those of this project unpacked, once for all
+instances of a file. Those of others are unpacked for each, which may write beside its resources."""
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 
 from fmpy import extract, platform
 
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.description import Description, describe
 
 MAX_UNPACKED = 32
@@ -19,7 +21,18 @@ MAX_UNPACKED = 32
 File = tuple[Path, int, int]
 """A path with time of change (ns) and size of what is there."""
 
-_folders: dict[File, str] | None = None
+
+@dataclass
+class Unpacked:
+    """A folder in which an FMU of this project is unpacked, and how many instances are open."""
+
+    folder: str
+    instances: int = 0
+
+
+_unpacked: dict[File, Unpacked] = {}
+_lock = Lock()
+_stay = False
 
 
 def described(path: Path) -> Description:
@@ -45,33 +58,44 @@ def _file(path: Path) -> File:
 @contextmanager
 def unpacked_once() -> Iterator[None]:
     """Within the context, FMUs of this project stay unpacked until `trim` drops them."""
-    global _folders
-    _folders = {}
+    global _stay
+    _stay = True
     try:
         yield
     finally:
         trim(0)
-        _folders = None
+        _stay = False
 
 
 def unpack(description: Description, folder: str) -> str:
-    """Unpacks an FMU into `folder`, which is empty; or removes that, and returns the folder in
-    which it is unpacked already."""
-    if description.block is None:
-        extract(description.path, folder)
-        return folder
-    if _folders is None:
-        extract(description.path, folder, _is_needed)
-        return folder
-    file = _file(description.path)
-    unpacked = _folders.pop(file, None)
-    if unpacked is None:
-        extract(description.path, folder, _is_needed)
-        unpacked = folder
-    else:
-        os.rmdir(folder)
-    _folders[file] = unpacked  # the newest
-    return unpacked
+    """The folder in which an FMU is unpacked: `folder`, which is empty, a new one if that is "", or
+    that of one of this project that is unpacked already.
+
+    So all its instances have one library: of each its own the code of 64 would fill the caches.
+    FMUs of others have a folder and a library each. What they keep in static variables would be
+    common to their instances, in silence, and that they may be instantiated several times in a
+    process (`canBeInstantiatedOnlyOncePerProcess`) is what they say where they say nothing.
+    """
+    own = description.block is not None
+    if folder or not own:
+        return _extracted(description.path, folder, own)
+    with _lock:
+        file = _file(description.path)
+        if (unpacked := _unpacked.pop(file, None)) is None:
+            unpacked = Unpacked(_extracted(description.path, "", own))
+        unpacked.instances += 1
+        _unpacked[file] = unpacked  # the newest
+        return unpacked.folder
+
+
+def _extracted(path: Path, folder: str, own: bool) -> str:
+    folder = folder or temporary_folders.new()
+    try:
+        extract(path, folder, _is_needed if own else None)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return folder
 
 
 def _is_needed(entry: str) -> bool:
@@ -80,15 +104,26 @@ def _is_needed(entry: str) -> bool:
     return entry.startswith(("modelDescription.xml", "resources/", f"binaries/{platform}/"))
 
 
-def leave(folder: str) -> None:
-    """Removes the folder of an FMU that is closed, unless it is kept."""
-    if _folders is None or folder not in _folders.values():
-        shutil.rmtree(folder, ignore_errors=True)
+def leave(folder: str) -> bool:
+    """One instance of those in a folder is closed; it is removed with the last one, unless it is
+    kept. Returns whether others are open."""
+    with _lock:
+        file, unpacked = next(
+            ((f, each) for f, each in _unpacked.items() if each.folder == folder), (None, None)
+        )
+        if file is None or unpacked is None:
+            shutil.rmtree(folder, ignore_errors=True)
+            return False
+        unpacked.instances -= 1
+        if not unpacked.instances and not _stay:
+            shutil.rmtree(_unpacked.pop(file).folder, ignore_errors=True)
+        return unpacked.instances > 0
 
 
 def trim(most: int = MAX_UNPACKED) -> None:
-    """Removes the folders that were used longest ago, so that `most` are left. No FMU may be open
-    in them."""
-    for file in list(_folders or ())[: max(len(_folders or ()) - most, 0)]:
-        assert _folders is not None
-        shutil.rmtree(_folders.pop(file), ignore_errors=True)
+    """Removes the folders that were used longest ago and in which no FMU is open, so that `most`
+    are left."""
+    with _lock:
+        closed = [file for file, each in _unpacked.items() if not each.instances]
+        for file in closed[: max(len(_unpacked) - most, 0)]:
+            shutil.rmtree(_unpacked.pop(file).folder, ignore_errors=True)

@@ -110,11 +110,15 @@ class Recorder:
             self._file = self.target.open("ab", buffering=0)
 
     def finish(self) -> None:
-        """Make the CSV of the rows, and remove these. Raises OSError, as on a full disk, and keeps
-        the rows."""
+        """Make the CSV of the rows, which stay. Raises OSError, as on a full disk."""
         if self._file and self.last is not None:
             self._file.close()
             make_csv(self.path)
+
+    def remove(self) -> None:
+        """Remove the rows."""
+        if self._file and self.last is not None:
+            remove_rows(self.path)
 
     @staticmethod
     def _beside(path: Path) -> Path:
@@ -147,8 +151,8 @@ class Recorder:
 
 
 def make_csv(path: Path) -> int:
-    """Make the CSV `path` of its rows, and remove these; the number of rows. Raises OSError, as on
-    a full disk, and keeps the rows."""
+    """Make the CSV `path` of its rows, which stay; their number. Raises OSError, as on a full
+    disk."""
     source = path.with_suffix(rows.SUFFIX)
     made = path.with_name(f".{path.name}.{os.getpid()}")
     made.unlink(missing_ok=True)
@@ -159,9 +163,13 @@ def make_csv(path: Path) -> int:
     except OSError:
         made.unlink(missing_ok=True)
         raise
-    for left in (source, *rows.blocks(path)):
-        left.unlink(missing_ok=True)
     return count
+
+
+def remove_rows(path: Path) -> None:
+    """Remove the rows of which the CSV `path` was made."""
+    for left in (path.with_suffix(rows.SUFFIX), *rows.blocks(path)):
+        left.unlink(missing_ok=True)
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -9,7 +9,8 @@ from hapticlink.orchestrator.results.tables import Results
 
 def last_time(results: Results) -> float:
     """The time (s) of the last row of the first table that has any."""
-    rows = (table["time"] for table in results.tables.values())
+    *_, last = results.windows()
+    rows = (table["time"] for table in last.tables.values())
     return next((float(times[-1]) for times in rows if len(times)), 0.0)
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folder_lock, json_file, rows
-from hapticlink.orchestrator.results.files import make_csv, write_json
+from hapticlink.orchestrator.results.files import make_csv, remove_rows, write_json
 from hapticlink.orchestrator.results.numbers import last_time
 from hapticlink.orchestrator.results.run_folder import RUN
 from hapticlink.orchestrator.results.tables import load
@@ -48,6 +48,7 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
             lost = rows.torn(source)
             _, kept = rows.read(source)
             recovered[name] = Recovered(make_csv(table), float(kept[-1, 0]), lost)
+            remove_rows(table)
     changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
     if record.end.process is not None:
         last = last_time(load(folder))  # its tables may be whole: an FMU may crash at its end

@@ -92,9 +92,22 @@ def write_csv(source: Path, target: BinaryIO) -> int:
 
 def read(path: Path) -> tuple[tuple[str, ...], Rows]:
     """The columns and the rows of a table; a row that is not whole is left out."""
+    columns, found = parts(path)
+    return columns, np.concatenate([np.zeros((0, len(columns))), *found])
+
+
+def parts(path: Path) -> tuple[tuple[str, ...], Iterator[Rows]]:
+    """The columns of a table, and its rows piece by piece."""
     with path.open("rb") as file:
         columns = _columns(file.readline(), path)
-    return columns, np.concatenate([np.zeros((0, len(columns))), *_parts(path)])
+    return columns, _parts(path)
+
+
+def count(path: Path) -> int:
+    """The number of rows of a table that are whole, without those of its blocks."""
+    with path.open("rb") as file:
+        line = file.readline()
+        return (os.fstat(file.fileno()).st_size - len(line)) // (8 * len(_columns(line, path)))
 
 
 def torn(path: Path) -> int:

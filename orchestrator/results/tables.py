@@ -30,12 +30,14 @@ class Table(Mapping[str, Vector]):
     `device.x[2]`, ... into (rows, n), those of a matrix into (rows, n, m), by their indices,
     whichever column comes first; entries with gaps between them into (rows, k). The full name of a
     column gives that column, (rows,). Raises KeyError for an unknown name. `others` are the tables
-    of the same run, for that message.
+    of the same run, for that message. Rows of a window begin with the `first` of `of` in all.
     """
 
     columns: tuple[str, ...]
     rows: Vector
     others: Mapping[str, Table] = field(default_factory=dict)
+    first: int = 0
+    of: int | None = None
 
     def __getitem__(self, name: str) -> Vector:
         if name in self.columns:
@@ -66,6 +68,11 @@ class Table(Mapping[str, Vector]):
     def __len__(self) -> int:
         return len(self.columns)
 
+    @property
+    def total(self) -> int:
+        """The number of rows of the whole run."""
+        return len(self.rows) if self.of is None else self.of
+
     def __repr__(self) -> str:
         return fill(f"{len(self.rows)} rows of {', '.join(self.signals)}", 100)
 
@@ -88,11 +95,31 @@ def _shape(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
 @dataclass(frozen=True, eq=False)
 class Results:
     """The results of a run: `run` is run.json, `tables` the CSVs by rate; `folder` is None if it
-    was run in memory."""
+    was run in memory. Where they are a window of the run, the rows of `begin` < time <= `end` (s)
+    are meant, and those beside them are for interpolation."""
 
     folder: Path | None
     run: dict[str, Any]
-    tables: dict[str, Table]
+    tables: Mapping[str, Table]
+    begin: float = -math.inf
+    end: float = math.inf
+
+    @property
+    def number(self) -> int:
+        """The number of `windows`."""
+        return 1
+
+    def windows(self) -> Iterator[Results]:
+        """The windows of time that follow each other, of which these results consist: themselves,
+        but of a run that is too long to be read at once."""
+        yield self
+
+    def within(self, times: Vector) -> slice:
+        """The rows of ordered times (s) that are meant."""
+        return slice(
+            int(np.searchsorted(times, self.begin, "right")),
+            int(np.searchsorted(times, self.end, "right")),
+        )
 
     @cached_property
     def record(self) -> RunRecord:
@@ -111,20 +138,22 @@ class Results:
         return self.tables["graphics"]
 
 
-def size(folder: Path, run: Mapping[str, Any]) -> int:
-    """Bytes of a run's tables."""
-    return sum(_place(folder / n).stat().st_size for n in run["files"] if n.endswith(TABLES))
+def size(folder: Path, run: Mapping[str, Any], binary: bool = False) -> int:
+    """Bytes of a run's tables, `binary` where they are there so."""
+    tables = (folder / name for name in run["files"] if name.endswith(TABLES))
+    return sum(_place(path, binary).stat().st_size for path in tables)
 
 
-def _place(path: Path) -> Path:
-    """Where a table is: a CSV, or what it is made of where the run was killed."""
+def _place(path: Path, binary: bool = False) -> Path:
+    """Where a table is: a CSV, or what it is made of where the run was killed, or where that is
+    wanted (`binary`) and still there."""
     left = path.with_suffix(rows.SUFFIX)
-    return left if left.exists() and not path.exists() else path
+    return left if left.exists() and (binary or not path.exists()) else path
 
 
-def load(folder: Path | str) -> Results:
-    """Reads a run's folder. Raises InputFault if it contains no run, one of another version, or one
-    that was changed."""
+def load(folder: Path | str, binary: bool = False) -> Results:
+    """Reads a run's folder; `binary`: from the rows where they are still there. Raises InputFault
+    if it contains no run, one of another version, or one that was changed."""
     folder = Path(folder)
     tables: dict[str, Table] = {}
     try:
@@ -133,17 +162,29 @@ def load(folder: Path | str) -> Results:
         raise InputFault(f"{folder}: not the folder of a run: {error}") from error
     results = Results(folder, run, tables)
     for name in results.record.rates:
-        if any(name + suffix in results.record.files for suffix in TABLES):
-            tables[name] = read_table(folder / f"{name}.csv", tables)
-        else:  # nothing of it is recorded
-            tables[name] = Table(("time",), np.zeros((0, 1)), tables)
+        if recorded(name, results.record.files):
+            tables[name] = read_table(folder / f"{name}.csv", tables, binary)
+        else:
+            tables[name] = empty(tables)
     return results
 
 
-def read_table(path: Path, others: Mapping[str, Table] | None = None) -> Table:
+def recorded(rate: str, files: Sequence[str]) -> bool:
+    """Whether a rate has a table among the files of a run."""
+    return any(rate + suffix in files for suffix in TABLES)
+
+
+def empty(others: Mapping[str, Table]) -> Table:
+    """The table of a rate of which nothing is recorded."""
+    return Table(("time",), np.zeros((0, 1)), others)
+
+
+def read_table(
+    path: Path, others: Mapping[str, Table] | None = None, binary: bool = False
+) -> Table:
     """Reads one CSV of a run, or its rows where the run was killed; `others` are the run's other
     tables. Raises InputFault for a table that is not as a run writes it."""
-    if (place := _place(path)) != path:
+    if (place := _place(path, binary)) != path:
         _require_file(place)
         return Table(*rows.read(place), {} if others is None else others)
     _require_file(path)

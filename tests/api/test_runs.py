@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -56,14 +57,25 @@ def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
     assert folder.run["options"] == ["duration=0.1", "graphics.rate=40"]
 
 
-def test_tables_too_large_are_not_read_back_and_that_is_told(
-    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+def test_a_long_run_reads_no_table_back_and_tells_the_same(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("hapticlink.api.runs.MAX_TABLE_BYTES", 1000)
-    assert status("run", bar, "--out", tmp_path / "out") == 0
-    assert "tables of more than 1000 bytes are not read back and drawn" in caplog.text
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"haptics.csv", "run.json"}
-    assert len(hl.load(tmp_path / "out").haptics["time"]) == 129
+    """A run of many windows: its lines, run.json and figures, without a CSV that is read."""
+    told, runs = [], []
+    for name, size in (("short", 1 << 24), ("long", 2000)):
+        monkeypatch.setattr("hapticlink.orchestrator.results.windows.WINDOW_BYTES", size)
+        monkeypatch.setattr("numpy.loadtxt", lambda *_, **__: pytest.fail("a CSV was read"))
+        assert status("run", bar, "--out", tmp_path / name) == 0
+        said = capsys.readouterr().out.replace(f"/{name}", "")
+        told.append([line for line in said.splitlines() if "run time" not in line])
+        runs.append(json.loads((tmp_path / name / "run.json").read_text()))
+        del runs[-1]["timings"]
+    assert told[0] == told[1]
+    assert runs[0] == runs[1]
+    monkeypatch.undo()
+    short, long = (hl.load(tmp_path / name) for name in ("short", "long"))
+    assert same(short, long)
+    assert {p.name for p in (tmp_path / "long").iterdir()} == {*long.run["files"]}
 
 
 def test_options_of_a_scene_object_act(bar: Path) -> None:

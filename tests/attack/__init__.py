@@ -15,5 +15,6 @@ python -m tests.attack.loops --cases 300
 python -m tests.attack.page --cases 300
 python -m tests.attack.signals_of_commands --cases 300
 
-Each writes a table to results/faults, with its seed and the commit of the code; Ctrl-C ends it with the cases that it has made.
+Each writes a table to results/faults, with its seed and the commit of the code; Ctrl-C ends it with
+the cases that it has made.
 """

@@ -96,7 +96,7 @@ def changed_run(scene: Scene, folder: Path, apply: Callable[[LiveRun, Any], None
             while changes and changes[0][0] == len(rows):
                 apply(live, changes.pop(0)[1])
                 for instance in simulation.instances.values():
-                    instance.settle()  # which a run in real time does before its steps
+                    instance.settle(simulation.seconds(tick))  # as a run in real time does
 
         loop.events.patience(0)
         loop.run(turn)

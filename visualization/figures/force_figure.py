@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.figure_axes import legend_above_curves, titled
+from hapticlink.visualization.figures.curves import Curve, curve
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,11 +26,15 @@ STYLES = ("-", "--", ":", "-.")
 def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     """Forces, moments and, against their limits, motor torques of a run that has wrenches.
     devices: of each user by point; the first one's name is empty. Further users are dashed."""
-    wrenches = all_wrenches(results)
+    first = next(results.windows())
+    wrenches = {
+        name: curve(results, lambda window, name=name: all_wrenches(window)[name])
+        for name in all_wrenches(first)
+    }
     driven = {
-        user: (*moved, device.torque_limit)
+        user: (*curve(results, partial(_torques, device=device, user=user)), device.torque_limit)
         for user, device in devices.items()
-        if (moved := torques(results, device, user))
+        if torques(first, device, user)
     }
     largest, (_, force, _) = max(wrenches.items(), key=lambda item: item[1][1].max())
     title = f"The largest force is that of the {largest}: {short(force.max())} N"
@@ -55,3 +61,9 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     if driven:
         legend_above_curves(axes[2], columns=5)
     return figure
+
+
+def _torques(window: Results, device: Device, user: str) -> Curve:
+    found = torques(window, device, user)
+    assert found is not None
+    return found

@@ -5,7 +5,7 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -13,7 +13,6 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.analysis.findings import summary, words
 from hapticlink.analysis.findings.episodes import episodes
@@ -21,12 +20,12 @@ from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
 from hapticlink.analysis.findings.limits import NOTICEABLE_J
 from hapticlink.analysis.findings.tracking import (
     constrained,
+    constraint_counts,
     further_users,
     of_block,
     pose_error,
-    tracking,
 )
-from hapticlink.analysis.findings.user_port import UserPort, user_port
+from hapticlink.analysis.findings.user_port import UserPort
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
@@ -40,9 +39,10 @@ from hapticlink.orchestrator.base.loop_names import (
 )
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.scene_part import all_devices, scene_part
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.figure_axes import framed, plain, png, titled
+from hapticlink.visualization.figures.curves import Curve, curve, port_curve
 from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
 from hapticlink.visualization.mechanism import drawing, marks
@@ -74,30 +74,31 @@ def figures(results: Results) -> dict[str, Figure]:
 def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     """By name, what draws each figure of a run."""
     drawn_by: dict[str, Callable[[], Figure]] = {}
-    with_rows = {name: table for name, table in results.tables.items() if len(table["time"])}
-    results = replace(results, tables=with_rows)
     if not last_time(results):
         return drawn_by
+    first = next(results.windows())
+    with_rows = {name: table for name, table in first.tables.items() if len(table["time"])}
+    first = replace(first, tables=with_rows)
     linkage = scene_part(
         results, "linkage", Linkage
     )  # an SSP has the block, but not its description
     size = len(coordinate_units(linkage)) if linkage else 0
-    if linkage and (coordinates := of_block(results, JOINT_COORDINATES, size)):
-        q = coordinates[JOINT_COORDINATES]
-        if len(q := q[np.isfinite(q).all(axis=1)]):
-            drawn_by["mechanism"] = partial(_mechanism, results, linkage, q)
-    if of_block(results, POINT_POSE, 3):
+    if linkage and of_block(first, JOINT_COORDINATES, size):
+        ends = [q for window in results.windows() for q in _finite(window, size)]
+        if ends:
+            drawn_by["mechanism"] = partial(_mechanism, results, linkage, ends)
+    if of_block(first, POINT_POSE, 3):
         if "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
-        if of_block(results, HANDLE_POSE, 3):
+        if of_block(first, HANDLE_POSE, 3):
             drawn_by["distance"] = partial(_distance, results)
-    if wrenches(results):
+    if wrenches(first):
         drawn_by["forces"] = partial(forces, results, all_devices(results))
-    if contact := touching(results):
-        drawn_by["contact"] = partial(_contact, results, *contact)
-    if counted := constrained(results):
-        drawn_by["constraints"] = partial(_constraints, results, *counted)
-    if port := user_port(results):
+    if touching(first):
+        drawn_by["contact"] = partial(_contact, results)
+    if constrained(first):
+        drawn_by["constraints"] = partial(_constraints, results)
+    if port := port_curve(results):
         drawn_by["user_port"] = partial(_port, results, port)
     if generated := _generated(results):
         drawn_by["energies"] = partial(_energies, results, generated)
@@ -106,13 +107,21 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     return drawn_by
 
 
+def _finite(window: Results, size: int) -> Vector:
+    """The first and the last joint coordinates of a window that are finite."""
+    table = of_block(window, JOINT_COORDINATES, size)
+    q = table[JOINT_COORDINATES] if table else np.zeros((0, size))
+    q = q[np.isfinite(q).all(axis=1)]
+    return q[[0, -1]] if len(q) else q
+
+
 def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
     """Name and PNG of each figure of a run, each drawn when it is asked for."""
     for name, draw in drawings(results).items():
         yield name, png(draw())
 
 
-def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
+def _mechanism(results: Results, linkage: Linkage, q: Sequence[Vector]) -> Figure:
     figure, axes = titled(results, _finding(results), "x (mm)", "y (mm)")
     contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
     for label, style, path in _paths(results):
@@ -140,20 +149,30 @@ def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
 def _finding(results: Results) -> str:
     """How far the operational point was led, how far the handle was from it, where the linkage gave
     way in fewer directions, and what the rendering gave back."""
-    (_, _, path), *_ = _paths(results)
-    reach = np.linalg.norm(path - path[0], axis=1).max()
-    parts = [f"The operational point was led up to {_with('mm', reach)} from its start"]
-    if of_block(results, HANDLE_POSE, 3):
-        time, apart, _ = pose_error(results)
+    first = next(results.windows())
+    parts = [f"The operational point was led up to {_with('mm', _reach(results))} from its start"]
+    if of_block(first, HANDLE_POSE, 3):
+        time, apart, _ = curve(results, pose_error)
         at = _with("s", float(time[apart.argmax()]))
         parts.append(f"the handle was at most {_with('mm', apart.max())} off it, at {at}")
     if blocked := [e for e in episodes(results) if e.kind == "constraints"]:
         times = f"{len(blocked)} times" if len(blocked) > 1 else "once"
         parts.append(f"{times} {blocked[0].said}")
-    if (port := user_port(results)) and (found := port.measured).peak > NOTICEABLE_J:
+    if (port := port_curve(results)) and (found := port.measured).peak > NOTICEABLE_J:
         by = _with("s", found.time_of_peak)
         parts.append(f"{_with('mJ', 1e3 * found.peak)} generated by {by}")
     return "; ".join(parts)
+
+
+def _reach(results: Results) -> float:
+    """How far (mm) the operational point, or the handle without it, was from its start."""
+    signal = POINT_POSE if of_block(next(results.windows()), POINT_POSE, 3) else HANDLE_POSE
+    start, reach = None, 0.0
+    for window in results.windows():
+        _, path = _place(window, signal)
+        start = path[0] if start is None else start
+        reach = max(reach, float(np.linalg.norm(path - start, axis=1).max(initial=0.0)))
+    return reach
 
 
 def _with(unit: str, value: float) -> str:
@@ -163,31 +182,44 @@ def _with(unit: str, value: float) -> str:
 
 def _arrow(results: Results, axes: Axes) -> None:
     """The largest force of the hand, where it acted."""
-    force, handle = of_block(results, HAND_WRENCH, 3), of_block(results, HANDLE_POSE, 3)
-    handle = handle or of_block(results, POINT_POSE, 3)
-    if not (force and handle):
+    acted = [found for window in results.windows() if (found := _largest(window))]
+    if not acted:
         return
-    most = np.hypot(*force[HAND_WRENCH][:, :2].T)
-    k = int(most.argmax())
-    if not most[k] > 0:
+    most, time, force, pose = max(acted, key=lambda each: each[0])
+    if not most > 0:
         return
-    row = int(np.searchsorted(handle["time"], force["time"][k] + 1e-12, "right")) - 1
-    pose = handle[HANDLE_POSE if HANDLE_POSE in handle else POINT_POSE][max(row, 0), :2] * 1e3
     _, color, _ = marks.FORCES["F_hand"]
-    along = force[HAND_WRENCH][k, :2] / most[k] * ARROW
+    along = force / most * ARROW
     axes.annotate(
-        "", pose, (*along,), textcoords="offset points", zorder=6,
+        "", (*pose,), (*along,), textcoords="offset points", zorder=6,
         arrowprops={"arrowstyle": "<|-", "color": color, "lw": 2.2, "shrinkA": 0, "shrinkB": 0},
     )  # fmt: skip
-    label = f"largest force of the hand, {short(most[k])} N, at {force['time'][k]:.3g} s"
+    label = f"largest force of the hand, {short(most)} N, at {time:.3g} s"
     axes.plot([], [], color=color, lw=2.2, marker="<", label=fill(label, 34))
+
+
+def _largest(window: Results) -> tuple[float, float, Vector, Vector] | None:
+    """The largest force of the hand (N), when (s), its components and where it acted (mm)."""
+    force, handle = of_block(window, HAND_WRENCH, 3), of_block(window, HANDLE_POSE, 3)
+    handle = handle or of_block(window, POINT_POSE, 3)
+    if not (force and handle):
+        return None
+    rows = window.within(force["time"])
+    F, times = force[HAND_WRENCH][rows, :2], force["time"][rows]
+    if not len(F):
+        return None
+    most = np.hypot(*F.T)
+    k = int(most.argmax())
+    row = int(np.searchsorted(handle["time"], times[k] + 1e-12, "right")) - 1
+    pose = handle[HANDLE_POSE if HANDLE_POSE in handle else POINT_POSE][max(row, 0), :2] * 1e3
+    return most[k], times[k], F[k], pose
 
 
 def _mark(results: Results, axes: Axes) -> None:
     """The episodes of a run, along the path of the operational point."""
-    if (table := of_block(results, POINT_POSE, 3)) is None:
+    if of_block(next(results.windows()), POINT_POSE, 3) is None:
         return
-    time, path = table["time"], table[POINT_POSE][:, :2] * 1e3
+    time, path = curve(results, partial(_place, signal=POINT_POSE))
     marked = [*episodes(results)]
     for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
         color, label = marks.KINDS[kind]
@@ -200,6 +232,14 @@ def _mark(results: Results, axes: Axes) -> None:
         )  # fmt: skip
 
 
+def _place(window: Results, signal: str) -> Curve:
+    """Times (s) and places (mm) of a pose."""
+    table = of_block(window, signal, 3)
+    assert table is not None
+    rows = window.within(table["time"])
+    return table["time"][rows], table[signal][rows, :2] * 1e3
+
+
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
     """Label, line style and path (mm) of operational point, handle and further points."""
     linkage = results.record.scene["linkage"] or {}
@@ -207,25 +247,25 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
         (signal_of_user(POINT_POSE, point["name"]), f"point {point['name']}", "-.")
         for point in linkage.get("point", ())
     ]
+    first = next(results.windows())
     return [
-        (label, style, table[signal][:, :2] * 1e3)
+        (label, style, curve(results, partial(_place, signal=signal))[1])
         for signal, label, style in (
             (POINT_POSE, "operational point x_S", "-"),
             (HANDLE_POSE, "handle x_D", "--"),
             *further,
         )
-        if (table := of_block(results, signal, 3))
+        if of_block(first, signal, 3)
     ]
 
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if of_block(results, HANDLE_POSE, 3):
-        apart = short(tracking(results)[1].max())
+    if of_block(next(results.windows()), HANDLE_POSE, 3):
+        apart = short(curve(results, pose_error)[1].max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:
-        reach = np.linalg.norm(paths[0][2] - paths[0][2][0], axis=1).max()
-        title = f"The operational point moves up to {short(reach)} mm from its start"
+        title = f"The operational point moves up to {short(_reach(results))} mm from its start"
     figure, axes = titled(results, title, "x (mm)", "y (mm)")
     for label, style, path in paths:
         axes.plot(*path.T, style, label=plain(label))
@@ -238,10 +278,11 @@ def _trajectories(results: Results) -> Figure:
 
 
 def _distance(results: Results) -> Figure:
-    users = {user: pose_error(results, user) for user in ("", *further_users(results))}
-    largest, (time, gap, _) = max(
-        users.items(), key=lambda each: each[1].distance_mm.max(initial=0)
-    )
+    users = {
+        user: curve(results, partial(pose_error, user=user))
+        for user in ("", *further_users(results))
+    }
+    largest, (time, gap, _) = max(users.items(), key=lambda each: each[1][1].max(initial=0))
     at = int(gap.argmax())
     title = (
         f"Distance of handle to {_point(largest)}: at most {short(gap[at])} mm, "
@@ -249,7 +290,7 @@ def _distance(results: Results) -> Figure:
     )
     figure, axes = titled(results, title, "time (s)", "distance |x_S - x_D| (mm)")
     for (user, error), style in zip(users.items(), cycle(STYLES)):
-        axes.plot(error.time_s, error.distance_mm, style, label=plain(_point(user)))
+        axes.plot(*error[:2], style, label=plain(_point(user)))
     if len(users) > 1:
         axes.legend(fontsize="small")
     return figure
@@ -259,11 +300,10 @@ def _point(user: str) -> str:
     return f"point {user}" if user else "operational point"
 
 
-def _contact(results: Results, time: Vector, pushing: NDArray[np.bool_]) -> Figure:
-    table = of_block(results, ENVIRONMENT_WRENCH, 3)
-    assert table is not None  # it tells when contacts push
-    force = np.linalg.norm(table[ENVIRONMENT_WRENCH][:, :2], axis=1)
-    share = 100 * float(pushing.mean())
+def _contact(results: Results) -> Figure:
+    time, force, pushing = curve(results, _pushing)
+    pushes = [touched[1] for window in results.windows() if (touched := touching(window))]
+    share = 100 * float(np.concatenate(pushes).mean())
     most = short(force[pushing].max(initial=0.0))
     title = f"Contacts push in {short(share)} % of the samples, with |F_env| of at most {most} N"
     figure, axes = titled(
@@ -273,10 +313,29 @@ def _contact(results: Results, time: Vector, pushing: NDArray[np.bool_]) -> Figu
     return figure
 
 
-def _constraints(results: Results, table: Table, name: str) -> Figure:
-    count, time = table[name], table["time"]
-    most = int(count.max())
-    share = 100 * float((count == most).mean())
+def _pushing(window: Results) -> Curve:
+    """Times (s), |F_env| (N), and whether contacts push."""
+    table, touched = of_block(window, ENVIRONMENT_WRENCH, 3), touching(window)
+    assert table is not None
+    assert touched is not None
+    time, pushing = touched
+    force = table[ENVIRONMENT_WRENCH][window.within(table["time"]), :2]
+    return time, np.linalg.norm(force, axis=1), pushing
+
+
+def _counts(window: Results) -> Curve:
+    """Times (s) and numbers of constrained directions."""
+    counted = constrained(window)
+    assert counted is not None
+    table, name = counted
+    rows = window.within(table["time"])
+    return table["time"][rows], table[name][rows]
+
+
+def _constraints(results: Results) -> Figure:
+    time, count = curve(results, _counts)
+    most, samples = int(count.max()), constraint_counts(results.windows())
+    share = 100 * (samples[max(samples)] / sum(samples.values()))
     title = f"{most} constrained directions in {share:.3g} % of the samples"
     figure, axes = titled(results, title, "time (s)", "constrained directions")
     axes.step(time, count, where="post")

@@ -1,5 +1,5 @@
-"""What the lifted map says of the run behind a page: of the FMUs of its scene with all that was
-changed on the page, in hands that hold the handles where they are at the start."""
+"""The verdict on the run behind a page: of the FMUs of its scene with all that was changed on the
+page, where the handles are at the start, held by the mouse and by hands from soft to firm."""
 
 from __future__ import annotations
 
@@ -8,25 +8,28 @@ from dataclasses import replace
 
 import numpy as np
 
+from hapticlink.analysis.stability import frozen_nonlinearities
+from hapticlink.analysis.stability.hands import HANDS
+from hapticlink.analysis.stability.held_equilibria import held_system
+from hapticlink.analysis.stability.kinds import DRIFT
 from hapticlink.analysis.stability.lifted_map import hyperperiod
-from hapticlink.analysis.stability.modes import leading
-from hapticlink.analysis.stability.scene_stability import Stability, at_rest
 from hapticlink.analysis.stability.state_vector import size
+from hapticlink.analysis.stability.workspace_cases import AtRest, Case
+from hapticlink.components.specs.hand import SpringHand
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
-from hapticlink.orchestrator.base.loop_names import DEVICE
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.changes import held_by
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live.controls import Settings
+from hapticlink.visualization.live.mouse_hand import DAMPING, STIFFNESS
 
 MAX_COST = {"native": 1e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map
 is computed, by the packaging of the FMUs; 1e7 take about 2 s of processor time with native ones."""
-SEARCH = 0.25
-"""Simulated time (s) within which an equilibrium is sought."""
+MOUSE = "the mouse"
 RATES = range(1, 201)
 """Graphics rates (Hz) that may be suggested in place of a slow one."""
 
@@ -39,17 +42,25 @@ def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[
     tooltip."""
     try:
         found = judged(scene, settings, parameters)
+        worst = max(found, key=lambda case: case.severity)
     except Fault as fault:
         short = str(fault).partition(";")[0].partition("\n")[0]
         return {"verdict": "", "said": f"not computed: {short}", "why": str(fault)}
-    return {"verdict": found.verdict, "said": _summary(found), "why": "\n".join(found.lines())}
+    verdict = "marginal" if worst.drifts else worst.verdict
+    lines = (
+        f"{case.hand}: {case.verdict}, growth rate {case.growth:.4g} 1/s, {case.hertz:.3g} Hz"
+        for case in found
+    )
+    return {"verdict": verdict, "said": _summary(worst), "why": "\n".join(lines)}
 
 
-def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Stability:
-    """The stability of the run. Raises InputFault where its computation would take long, and as
-    `stability` does."""
+def judged(scene: Scene, settings: Settings, parameters: Parameters) -> list[Case]:
+    """The cases of the run, a hand each. Raises InputFault where its computation would take long,
+    and as `stability` does."""
     if settings.jitter:
         raise InputFault("with jitter the system never repeats; set the jitter to 0")
+    if scene.hand is None:
+        raise InputFault("nobody holds the mechanism")
     changed = _at_rate(scene, settings.rate)
     with (
         interrupt.held(),
@@ -66,7 +77,10 @@ def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Stabilit
                 held_by(c, s.holds.get(c.name), s.delays.get(c.name)) for c in whole.connections
             ),
         )
-        return at_rest(changed, system, 0.0, SEARCH)
+        hands = {MOUSE: SpringHand(stiffness=STIFFNESS, damping=DAMPING), **HANDS}
+        without, _ = frozen_nonlinearities.without(system)
+        with held_system(changed, without) as place:
+            return AtRest(place).cases("the start", hands, DRIFT)
 
 
 def _at_rate(scene: Scene, rate: float | None) -> Scene:
@@ -111,13 +125,10 @@ def _with_parameters(fmu: Fmu, parameters: Parameters) -> Fmu:
     return replace(fmu, starts=tuple(starts.values()))
 
 
-def _summary(found: Stability) -> str:
-    rate = f"{abs(found.growth):.2g} 1/s"
-    if found.verdict == "stable":
-        return f"stable at rest, decays {rate}"
-    if found.verdict == "marginal":
-        return "marginal at rest"
-    owners = [name.partition(".")[0] for name in found.names]
-    whose = leading(found.modes[0], owners, 1)[0][0] if found.modes else "all"
-    whose = whose.replace("virtual_", "").replace(DEVICE, "handle").replace("_", " ")
-    return f"unstable, grows {rate}, mode of {whose}"
+def _summary(worst: Case) -> str:
+    rate = f"{abs(worst.growth):.2g} 1/s"
+    if worst.verdict == "stable":
+        return f"stable in all hands, decays {rate}"
+    if worst.verdict == "marginal":
+        return f"marginal in {worst.hand}"
+    return f"{worst.kind} of {worst.hertz:.2g} Hz, grows {rate}, in {worst.hand}"

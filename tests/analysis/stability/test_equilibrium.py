@@ -37,7 +37,7 @@ SERIAL = held("arm", 161.7, 18.0, 0.08416, 0.05309, -1.0502, turn=1.0)
 def test_it_is_the_one_at_which_the_run_rests(scene: str | Path, options: dict[str, Any]) -> None:
     """Newton's method from the start of these scenes ends at others, which are unstable."""
     options |= {"duration": 12.0}
-    found = hl.stability(scene, options)
+    found = hl.equilibrium_stability(scene, options)
     run = hl.run(scene, options, figures=False)
     x, time = run["virtual_mechanism.x"], run.time("virtual_mechanism.x")
     assert np.abs(run["virtual_mechanism.qd"][-2:]).max() < 1e-3
@@ -61,7 +61,7 @@ def test_what_presses_is_told_with_its_depth() -> None:
         "contacts.damping": 10.0,
         "controller.contact": True,
     }
-    found = hl.stability(SLIDER_CRANK, options)
+    found = hl.equilibrium_stability(SLIDER_CRANK, options)
     run = hl.run(SLIDER_CRANK, options, figures=False)
     (depth,) = found.where.contacts.values()
     assert list(found.where.contacts) == ["rod on enclosure"]
@@ -72,7 +72,7 @@ def test_what_presses_is_told_with_its_depth() -> None:
 def test_a_run_that_grows_away_is_told() -> None:
     """A wall that is too stiff, against which the handle hops: its rest is 2 N/K deep."""
     options = {"fmu.wall.start.stiffness": 6000.0, "linkage.start.rail": 0.0003}
-    found = hl.stability("virtual-wall", options)
+    found = hl.equilibrium_stability("virtual-wall", options)
     assert found.where.pose[0] == pytest.approx(2 / 6000)
     assert found.where.run == "passes"
     assert "the run from the start has not come to rest there" in "\n".join(found.lines())
@@ -91,7 +91,7 @@ def test_a_run_that_diverges_is_told_with_the_time_of_the_run() -> None:
     }
     run = hl.run("closed-loop-direct", options, figures=False)
     assert run.fault
-    found = hl.stability("closed-loop-direct", options)
+    found = hl.equilibrium_stability("closed-loop-direct", options)
     assert found.where.ended.split(" at t = ")[1] == str(run.fault).split(" at t = ")[1]
 
 
@@ -111,9 +111,9 @@ def test_a_limit_cycle_that_divides_the_period_is_no_rest(damping: float, found:
     assert speed[-1] == pytest.approx(-speed[-2], rel=1e-3)
     if not found:  # every search ends in the cycle
         with pytest.raises(hl.InputFault, match=r"limit cycle that repeats after 0\.03125 s"):
-            hl.stability("closed-loop", options)
+            hl.equilibrium_stability("closed-loop", options)
         return
-    at = hl.stability("closed-loop", options)
+    at = hl.equilibrium_stability("closed-loop", options)
     assert at.verdict == "unstable"
     assert at.where.run == "passes"
 
@@ -126,7 +126,7 @@ def test_an_arm_that_shakes_between_the_limits_of_motors_does_not_rest() -> None
     assert x[-1] == pytest.approx(x[-512], abs=1e-5)
     assert qd[-1, 1] == pytest.approx(-qd[-2, 1], rel=1e-3)
     assert abs(qd[-1, 1]) > 1.0
-    found = hl.stability("serial", options)
+    found = hl.equilibrium_stability("serial", options)
     assert found.verdict == "unstable"
     assert found.where.run == "passes"
 
@@ -139,7 +139,7 @@ def test_a_run_that_has_not_grown_yet_does_not_rest() -> None:
         "linkage.start.rail": 2 / 6000 + 1e-9,
         "duration": 0.5,
     }
-    found = hl.stability("virtual-wall", options)
+    found = hl.equilibrium_stability("virtual-wall", options)
     assert found.verdict == "unstable"
     assert found.where.run == "passes"
 
@@ -150,7 +150,7 @@ def test_a_moving_target_is_told_before_a_search(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(LiftedMap, "slopes", search)
     with pytest.raises(hl.InputFault, match="moves with time"):
-        hl.stability("two-hands")
+        hl.equilibrium_stability("two-hands")
 
 
 def test_a_variant_without_an_equilibrium_nearby_is_run_from_its_own_start(

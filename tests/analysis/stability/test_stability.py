@@ -31,7 +31,7 @@ HELD: dict[str, Any] = {
 
 def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
     """m = 1, K = 100, T = 0.05: z^2 - (2 - alpha/2) z + 1 + alpha/2 with alpha = K T^2/m."""
-    found = hl.stability("sampled-spring")
+    found = hl.equilibrium_stability("sampled-spring")
     alpha = 0.25
     z = max(np.roots([1.0, -(2 - alpha / 2), 1 + alpha / 2]), key=lambda root: root.imag)
     (mode,) = found.modes
@@ -64,12 +64,12 @@ def test_a_mode_that_may_grow_is_counted(A: list[list[float]], error: float, sai
 def test_a_hanging_and_a_standing_mechanism_move_as_their_linearisations_do() -> None:
     """A uniform rod of 1 m and 1 kg with 0.01 N.m.s/rad, and the N-four-bar above its pivots, which
     is singular there: phi'' = a phi, a = g ((N + 1)/2 + N)/((N + 1)/3 + N)."""
-    (hanging,) = hl.stability("pendulum").modes
+    (hanging,) = hl.equilibrium_stability("pendulum").modes
     assert hanging.growth == pytest.approx(-0.01 / (2 / 3), rel=1e-5)
     assert math.hypot(hanging.growth, hanging.omega) == pytest.approx(
         math.sqrt(1.5 * 9.81), rel=1e-6
     )
-    standing = hl.stability("n-four-bar")
+    standing = hl.equilibrium_stability("n-four-bar")
     a = 9.81 * (1.5 + 2) / (1.0 + 2)
     growth = [mode.growth for mode in standing.modes]
     assert growth == pytest.approx([math.sqrt(a), -math.sqrt(a)], rel=1e-5)
@@ -83,7 +83,9 @@ def test_semi_implicit_euler_is_stable_up_to_alpha_4_minus_2_beta(
     spring = {"stiffness": share * (4 - 2 * beta) / T**2, "damping": beta / T}
     options = {"haptics.rate": 512, "mechanism.integrator": "semi-implicit-euler"}
     options |= {f"linkage.joint.rail.{name}": value for name, value in spring.items()}
-    found = hl.stability("sampled-spring", options | {"hand.stiffness": [0.0, 0.0, 0.0]})
+    found = hl.equilibrium_stability(
+        "sampled-spring", options | {"hand.stiffness": [0.0, 0.0, 0.0]}
+    )
     assert found.verdict == verdict
 
 
@@ -99,7 +101,7 @@ def test_baumgarte_is_stable_up_to_its_limit_off_the_closures(share: float, verd
         "mechanism.beta": 1.0,
         "hand.wrench": [0.0, 0.0, 0.0],
     }
-    found = hl.stability("five-bar", options)
+    found = hl.equilibrium_stability("five-bar", options)
     assert found.verdict == verdict
     assert len(found.neutral) >= 2  # it moves freely
     line = "growth up to 0.051 1/s cannot be distinguished from none"
@@ -136,7 +138,7 @@ def test_the_equilibrium_at_a_contact_is_that_at_which_a_run_rests(
             "target": [[0.0, 0.15, -0.01, 0.0]],
         },
     })  # fmt: skip
-    found = hl.stability(scene)
+    found = hl.equilibrium_stability(scene)
     run = hl.run(scene, figures=False)
     q = run["virtual_mechanism.q"][:, 0]
     assert found.equilibrium["virtual_mechanism.q[1]"] == pytest.approx(q[-1], abs=1e-8)
@@ -149,7 +151,7 @@ def test_the_equilibrium_at_a_contact_is_that_at_which_a_run_rests(
 def test_growth_and_frequency_are_those_of_a_run_across_rates() -> None:
     """closed-loop-direct in a hand that is a spring: unstable at 30 Hz, with a period of half a
     second that has more than one turn of its mode."""
-    found = hl.stability("closed-loop-direct", HELD)
+    found = hl.equilibrium_stability("closed-loop-direct", HELD)
     assert found.period == 0.5
     assert found.verdict == "unstable"
     first = found.modes[0]
@@ -184,7 +186,7 @@ def test_an_algebraic_loop_has_the_growth_of_its_run(method: str, interpolation:
                  "damping": [0.3, 0.0, 0.0], "target": [[0.0, 0.0, 0.0, 0.0]]},
         "haptics.rate": 60,
     }  # fmt: skip
-    found = hl.stability("sampled-spring", options)
+    found = hl.equilibrium_stability("sampled-spring", options)
     x = hl.run("sampled-spring", options | {"duration": 3.0}, figures=False)["virtual_mechanism.q"]
     late = x[len(x) // 2 :, 0]
     a, b = np.linalg.lstsq(np.column_stack([late[1:-1], late[:-2]]), late[2:])[0]
@@ -220,7 +222,7 @@ def test_redundant_closures_are_kept_by_perturbations(tmp_path: Path) -> None:
         lines += [f'[[linkage.loop]]\nbodies = ["bar", "rod{k}"]\nat = {ends}']
     path = tmp_path / "bar.toml"
     path.write_text("\n".join(lines))
-    found = hl.stability(path)
+    found = hl.equilibrium_stability(path)
     (mode,) = found.modes
     omega = math.sqrt(9.81 * (1.5 * rods + bar) / (length * (rods + bar)))
     assert mode.omega == pytest.approx(omega, rel=1e-6)
@@ -229,9 +231,11 @@ def test_redundant_closures_are_kept_by_perturbations(tmp_path: Path) -> None:
 
 def test_a_moving_target_and_a_push_into_the_free_have_no_equilibrium() -> None:
     with pytest.raises(hl.InputFault, match="moves with time"):
-        hl.stability("two-hands")
+        hl.equilibrium_stability("two-hands")
     with pytest.raises(hl.InputFault, match=r"no equilibrium found: virtual_mechanism\.qd?\["):
-        hl.stability("sampled-spring", {"hand": {"type": "constant", "wrench": [1.0, 0.0, 0.0]}})
+        hl.equilibrium_stability(
+            "sampled-spring", {"hand": {"type": "constant", "wrench": [1.0, 0.0, 0.0]}}
+        )
 
 
 def test_growth_along_a_trajectory_is_that_of_the_variational_equation() -> None:
@@ -272,7 +276,9 @@ def test_many_samples_are_on_their_way(late: int) -> None:
         "fmu.wall.settings": {"stiffness": 300.0, "unilateral": False},
         "delays": {"wall.F": late / 512},
     }
-    assert hl.stability("virtual-wall", options).radius == pytest.approx(expected, abs=1e-8)
+    assert hl.equilibrium_stability("virtual-wall", options).radius == pytest.approx(
+        expected, abs=1e-8
+    )
 
 
 def test_samples_of_a_position_gather_while_a_slower_wall_does_not_read_them() -> None:
@@ -292,7 +298,7 @@ def test_samples_of_a_position_gather_while_a_slower_wall_does_not_read_them() -
         "fmu.wall.settings": {"stiffness": K, "unilateral": False},
         "delays": {"virtual_mechanism.rail.position": 0.005},
     }
-    found = hl.stability("virtual-wall", options)
+    found = hl.equilibrium_stability("virtual-wall", options)
     first = max(np.linalg.eigvals(A), key=lambda z: (abs(z), z.imag))
     assert found.radius == pytest.approx(abs(first), rel=1e-6)
     assert found.modes[0].omega == pytest.approx(np.angle(first) * 64, rel=1e-6)
@@ -301,15 +307,17 @@ def test_samples_of_a_position_gather_while_a_slower_wall_does_not_read_them() -
 def test_what_has_no_map_is_refused() -> None:
     rates = {"graphics.rate": [0.03, 0.07, 0.1, 0.2], "duration": 0.1}
     with pytest.raises(hl.InputFault, match=r"the period of \w+ varies"):
-        hl.stability("closed-loop-direct", HELD | rates)
+        hl.equilibrium_stability("closed-loop-direct", HELD | rates)
     with pytest.raises(hl.InputFault, match="latency and loss are random"):
-        hl.stability("virtual-wall", {"delays": {"wall.F": {"min": 0.001, "loss": 0.5}}})
+        hl.equilibrium_stability(
+            "virtual-wall", {"delays": {"wall.F": {"min": 0.001, "loss": 0.5}}}
+        )
 
 
 @pytest.mark.parametrize("options", [{"packaging": "native"}, {"isolate": True}])
 def test_every_kind_of_fmu_has_the_same_map(options: dict[str, Any]) -> None:
-    found = hl.stability("virtual-wall", options)
-    assert found.radius == pytest.approx(hl.stability("virtual-wall").radius, rel=1e-9)
+    found = hl.equilibrium_stability("virtual-wall", options)
+    assert found.radius == pytest.approx(hl.equilibrium_stability("virtual-wall").radius, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -324,7 +332,7 @@ def test_every_kind_of_fmu_has_the_same_map(options: dict[str, Any]) -> None:
 )
 def test_the_memory_of_a_hold_is_part_of_the_state(hold: str, weights: tuple[float, ...]) -> None:
     """The mass takes the mean over its step of the force that is extrapolated from samples."""
-    found = hl.stability("sampled-spring", {"holds": {"hand.F": hold}})
+    found = hl.equilibrium_stability("sampled-spring", {"holds": {"hand.F": hold}})
     h, A = 0.05, np.eye(4, k=-1)  # of x_k, x_{k-1}, x_{k-2} and, in the last row, v
     A[0] = A[3] = 0.0
     A[0, 0], A[0, 3], A[3, 3] = 1.0, h, 1.0
@@ -335,8 +343,8 @@ def test_the_memory_of_a_hold_is_part_of_the_state(hold: str, weights: tuple[flo
 
 
 def test_friction_and_quanta_are_taken_out_and_told() -> None:
-    plain = hl.stability("virtual-wall")
-    rough = hl.stability(
+    plain = hl.equilibrium_stability("virtual-wall")
+    rough = hl.equilibrium_stability(
         "virtual-wall",
         {"fmu.wall.settings.quantum": 1e-4, "linkage.joint.rail.friction": 0.1},
     )
@@ -375,7 +383,7 @@ def held_by_spring() -> tuple[dict[str, Any], float]:
     hand = {"type": "spring", "stiffness": [300.0, 300.0, 1.0], "damping": [5.0, 5.0, 0.01]}
     target = [[0.0, 0.0445, 0.0148, -0.7878]]
     options = {"graphics.rate": 64, "hand": hand | {"target": target}}
-    return options, hl.stability("closed-loop-direct", options).radius
+    return options, hl.equilibrium_stability("closed-loop-direct", options).radius
 
 
 @pytest.mark.parametrize("pspm", [False, True])
@@ -388,7 +396,7 @@ def test_the_hold_passive_is_judged_without_its_friction(
     if pspm:
         poses = ("virtual_mechanism.x -> controller.x_S", "virtual_mechanism.v -> controller.v_S")
         held["holds"] = dict.fromkeys(poses, "pspm")
-    found = hl.stability("closed-loop-direct", options | held)
+    found = hl.equilibrium_stability("closed-loop-direct", options | held)
     assert found.verdict == "stable"
     assert any("the friction of hold passive, taken out" in line for line in found.frozen)
     assert found.radius == pytest.approx(plain, abs=1e-6)

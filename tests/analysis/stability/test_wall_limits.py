@@ -133,7 +133,9 @@ CASES = [
 
 @pytest.mark.parametrize(("options", "key", "limit"), CASES)
 def test_the_lifted_map_has_the_limit(options: Options, key: str, limit: float) -> None:
-    found = [hl.stability("virtual-wall", options | {key: k * limit}) for k in (0.995, 1.005)]
+    found = [
+        hl.equilibrium_stability("virtual-wall", options | {key: k * limit}) for k in (0.995, 1.005)
+    ]
     assert [f.verdict for f in found] == ["stable", "unstable"]
 
 
@@ -177,7 +179,7 @@ def test_a_unilateral_wall_has_the_same_limit_in_contact() -> None:
     """The scene as it is: the equilibrium lies within the wall, the start outside of it."""
     limit = wall_limits.stable(M, D, T)
     for share, verdict in ((0.995, "stable"), (1.005, "unstable")):
-        found = hl.stability("virtual-wall", {STIFFNESS: share * limit})
+        found = hl.equilibrium_stability("virtual-wall", {STIFFNESS: share * limit})
         assert found.verdict == verdict
         assert found.equilibrium["virtual_mechanism.q[1]"] == pytest.approx(2 / (share * limit))
 

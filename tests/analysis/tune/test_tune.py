@@ -18,7 +18,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.stability.hands import FIRM, HANDS, spring
+from hapticlink.analysis.stability.hands import FIRM, SPRINGS, spring
 from hapticlink.analysis.stability.held_equilibria import held
 from hapticlink.analysis.stability.linearisation import linearised
 from hapticlink.analysis.stability.poses import LIGHT, Pose, simulated
@@ -261,7 +261,7 @@ def test_the_columns_that_are_carried_hold_all_modes() -> None:
     given = pose.options(("sensing=encoders", "graphics.rate=32"))
     with held("closed-loop", given) as place:
         for scale in (0.1, 1.0, 3.0):
-            place.stable(dict.fromkeys(("drift", "topology"), scale), HANDS[0])
+            place.stable(dict.fromkeys(("drift", "topology"), scale), SPRINGS[0])
             whole = linearised(place._map, place._at.point)
             radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (place._at, whole)]
             assert radii[0] == pytest.approx(radii[1], rel=1e-6)

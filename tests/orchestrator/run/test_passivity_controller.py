@@ -103,7 +103,7 @@ def test_a_coupling_beyond_its_limit_gives_the_handle_little() -> None:
 
 def test_the_lifted_map_is_that_of_the_loop_without_it() -> None:
     found = [
-        hl.stability("virtual-wall", options)
+        hl.equilibrium_stability("virtual-wall", options)
         for options in ({}, {"fmu.wall.settings.passivity": MASS})
     ]
     assert found[1].growth == pytest.approx(found[0].growth, rel=1e-6)

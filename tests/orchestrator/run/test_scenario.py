@@ -162,3 +162,8 @@ def test_lines_in_the_figures(tmp_path):
     found = hl.run("closed-loop", ["duration=0.6", at], out=tmp_path / "run")
     axes = found.figures()["distance"].axes[0]
     assert any(list(line.get_xdata()) == [found.run["events"][0][0]] * 2 for line in axes.lines)
+
+
+def test_one_program_of_a_scene_with_events_is_refused(tmp_path):
+    with pytest.raises(InputFault, match="at given times"):
+        hl.build("scenario", as_one=True, out=tmp_path)

@@ -1,0 +1,129 @@
+"""The rows of a run as it has written them, one window of time after the other, so that the memory
+of what reads them does not grow with the duration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from hapticlink.orchestrator.results import json_file, rows
+from hapticlink.orchestrator.results.run_record import RunRecord
+from hapticlink.orchestrator.results.tables import (
+    Results,
+    Table,
+    empty,
+    load,
+    read_table,
+    recorded,
+    size,
+)
+
+WINDOW_BYTES = 1 << 24
+"""Of the rows of a window, of all tables. Runs with fewer are one window."""
+STEPS_BESIDE = 2
+"""Rows beside a window, in the longest steps of all clocks, to interpolate between any two."""
+
+
+def opened(folder: Path) -> Results:
+    """The results of a run whose rows are still there, all of them read unless they are more than a
+    window; `load` for others."""
+    run = json_file.read(folder / "run.json")
+    if size(folder, run, binary=True) <= WINDOW_BYTES:
+        return load(folder, binary=True)
+    return Streamed(folder, run, TablesLater(folder, tuple(run["rates"]), tuple(run["files"])))
+
+
+class TablesLater(Mapping[str, Table]):
+    """The tables of a run's folder, each read when it is asked for and kept then."""
+
+    def __init__(self, folder: Path, names: tuple[str, ...], files: tuple[str, ...]) -> None:
+        self._folder, self._names, self._files = folder, names, files
+        self._read: dict[str, Table] = {}
+
+    def __getitem__(self, name: str) -> Table:
+        if name not in self._names:
+            raise KeyError(name)
+        if name not in self._read:
+            path = self._folder / f"{name}.csv" if recorded(name, self._files) else None
+            self._read[name] = read_table(path, self) if path else empty(self)
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+@dataclass(frozen=True, eq=False)
+class Streamed(Results):
+    """Results whose windows are read from the rows, while these are there; the tables themselves
+    are read whole, as `TablesLater`."""
+
+    @cached_property
+    def number(self) -> int:
+        """The number of windows."""
+        assert self.folder
+        return -(-size(self.folder, self.run, binary=True) // WINDOW_BYTES)
+
+    def windows(self) -> Iterator[Results]:
+        assert self.folder
+        record, end, beside = self.record, self.record.end.time or 0.0, _beside(self.record)
+        written = {name: recorded(name, record.files) for name in record.rates}
+        files = {
+            name: _Forward(self.folder / f"{name}{rows.SUFFIX}")
+            for name in written
+            if written[name]
+        }
+        cuts = [-np.inf, *(end * np.arange(1, self.number) / self.number), np.inf]
+        for begin, until in pairwise(map(float, cuts)):
+            tables: dict[str, Table] = {}
+            for name in record.rates:
+                file = files.get(name)
+                span = begin - beside, until + beside
+                tables[name] = file.between(*span, tables) if file else empty(tables)
+            window = Results(self.folder, self.run, tables, begin, until)
+            window.__dict__["record"] = record  # read once
+            yield window
+
+
+def until(results: Results, time: float) -> Iterator[Results]:
+    """The windows of results until a time (s)."""
+    for window in results.windows():
+        if window.begin < time:
+            cut = replace(window, end=min(window.end, time))
+            cut.__dict__["record"] = results.record
+            yield cut
+
+
+def _beside(record: RunRecord) -> float:
+    """The time (s) of the rows beside a window."""
+    longest = max(clock.longest for clock in record.clocks.values())
+    first = max(clock.first for clock in record.clocks.values())
+    return STEPS_BESIDE * max(longest, first) * int(record.scene["record"]["every"])
+
+
+class _Forward:
+    """Reads spans of the rows of a table, each of which begins later than the one before."""
+
+    def __init__(self, path: Path) -> None:
+        self._columns, self._parts = rows.parts(path)
+        self._total = rows.count(path)
+        self._kept, self._first = np.zeros((0, len(self._columns))), 0
+
+    def between(self, begin: float, end: float, others: Mapping[str, Table]) -> Table:
+        """The rows of begin <= time <= end (s)."""
+        over = int(np.searchsorted(self._kept[:, 0], begin))
+        found = [self._kept[over:]]
+        while not (len(found[-1]) and found[-1][-1, 0] > end):
+            if (part := next(self._parts, None)) is None:
+                break
+            found.append(part)
+        self._kept, self._first = np.concatenate(found), self._first + over
+        kept = self._kept[: np.searchsorted(self._kept[:, 0], end, "right")]
+        return Table(self._columns, kept, others, self._first, self._total)

@@ -1,0 +1,86 @@
+"""The choice of a method, from rows that are known; the draws; and one scene from end to end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.analysis import advise
+from hapticlink.analysis.advise import Measured, Method
+from hapticlink.analysis.advise.draws import FACTOR, draws
+from hapticlink.orchestrator import open_scene
+
+
+def row(error_mm: float, peak_J: float = 0.0, work_J: float = 0.1, end: str = "duration") -> Any:
+    return {
+        "end": end,
+        "tracking_max_mm": error_mm,
+        "theta_max_rad": 0.1,
+        "port_peak_J": peak_J,
+        "hand_work_J": work_J,
+    }
+
+
+def test_limits_are_the_end_the_error_and_a_quarter_of_the_work() -> None:
+    assert advise.within(row(5.0, 0.0249))
+    assert not advise.within(row(5.0, 0.0251))
+    assert advise.within(row(5.0, 0.9e-3, work_J=0.0))
+    assert not advise.within(row(43.0))
+    assert not advise.within(row(5.0, end="diverged"))
+    assert not advise.within({"end": "refused", "message": ""})
+
+
+def test_the_smallest_error_within_the_limits_of_all_draws_is_advised() -> None:
+    """`exact` leaves them once, `zoh` is twice as far off; `foh` and `even` win two draws each."""
+
+    def of(hold: str, errors: list[float], within: int = 4) -> Measured:
+        return Measured(Method(hold, "own"), np.array(errors), np.zeros(4), within)
+
+    exact, zoh = of("exact", [0.1] * 4, 3), of("zoh", [2.0, 4.0, 6.0, 8.0])
+    foh, even = of("foh", [1.0, 2.0, 3.0, 4.0]), of("even", [1.3, 1.9, 3.6, 3.9])
+    found = advise._chosen("", [zoh, exact, even, foh], {})
+    assert found.taken is foh
+    assert found.ties == (even,)
+    assert set(found.others) == {exact, zoh}
+    assert "1 of" not in next(found.lines())
+    none = advise._chosen("", [exact, of("lost", [9.0] * 4, 1)], {})
+    assert none.taken is exact
+    assert next(none.lines()).startswith("nothing keeps the limits")
+
+
+@pytest.mark.parametrize("scene", ["closed-loop-direct", "closed-loop-b1", "enclosure"])
+def test_draws_are_other_hands_of_the_same_kind(scene: str) -> None:
+    read = open_scene.load(scene)
+    drawn = list(draws(read, 5, 1))
+    assert drawn == list(draws(read, 5, 1)) != list(draws(read, 5, 2))
+    hands = [open_scene.load(scene, options).hand for options in drawn]
+    assert {type(hand) for hand in hands} == {type(read.hand)}
+    assert len({str(hand) for hand in hands}) == 5
+    for hand in hands:
+        if hasattr(hand, "wrench"):
+            ratio = np.hypot(*hand.wrench[:2]) / np.hypot(*read.hand.wrench[:2])  # type: ignore[union-attr]
+            assert 1 / FACTOR <= ratio <= FACTOR
+
+
+def test_a_scene_without_a_hand_gets_no_advice(tmp_path: Path) -> None:
+    with pytest.raises(hl.InputFault, match="nothing to advise"):
+        advise.advise("pendulum", (), tmp_path)
+
+
+def test_the_advice_of_a_scene_is_what_its_runs_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two holds and the scene's gains on half a second: the numbers are those of a run."""
+    monkeypatch.setattr(advise, "HOLDS", {name: advise.HOLDS[name] for name in ("zoh", "passive")})
+    monkeypatch.setattr(advise, "GAINS", {"soft": advise.GAINS["soft"]})
+    given = ("duration=0.5", "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]")
+    monkeypatch.setattr(advise, "ROUND", 2)
+    found = advise.advise("closed-loop-direct", given, tmp_path, count=1)
+    assert found.taken.admitted
+    run = hl.run("closed-loop-direct", (*given, *found.taken.method.options), figures=False)
+    assert found.taken.error_mm[0] == run.measures().tracking[""].max_mm
+    assert len(found.screened) >= 4

@@ -1,0 +1,56 @@
+"""Instances of one file of this project have one library in a run, and are independent; FMUs of
+others have one each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hapticlink.fmus.build import build, build_native
+from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.process_cache import described
+from tests.orchestrator import coupled
+from tests.orchestrator.foreign_fmus import c_fmu
+
+
+@pytest.mark.parametrize("make", [build, build_native])
+def test_instances_of_our_file_share_a_folder_until_the_last_is_closed(
+    tmp_path: Path, own_temporary_folder: Path, make: Callable[..., Path]
+) -> None:
+    """y = 2 u, and z the w of the step before."""
+    description = described(make(coupled.gain("gain", 2.0, 0.0), tmp_path))
+    instances = [InProcess(f"f{i}", description, np.zeros(2)) for i in range(8)]
+    with ExitStack() as stack:
+        for instance in instances:
+            stack.enter_context(instance)
+        assert len([*own_temporary_folder.iterdir()]) == 1
+        for i, instance in enumerate(instances):
+            instance.enter_initialization(1.0)
+            instance.exit_initialization()
+            scalars = [*description.port("u", "input"), *description.port("w", "input")]
+            instance.connect(scalars, range(len(scalars)))(np.array([0.0, float(i)]))
+        for instance in instances:  # all are set before one steps
+            instance.step(0.0, 0.1, 0.1)
+        for i, instance in enumerate(instances):
+            instance.get()
+            assert instance.outputs[1] == float(i)
+        instances[0].close()
+        assert len([*own_temporary_folder.iterdir()]) == 1
+    assert not [*own_temporary_folder.iterdir()]
+
+
+def test_instances_of_a_file_of_others_have_a_library_each(
+    tmp_path: Path, own_temporary_folder: Path
+) -> None:
+    description = describe(c_fmu(tmp_path))
+    with ExitStack() as stack:
+        for i in range(2):
+            outputs = np.zeros(len(description.outputs))
+            stack.enter_context(InProcess(f"f{i}", description, outputs))
+        assert len([*own_temporary_folder.iterdir()]) == 2
+    assert not [*own_temporary_folder.iterdir()]

@@ -1,0 +1,61 @@
+"""Curves over a run: every sample of it, or, of a run of several windows, those that are the least
+or the most of a stretch, which are as many as a screen can show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from hapticlink.analysis.findings.user_port import UserPort, ports
+from hapticlink.orchestrator.results.tables import Results, Vector
+
+STRETCHES = 2048
+"""Of a long run: more than a figure has pixels."""
+Curve = tuple[Vector, ...]
+"""Times or places, (k,), and what belongs to them, each (k,) or (k, n)."""
+
+
+def curve(results: Results, of: Callable[[Results], Curve]) -> Curve:
+    """What a function gives of each window, one after the other."""
+    parts = [_thinned(of(window), results.number) for window in results.windows()]
+    return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
+
+
+def port_curve(results: Results) -> UserPort | None:
+    """The energy at the user's port, as a curve."""
+    parts = [_thinned_port(port, results.number) for port in ports(results) if port]
+    if not parts:
+        return None
+    *_, last = parts
+    blocks = {name: np.concatenate([p.blocks_J[name] for p in parts]) for name in last.blocks_J}
+    time, hands, generated = (np.concatenate([port[i] for port in parts]) for i in range(3))
+    return UserPort(time, hands, generated, blocks, last.works)
+
+
+def _thinned_port(port: UserPort, windows: int) -> UserPort:
+    curves = *port[:3], *port.blocks_J.values()
+    time, hands, generated, *blocks = _thinned(curves, windows)
+    by_name = dict(zip(port.blocks_J, blocks, strict=True))
+    return UserPort(time, hands, generated, by_name, port.works)
+
+
+def _thinned(curve: Curve, windows: int) -> Curve:
+    """The samples of a window that are drawn."""
+    if windows == 1 or len(curve[0]) <= STRETCHES // windows:
+        return curve
+    kept = extremes(np.column_stack(curve), max(STRETCHES // windows, 1))
+    return tuple(each[kept] for each in curve)
+
+
+def extremes(columns: Vector, stretches: int) -> Sequence[int]:
+    """The first and the last row, and the rows with the least and the most of each column in each
+    stretch of rows, in order."""
+    rows = np.linspace(0, len(columns), stretches + 1).astype(int)
+    kept = {0, len(columns) - 1}
+    for begin, end in pairwise(rows):
+        if end > begin:
+            part = columns[begin:end]
+            kept |= {*(begin + part.argmin(axis=0)), *(begin + part.argmax(axis=0))}
+    return sorted(kept)
