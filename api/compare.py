@@ -90,8 +90,8 @@ def compare(
     if isinstance(runs, Mapping):
         return Comparison({str(name): run for name, run in found.items()})
     every = list(found.values())
-    folders = [run.folder for run in every]
-    if all(folders):
+    folders = [run.folder for run in every if run.folder]
+    if len(folders) == len(every):
         return Comparison(dict(zip(named_runs.names(folders), every, strict=True)))
     return Comparison(dict(zip(_by_settings(every), every, strict=True)))
 

@@ -117,8 +117,8 @@ def _figures(runs: Mapping[str, Results]) -> Iterator[str]:
     for name, figure in [*overlay.figures(runs).items()][1:]:
         yield _picture(name, figure)
     for name, run in runs.items():
-        if draw := of_a_run.drawings(run).get("mechanism"):
-            drawn = draw()
+        if mechanism := of_a_run.drawings(run).get("mechanism"):
+            drawn = mechanism()
             title = f"{name}: {drawn.axes[0].get_title()}"
             drawn.axes[0].set_title(plain(fill(title, 70)), fontsize="medium")
             yield _picture(f"mechanism, {name}", drawn)

@@ -191,7 +191,7 @@ def _arrow(results: Results, axes: Axes) -> None:
     _, color, _ = marks.FORCES["F_hand"]
     along = force / most * ARROW
     axes.annotate(
-        "", pose, (*along,), textcoords="offset points", zorder=6,
+        "", (*pose,), (*along,), textcoords="offset points", zorder=6,
         arrowprops={"arrowstyle": "<|-", "color": color, "lw": 2.2, "shrinkA": 0, "shrinkB": 0},
     )  # fmt: skip
     label = f"largest force of the hand, {short(most)} N, at {time:.3g} s"

@@ -145,7 +145,7 @@ class Controls:
         """Whether the connection can have the hold, in a run that begins with it at least."""
         return message.hold in self._holds.get(message.connection, ())
 
-    def _require(self, name: str, known: dict[str, Any]) -> None:
+    def _require(self, name: str, known: Mapping[str, Any]) -> None:
         if name not in known:
             raise InputFault(unknown("control", name, known))
 
