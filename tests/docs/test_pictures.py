@@ -21,6 +21,7 @@ TEXT_ALONE = {
     "ports.md",
     "scene-reference.md",
     "glossary.md",
+    "history.md",
     "errata.md",
     "install.md",
 }
