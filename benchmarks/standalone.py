@@ -132,7 +132,8 @@ def _measured(
             nodes.append(_node(text))
             wall.append(opened.evaluate(IN_CHROMIUM, [TIMED + IN_WORKER, DURATION, 5]))
         opened.close()
-        return len(text.encode()), make, *(DURATION / min(t) for t in (runs, nodes, wall))
+        by_run, by_node, by_chromium = (DURATION / min(times) for times in (runs, nodes, wall))
+        return len(text.encode()), make, by_run, by_node, by_chromium
 
 
 def _node(text: str) -> float:

@@ -75,7 +75,7 @@ class Measured(Session):
             if name == "hand.target":
                 x, y = np.ravel(value)[:2].tolist()
                 hand = live._simulation.instances["hand"]
-                hand.before_step(lambda: self.acted.setdefault((x, y), time.time()))
+                hand.before_step(lambda _: self.acted.setdefault((x, y), time.time()))
 
         live.set, live.noted = noted, True  # type: ignore[method-assign,attr-defined]
 

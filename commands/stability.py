@@ -100,10 +100,10 @@ def stability(
     name = default_folder("runs", scene).name
     if vary:
         folder = out or default_folder("maps", scene, chosen)
-        points, record = _map(
+        points, map_record = _map(
             scene, folder, options(set, swap, map), vary, check, seed, jobs, quiet
         )
-        tell_result((f"{name}: {next(points)}", *points), record, quiet, json)
+        tell_result((f"{name}: {next(points)}", *points), map_record, quiet, json)
         return 0
     import hapticlink as hl
     from hapticlink.analysis.stability.kinds import Bounds

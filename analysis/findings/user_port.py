@@ -136,8 +136,8 @@ def ports(results: Results) -> Iterator[UserPort | None]:
 
 def _energy_at_start(window: Results) -> float:
     mechanism = of_block(window, MECHANISM_ENERGY)
-    first = mechanism[MECHANISM_ENERGY][:1] if mechanism else ()
-    return float(first[0]) if len(first) else 0.0
+    energies = mechanism[MECHANISM_ENERGY] if mechanism else np.zeros(0)
+    return float(energies[0]) if len(energies) else 0.0
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged

@@ -176,6 +176,7 @@ class _Search:
                 if key == f"{table}.damping":
                     yield tuple(overrides.written({key: value}))
         if read.graphics is not None:
+            assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
             rate = float(exact(read.graphics.rate))
             if margin.rate is not None and margin.rate > rate:
                 rate = min(margin.rate, float(self._haptic))
@@ -191,7 +192,7 @@ class _Search:
 
     def remedy(self, candidates: Sequence[tuple[str, ...]], poses: Sequence[Pose]) -> Remedy | None:
         """The candidate that is judged best in the worst pose and holds in all poses."""
-        ranked = []
+        ranked: list[tuple[float, int, tuple[str, ...]]] = []
         for change in candidates:
             options = (*self._given, *change)
             with_change = whole_frames(open_scene.load(self._scene, options), options)

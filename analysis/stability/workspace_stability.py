@@ -147,7 +147,10 @@ class _Judgement:
         hand, linkage = self._read.hand, self._read.linkage
         if not isinstance(hand, ConstantHand) or not any(hand.wrench) or linkage is None:
             return []
-        settled = {"hand.damping": list(SETTLED_BY), "duration": SETTLING}
+        settled: dict[str, float | list[float]] = {
+            "hand.damping": list(SETTLED_BY),
+            "duration": SETTLING,
+        }
         try:
             run = simulated(self._scene, self._given, settled)
         except InputFault:

@@ -74,10 +74,11 @@ class FiveBar:
         """Kinetic energy; `angles` are anything whose rates are those of the links."""
         speeds = [ca.jtimes(c, q, qd) for c in centres]
         turns = [ca.jtimes(a, q, qd) for a in angles]
-        return 0.5 * sum(
+        parts = (
             m * ca.sumsqr(v) + i * w**2
             for m, i, v, w in zip(self.masses, self.inertias, speeds, turns, strict=True)
         )
+        return 0.5 * sum(parts, start=ca.SX(0))
 
     @cached_property
     def tree(self) -> ca.Function:
@@ -153,7 +154,7 @@ class FiveBar:
         steps = [self.partitioned(pair) for pair in PAIRS]
         chosen = ca.Function.conditional("chosen", steps[:-1], steps[-1])
         which = ca.Function("which", [at], [best])(q)
-        return ca.Function("repartitioned", [q, qd, h], chosen(which, q, qd, h))
+        return ca.Function("repartitioned", [q, qd, h], chosen.call([which, q, qd, h]))
 
     def embedded(self, branch: float) -> ca.Function:
         """(q, qd, h) -> (q, qd) after a step of RK4 in the shoulders, with the elbows as closed
@@ -180,7 +181,7 @@ class FiveBar:
         whole = ca.Function("whole", [s, sd], [q, ca.jtimes(q, s, sd)])
         q0, qd0, step = ca.SX.sym("q", 4), ca.SX.sym("qd", 4), ca.SX.sym("h")
         after = runge_kutta(lambda g, v, vd: (g, sdd(v, vd)), q0, q0[[0, 2]], qd0[[0, 2]], step)
-        return ca.Function("embedded", [q0, qd0, step], whole(*after), {"cse": True})
+        return ca.Function("embedded", [q0, qd0, step], whole.call([*after]), {"cse": True})
 
     def side(self, q: np.ndarray) -> float:
         """The branch of `embedded`: on which side of the line of the elbows links 2 and 4 meet."""

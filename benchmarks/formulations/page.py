@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Literal
 
 import casadi as ca
 import matplotlib.pyplot as plt
@@ -22,6 +23,8 @@ METHODS = {
     "coordinate partitioning": "#2a9d5c",
     "symbolic embedding": "#8a6fb0",
 }
+STABILIZATIONS: tuple[Literal["baumgarte", "projection"], ...] = ("baumgarte", "projection")
+"""Of the first two methods."""
 UNKNOWNS = dict(zip(METHODS, ("n + m = 6", "n + m = 6", "n - m = 2", "n - m = 2"), strict=True))
 COLUMNS = ("case", "method", "straightness", "error_mm", "operations", "us_a_step")
 LOST = 10.0  # mm
@@ -55,7 +58,7 @@ def steps(
     """Of each method name, operations of a step, (state, steps) -> state, and the same of which the
     time is taken: partitioning with the pair of dependent coordinates that it has at the start."""
     h = 1 / RATE
-    for name, stabilization in zip(METHODS, ("baumgarte", "projection"), strict=False):
+    for name, stabilization in zip(METHODS, STABILIZATIONS, strict=False):
         settings = Mechanism(integrator="rk4", stabilization=stabilization)
         ours = Ours(bar.linkage(start[:4], start[4:]), bar.wrench, settings, h)
         advance = ours.advance(folder)

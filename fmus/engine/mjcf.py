@@ -13,14 +13,14 @@ which is the body's angle without jumps at half turns.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.bodies import Body, counterclockwise, edges
 from hapticlink.components.specs.contacts import Contacts, Pair
-from hapticlink.components.specs.linkage import Gear, Joint, Linkage, Spring
+from hapticlink.components.specs.linkage import Gear, Joint, Linkage, Loop, Spring
 from hapticlink.components.specs.quantities import Point
 from hapticlink.fmus.errors import FmuError
 
@@ -154,8 +154,8 @@ def _xy(point: tuple[float, float] | None) -> str:
 
 def _bodies(parent: ET.Element, name: str, linkage: Linkage, shapes: _Shapes) -> None:
     """The sites of the body `name`, and the bodies that it carries, into their element."""
-    for site, body, at in _sites(linkage):
-        if body == name:
+    for site, carrier, at in _sites(linkage):
+        if carrier == name:
             ET.SubElement(parent, "site", name=site, pos=_xy(at))
     for joint in linkage.joint:
         if joint.parent != name:
@@ -174,7 +174,8 @@ def _bodies(parent: ET.Element, name: str, linkage: Linkage, shapes: _Shapes) ->
 
 def _sites(linkage: Linkage) -> Iterator[tuple[str, str, Point | None]]:
     yield from points(linkage)
-    for kind, pairs in (("loop", linkage.loop), ("spring", linkage.spring)):
+    tied: dict[str, Sequence[Loop | Spring]] = {"loop": linkage.loop, "spring": linkage.spring}
+    for kind, pairs in tied.items():
         for i, pair in enumerate(pairs):
             for k in (0, 1):
                 yield f"{kind}{i}.{k}", pair.bodies[k], pair.at[k]
@@ -197,8 +198,8 @@ def _joint(body: ET.Element, joint: Joint, at: Point) -> None:
     attributes = {key: repr(float(value)) for key, value in given.items() if value is not None}
     if limits := joint.limits:
         ends = (limits.lower, -1e9), (limits.upper, 1e9)
-        ends = (repr(none if end is None else end) for end, none in ends)
-        attributes |= {"range": " ".join(ends), "limited": "true", "solimplimit": RIGID}
+        interval = " ".join(repr(none if end is None else end) for end, none in ends)
+        attributes |= {"range": interval, "limited": "true", "solimplimit": RIGID}
     kind = "hinge" if hinge else "slide"
     place = {"name": joint.name, "type": kind, "axis": axis, "pos": _xy(at)}
     ET.SubElement(body, "joint", place | attributes)

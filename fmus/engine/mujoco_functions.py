@@ -146,7 +146,7 @@ class Engine:
             values |= self._at(point, solve, minv, named, x)
         if "closure_error" in self._about["outputs"]:
             gaps = [self._gap(loop) for loop in self._loops]
-            values["closure_error"] = max([0.0, *map(np.linalg.norm, gaps)])
+            values["closure_error"] = max([0.0, *(float(np.linalg.norm(gap)) for gap in gaps)])
         if "branch_ok" in self._about["outputs"]:
             values |= self._assembly(values["q"], inputs["q_ref"])
         start = 0
@@ -376,4 +376,4 @@ def _pivots(W: Array) -> tuple:
 
 def _doubles(*values: Array) -> Array:
     flat = np.concatenate([np.ravel(np.asarray(v, dtype=float)) for v in values])
-    return memoryview(flat)
+    return flat.data

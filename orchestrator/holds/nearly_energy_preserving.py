@@ -11,6 +11,7 @@ Computational Methods for Coupled Problems, 2013).
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account, Vector, repayment
@@ -22,7 +23,7 @@ class NearlyEnergyPreserving(Account):
         self._last = self._x
         self._correction = self._travelled = self._last * 0.0
 
-    def outside(self, furthest: Vector, added: Vector) -> tuple[Vector, Vector]:
+    def outside(self, furthest: Vector, added: Vector) -> tuple[NDArray[np.bool_], Vector]:
         """A step against the motion of the last period, in which the correction does the opposite
         work."""
         beyond = (self.motion * self._travelled < 0.0) & (added > 0.0)

@@ -35,6 +35,7 @@ grows by a tenth a step. A smaller step back has been stopped, as a friction may
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account, Vector
@@ -49,7 +50,7 @@ class Passive(Account):
         super().__init__(context)
         self._last_predicted = np.zeros(context.size)
 
-    def outside(self, furthest: Vector, added: Vector) -> tuple[Vector, Vector]:
+    def outside(self, furthest: Vector, added: Vector) -> tuple[NDArray[np.bool_], Vector]:
         """(r + c) |dx| of a step that is not as predicted, (1 - beta) C |dx| of any other."""
         way = np.abs(self.motion)
         beyond = (self.motion * self.predicted < 0.0) | (way > furthest)

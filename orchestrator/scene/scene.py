@@ -186,7 +186,7 @@ class Scene:
         rates = {"haptics": self.haptics.rate, "graphics": self.graphics and self.graphics.rate}
         links, users = self.linkage, self.all_devices
         mechanism = links and f"{len(links.body)} bodies, {len(links.loop)} closed loops"
-        blocks = [*(["device"] * len(users)), *(f.name or f.replaces or f.path for f in self.fmu)]
+        blocks = [*(["device"] * len(users)), *(f.name or f.path or "unnamed" for f in self.fmu)]
         lines = (
             self.title,
             f"mechanism: {mechanism or 'none'}; {', '.join(blocks) or 'no device'}",

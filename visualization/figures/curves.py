@@ -5,16 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.user_port import UserPort, ports
 from hapticlink.orchestrator.results.tables import Results, Vector
 
 STRETCHES = 2048
 """Of a long run: more than a figure has pixels."""
-Curve = tuple[Vector, ...]
-"""Times or places, (k,), and what belongs to them, each (k,) or (k, n)."""
+Curve = tuple[NDArray[Any], ...]
+"""Times or places, (k,), and what belongs to them, numbers or flags, each (k,) or (k, n)."""
 
 
 def curve(results: Results, of: Callable[[Results], Curve]) -> Curve:

@@ -27,20 +27,18 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     """Forces, moments and, against their limits, motor torques of a run that has wrenches.
     devices: of each user by point; the first one's name is empty. Further users are dashed."""
     first = next(results.windows())
-    wrenches = {
-        name: curve(results, lambda window, name=name: all_wrenches(window)[name])
-        for name in all_wrenches(first)
-    }
+    wrenches = {name: curve(results, partial(_wrench, name=name)) for name in all_wrenches(first)}
     driven = {
-        user: (*curve(results, partial(_torques, device=device, user=user)), device.torque_limit)
+        user: curve(results, partial(_torques, device=device, user=user))
         for user, device in devices.items()
         if torques(first, device, user)
     }
     largest, (_, force, _) = max(wrenches.items(), key=lambda item: item[1][1].max())
     title = f"The largest force is that of the {largest}: {short(force.max())} N"
     labels = ["force (N)", "moment (N.m)", *(["motor torque (N.m)"] if driven else [])]
+    limits = {user: device.torque_limit for user, device in devices.items()}
     if driven:
-        share = 100 * max(np.abs(tau).max() / limit for _, tau, limit in driven.values())
+        share = 100 * max(np.abs(tau).max() / limits[user] for user, (_, tau) in driven.items())
         title += f"; motors reach {short(share)} % of their torque limit"
     figure, axes = titled(results, title, "time (s)", *labels)
     styles = dict(zip(["", *further_users(results)], cycle(STYLES)))
@@ -51,16 +49,20 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
         axes[0].plot(time, force, label=name, **look)
         axes[1].plot(time, moment, **look)
     legend_above_curves(axes[0], columns=2)
-    for user, (time, tau, limit) in driven.items():
+    for user, (time, tau) in driven.items():
         for i, each in enumerate(tau.T):
             label = None if user else f"motor {i + 1}"
             axes[2].plot(time, each, lw=1, color=f"C{i}", ls=styles[user], label=label)
         for sign in (-1, 1):
             label = None if user or sign < 0 else "limit"
-            axes[2].axhline(sign * limit, color="k", lw=0.8, ls="--", label=label)
+            axes[2].axhline(sign * limits[user], color="k", lw=0.8, ls="--", label=label)
     if driven:
         legend_above_curves(axes[2], columns=5)
     return figure
+
+
+def _wrench(window: Results, name: str) -> Curve:
+    return all_wrenches(window)[name]
 
 
 def _torques(window: Results, device: Device, user: str) -> Curve:

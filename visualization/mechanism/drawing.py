@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from hapticlink.orchestrator.scene.scene import Scene
 
 Points = NDArray[np.float64]
+Coordinates = Sequence[float] | NDArray[np.float64]
+"""Joint coordinates of a linkage (m, rad)."""
 Frame = Mapping[str, Any]
 Look = dict[str, Any]
 MAX_NAMED_BODIES = 10
@@ -51,8 +53,8 @@ ROLES_BEHIND_PATHS = ("obstacle", "device", "directions", "ground", "rail", "spr
 def draw(
     axes: Axes,
     linkage: Linkage,
-    q: Sequence[float],
-    end: Sequence[float] | None,
+    q: Coordinates,
+    end: Coordinates | None,
     contacts: Contacts | None = None,
     held: Device | None = None,
 ) -> Points:
@@ -76,7 +78,7 @@ def draw(
 def device(
     axes: Axes,
     linkage: Linkage,
-    q: Sequence[float],
+    q: Coordinates,
     devices: Mapping[str, Device],
     limits: Points,
 ) -> None:
@@ -95,7 +97,7 @@ def device(
         spine.set_visible(False)
 
 
-def figure(scene: Scene, q: Sequence[float]) -> Figure:
+def figure(scene: Scene, q: Coordinates) -> Figure:
     """A figure of the scene's mechanism at joint coordinates q."""
     from matplotlib.figure import Figure
 

@@ -25,8 +25,8 @@ def html(runs: Sequence[Recorded]) -> str:
 
 
 def _names(runs: Sequence[Recorded]) -> list[str]:
-    folders = [run.results.folder for run in runs]
-    return names(folders) if all(folders) else [run.name for run in runs]
+    written = [folder for run in runs if (folder := run.results.folder)]
+    return names(written) if len(written) == len(runs) else [run.name for run in runs]
 
 
 def require_written(path: Path) -> None:
