@@ -26,7 +26,7 @@ from benchmarks.rows import Rows
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.run import event_loop
 from hapticlink.orchestrator.run.compiled.library import load
-from hapticlink.visualization.live.mouse_hand import viewed
+from hapticlink.visualization.live.viewed_scene import viewed
 from hapticlink.visualization.replay import one_file
 from hapticlink.visualization.standalone import page
 

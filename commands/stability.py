@@ -106,7 +106,7 @@ def stability(
         tell_result((f"{name}: {next(points)}", *points), map_record, quiet, json)
         return 0
     import hapticlink as hl
-    from hapticlink.analysis.stability.kinds import Bounds
+    from hapticlink.analysis.stability.mode_kinds import Bounds
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 

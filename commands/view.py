@@ -104,8 +104,8 @@ def view(
             f"`hapticlink view {default_folder('runs', scene)}`"
         )
     import hapticlink as hl
-    from hapticlink.visualization.live.mouse_hand import viewed
     from hapticlink.visualization.live.session import Session
+    from hapticlink.visualization.live.viewed_scene import viewed
 
     read = viewed(scene, options(set, swap, map))
     if standalone:

@@ -28,7 +28,7 @@ from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.changes import changed, choices, require_other_rate
+from hapticlink.orchestrator.system.live_changes import changed, choices, require_other_rate
 from hapticlink.orchestrator.system.ports import names
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import Connection, System

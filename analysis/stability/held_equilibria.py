@@ -15,10 +15,10 @@ from hapticlink.analysis.stability.equilibrium import newton_step, rests, unrest
 from hapticlink.analysis.stability.gains import Gains, Scales
 from hapticlink.analysis.stability.hand_slopes import HandSlopes, hand_slopes
 from hapticlink.analysis.stability.hands import FIRM, LEVER, spring_hand
-from hapticlink.analysis.stability.kinds import DRIFT, kind
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod, linear_period
 from hapticlink.analysis.stability.linearisable_scene import linearisable
+from hapticlink.analysis.stability.mode_kinds import DRIFT, kind
 from hapticlink.analysis.stability.modes import Mode, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.trajectory import TOLERANCE

@@ -15,8 +15,8 @@ from typing import Any
 from hapticlink.analysis.stability.gains import LAWS, Gains
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE
 from hapticlink.analysis.stability.held_equilibria import Held
-from hapticlink.analysis.stability.kinds import Bounds
 from hapticlink.analysis.stability.largest_scale import largest
+from hapticlink.analysis.stability.mode_kinds import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.analysis.stability.rates import whole_frames
 from hapticlink.analysis.stability.workspace_cases import AtRest, Case, at_pose, in_poses

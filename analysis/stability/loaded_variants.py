@@ -17,8 +17,8 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long
 from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.modes import counted, modes
+from hapticlink.analysis.stability.radius_verdict import verdict
 from hapticlink.analysis.stability.trajectory import trajectory
-from hapticlink.analysis.stability.verdict import verdict
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi.variables import Scalar

@@ -17,9 +17,9 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.mode_frequency import traced
 from hapticlink.analysis.stability.modes import NEAR, Mode, counted, leading, modes
+from hapticlink.analysis.stability.radius_verdict import verdict
 from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
-from hapticlink.analysis.stability.verdict import verdict
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault

@@ -15,11 +15,11 @@ from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, free, holds
 from hapticlink.analysis.stability.held_equilibria import Held, held
-from hapticlink.analysis.stability.kinds import Bounds, kind
 from hapticlink.analysis.stability.linear_period import LinearPeriod
+from hapticlink.analysis.stability.mode_kinds import Bounds, kind
 from hapticlink.analysis.stability.modes import Mode, counted, leading, modes
 from hapticlink.analysis.stability.poses import Pose
-from hapticlink.analysis.stability.verdict import verdict
+from hapticlink.analysis.stability.radius_verdict import verdict
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, user_of_block

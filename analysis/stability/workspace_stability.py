@@ -17,8 +17,8 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hands import FREE, HANDS, OWN, OWN_FREE, holds, own_hand
 from hapticlink.analysis.stability.improvements import improvements
-from hapticlink.analysis.stability.kinds import DRIFT, Bounds
 from hapticlink.analysis.stability.linearisable_scene import linearisable
+from hapticlink.analysis.stability.mode_kinds import DRIFT, Bounds
 from hapticlink.analysis.stability.poses import Pose, average, evenly_spaced, simulated
 from hapticlink.analysis.stability.varying_rate import varies
 from hapticlink.analysis.stability.workspace_cases import in_poses

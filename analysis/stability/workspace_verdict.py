@@ -9,7 +9,7 @@ from typing import Any
 
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.improvements import Margin, Remedy
-from hapticlink.analysis.stability.kinds import Bounds
+from hapticlink.analysis.stability.mode_kinds import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.analysis.stability.workspace_cases import Case
 from hapticlink.components.specs.hand import Hand

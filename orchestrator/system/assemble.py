@@ -16,7 +16,13 @@ from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path as Keys
 from hapticlink.orchestrator.scene.toml_keys import Problem
-from hapticlink.orchestrator.system import checks, fmu_tables, haptic_loop, replacements, timed
+from hapticlink.orchestrator.system import (
+    checks,
+    fmu_tables,
+    haptic_loop,
+    replacements,
+    timed_events,
+)
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import connect, whole
 from hapticlink.orchestrator.system.recorded import recorded
@@ -64,7 +70,7 @@ def from_scene(
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(fmus, condition):
         problems.append((("stop_when",), f"{condition}: there is no such output"))
-    timed_events = timed.changes(scene, fmus, assigned, timeline, rules, problems)
+    changes = timed_events.changes(scene, fmus, assigned, timeline, rules, problems)
     written = recorded(scene.record, fmus, assigned, problems)
     if problems:
         raise SceneFault(scene.title, [scene.place(*problem) for problem in problems])
@@ -90,7 +96,7 @@ def from_scene(
             assigned,
             {fmu.name: names for fmu, *_, names in tables},
         ),
-        timed_events,
+        changes,
     )
 
 

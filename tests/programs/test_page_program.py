@@ -30,7 +30,7 @@ from hapticlink.programs.build import components
 from hapticlink.programs.page_program import webassembly_files
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolved import resolved
-from hapticlink.visualization.live.mouse_hand import STIFFNESS, viewed
+from hapticlink.visualization.live.viewed_scene import STIFFNESS, viewed
 from hapticlink.visualization.replay import one_file
 from hapticlink.visualization.standalone import page
 from hapticlink.visualization.standalone.description import Description

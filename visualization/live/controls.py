@@ -14,11 +14,11 @@ from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.changes import choices_between_rates, choices_of_slower
+from hapticlink.orchestrator.system.live_changes import choices_between_rates, choices_of_slower
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import System
 from hapticlink.visualization.live import messages
-from hapticlink.visualization.live.mouse_hand import STIFFNESS
+from hapticlink.visualization.live.viewed_scene import STIFFNESS
 
 GAINS = (HAND, CONTROLLER)
 """Blocks of a user whose tunable parameters are gains; those of the mechanism are, too."""

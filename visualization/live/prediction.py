@@ -11,8 +11,8 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hands import HANDS
 from hapticlink.analysis.stability.held_equilibria import held_system
-from hapticlink.analysis.stability.kinds import DRIFT
 from hapticlink.analysis.stability.lifted_map import hyperperiod
+from hapticlink.analysis.stability.mode_kinds import DRIFT
 from hapticlink.analysis.stability.state_vector import size
 from hapticlink.analysis.stability.workspace_cases import AtRest, Case
 from hapticlink.components.specs.hand import SpringHand
@@ -20,11 +20,11 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
-from hapticlink.orchestrator.system.changes import held_by
+from hapticlink.orchestrator.system.live_changes import held_by
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live.controls import Settings
-from hapticlink.visualization.live.mouse_hand import DAMPING, STIFFNESS
+from hapticlink.visualization.live.viewed_scene import DAMPING, STIFFNESS
 
 MAX_COST = {"native": 1e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map

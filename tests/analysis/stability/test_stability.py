@@ -15,7 +15,7 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.modes import counted, modes
-from hapticlink.analysis.stability.verdict import verdict
+from hapticlink.analysis.stability.radius_verdict import verdict
 from hapticlink.commands import main
 
 T = 1 / 512

@@ -14,11 +14,11 @@ import hapticlink as hl
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import HANDS, OWN, free
 from hapticlink.analysis.stability.held_equilibria import Held, held
-from hapticlink.analysis.stability.kinds import DRIFT, kind
 from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.linearisation import linearised
+from hapticlink.analysis.stability.mode_kinds import DRIFT, kind
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.workspace_cases import AtRest
 from hapticlink.components.specs.hand import ArmHand, SpringHand

@@ -8,7 +8,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.visualization.live.frames import Frames, power
-from hapticlink.visualization.live.mouse_hand import viewed
+from hapticlink.visualization.live.viewed_scene import viewed
 from tests.visualization.live.javascript import javascript
 
 

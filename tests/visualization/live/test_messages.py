@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.visualization.live.messages import Gain, Hand, Time, newest, parse
-from hapticlink.visualization.live.mouse_hand import viewed
+from hapticlink.visualization.live.viewed_scene import viewed
 from hapticlink.visualization.mechanism.picture import Part, directions
 
 

@@ -13,8 +13,8 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.visualization.live.controls import Settings
-from hapticlink.visualization.live.mouse_hand import viewed
 from hapticlink.visualization.live.prediction import predicted
+from hapticlink.visualization.live.viewed_scene import viewed
 from tests.visualization.live.chromium import Page, chromium
 from tests.visualization.live.served import Served
 
