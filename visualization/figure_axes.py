@@ -90,8 +90,10 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
 def _events(axes: Axes, results: Results) -> None:
     """A line at each time at which something happens in the scene, with its text."""
     texts: dict[float, list[str]] = {}
-    for time, text in results.run.get("events", ()):
-        if time <= last_time(results):
+    events = results.run.get("events", ())
+    end = last_time(results) if events else 0.0
+    for time, text in events:
+        if time <= end:
             texts.setdefault(time, []).append(shortened(text, 60))
     for time, said in texts.items():
         axes.axvline(time, color="0.4", linestyle=":", linewidth=1)

@@ -38,6 +38,7 @@ from hapticlink.orchestrator.base.loop_names import (
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors
 from hapticlink.orchestrator.results.tables import TABLES, Results
+from hapticlink.orchestrator.results.windows import last
 from hapticlink.orchestrator.scene.start_pose import outside
 from hapticlink.orchestrator.system.system import Replacement
 
@@ -78,7 +79,7 @@ def told(results: Results, name: str, known: Sequence[str] | None = None) -> Ite
     doubtful = [line for line in recorded if line.startswith("warning: ")]
     for line in (
         *doubtful,
-        *(known or numbers(results)),
+        *(numbers(results) if known is None else known),
         *(r for r in recorded if r not in doubtful),
     ):
         yield f"  {line}"
@@ -223,8 +224,7 @@ def _passivity(results: Results, measures: Measures) -> Iterator[str]:
 def _stopped(results: Results) -> Iterator[str]:
     """A line if the passive midpoint method had to stop the mechanism, and one if contacts change
     its energy between steps."""
-    *_, last = results.windows()
-    table = of_block(last, MECHANISM_STOPS)
+    table = of_block(last(results), MECHANISM_STOPS)
     if table and (results.record.scene["contacts"] or {}).get("detection") == "graphics":
         method = results.record.scene["mechanism"]["integrator"]
         yield (

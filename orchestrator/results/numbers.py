@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.windows import last
 
 
 def last_time(results: Results) -> float:
     """The time (s) of the last row of the first table that has any."""
-    *_, last = results.windows()
-    rows = (table["time"] for table in last.tables.values())
+    rows = (table["time"] for table in last(results).tables.values())
     return next((float(times[-1]) for times in rows if len(times)), 0.0)
 
 

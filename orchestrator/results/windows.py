@@ -3,6 +3,7 @@ of what reads them does not grow with the duration."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -82,11 +83,12 @@ class Streamed(Results):
         }
         cuts = [-np.inf, *(end * np.arange(1, self.number) / self.number), np.inf]
         for begin, until in pairwise(map(float, cuts)):
-            tables: dict[str, Table] = {}
-            for name in record.rates:
-                file = files.get(name)
-                span = begin - beside, until + beside
-                tables[name] = file.between(*span, tables) if file else empty(tables)
+            span = begin - beside, until + beside
+            # No table of a window knows the others: a cycle would stay until the next collection.
+            tables = {
+                name: files[name].between(*span) if name in files else empty({})
+                for name in record.rates
+            }
             window = Results(self.folder, self.run, tables, begin, until)
             window.__dict__["record"] = record  # read once
             yield window
@@ -99,6 +101,11 @@ def until(results: Results, time: float) -> Iterator[Results]:
             cut = replace(window, end=min(window.end, time))
             cut.__dict__["record"] = results.record
             yield cut
+
+
+def last(results: Results) -> Results:
+    """The last window of results, without those before it in memory."""
+    return deque(results.windows(), maxlen=1).pop()
 
 
 def _beside(record: RunRecord) -> float:
@@ -116,7 +123,7 @@ class _Forward:
         self._total = rows.count(path)
         self._kept, self._first = np.zeros((0, len(self._columns))), 0
 
-    def between(self, begin: float, end: float, others: Mapping[str, Table]) -> Table:
+    def between(self, begin: float, end: float) -> Table:
         """The rows of begin <= time <= end (s)."""
         over = int(np.searchsorted(self._kept[:, 0], begin))
         found = [self._kept[over:]]
@@ -126,4 +133,4 @@ class _Forward:
             found.append(part)
         self._kept, self._first = np.concatenate(found), self._first + over
         kept = self._kept[: np.searchsorted(self._kept[:, 0], end, "right")]
-        return Table(self._columns, kept, others, self._first, self._total)
+        return Table(self._columns, kept, {}, self._first, self._total)

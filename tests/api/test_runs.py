@@ -57,15 +57,22 @@ def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
     assert folder.run["options"] == ["duration=0.1", "graphics.rate=40"]
 
 
+@pytest.mark.parametrize("scene", ["bar", "closed-loop"])
 def test_a_long_run_reads_no_table_back_and_tells_the_same(
-    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    scene: str,
+    bar: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A run of many windows: its lines, run.json and figures, without a CSV that is read."""
+    """A run of many windows: its lines, run.json and figures, without a CSV that is read. That of a
+    bar has no numbers."""
     told, runs = [], []
+    given = (bar,) if scene == "bar" else (scene, *sets(["duration=0.1"]))
     for name, size in (("short", 1 << 24), ("long", 2000)):
         monkeypatch.setattr("hapticlink.orchestrator.results.windows.WINDOW_BYTES", size)
         monkeypatch.setattr("numpy.loadtxt", lambda *_, **__: pytest.fail("a CSV was read"))
-        assert status("run", bar, "--out", tmp_path / name) == 0
+        assert status("run", *given, "--out", tmp_path / name) == 0
         said = capsys.readouterr().out.replace(f"/{name}", "")
         told.append([line for line in said.splitlines() if "run time" not in line])
         runs.append(json.loads((tmp_path / name / "run.json").read_text()))

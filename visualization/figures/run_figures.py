@@ -182,10 +182,8 @@ def _with(unit: str, value: float) -> str:
 
 def _arrow(results: Results, axes: Axes) -> None:
     """The largest force of the hand, where it acted."""
-    acted = [found for window in results.windows() if (found := _largest(window))]
-    if not acted:
-        return
-    most, time, force, pose = max(acted, key=lambda each: each[0])
+    acted = (found for window in results.windows() if (found := _largest(window)))
+    most, time, force, pose = max(acted, key=lambda each: each[0], default=(0.0, 0.0, None, None))
     if not most > 0:
         return
     _, color, _ = marks.FORCES["F_hand"]
@@ -302,8 +300,9 @@ def _point(user: str) -> str:
 
 def _contact(results: Results) -> Figure:
     time, force, pushing = curve(results, _pushing)
-    pushes = [touched[1] for window in results.windows() if (touched := touching(window))]
-    share = 100 * float(np.concatenate(pushes).mean())
+    pushes = (touched[1] for window in results.windows() if (touched := touching(window)))
+    pushed, samples = np.sum([(each.sum(), len(each)) for each in pushes], axis=0)
+    share = 100 * float(pushed / samples)
     most = short(force[pushing].max(initial=0.0))
     title = f"Contacts push in {short(share)} % of the samples, with |F_env| of at most {most} N"
     figure, axes = titled(

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import math
+from collections.abc import Iterator
 from pathlib import Path
+from typing import ClassVar
+from weakref import WeakSet
 
 import numpy as np
 import pytest
@@ -15,6 +19,8 @@ from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import windows
 from hapticlink.orchestrator.results.tables import Results, load
+from hapticlink.orchestrator.results.windows import Streamed
+from hapticlink.visualization.figures import run_figures
 from hapticlink.visualization.figures.curves import STRETCHES, curve, extremes
 
 CASES = {
@@ -76,6 +82,35 @@ def test_no_window_grows_with_the_duration(tmp_path: Path, monkeypatch: pytest.M
         assert sum(map(len, kept)) >= duration * 512
         most.append(max(rows))
     assert most[1] < 1.2 * most[0]
+
+
+class Kept(Streamed):
+    """Counts the windows that are in memory at a time."""
+
+    there: ClassVar[WeakSet[Results]] = WeakSet()
+    most: ClassVar[int] = 0
+
+    def windows(self) -> Iterator[Results]:
+        for window in super().windows():
+            Kept.there.add(window)
+            Kept.most = max(Kept.most, len(Kept.there))
+            yield window
+
+
+def test_windows_that_were_read_do_not_stay_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not until a collection of garbage either, which arrays do not count for."""
+    monkeypatch.setattr(windows, "Streamed", Kept)
+    found = results(tmp_path, monkeypatch, "closed-loop", "duration=1")
+    gc.disable()
+    try:
+        assert [*summary.lines(found), *summary.numbers(found), *episodes(found)]
+        assert [*run_figures.drawings(found)]
+        run_figures.figures(found)
+    finally:
+        gc.enable()
+    assert 0 < Kept.most <= 5 < found.number
 
 
 def test_tables_of_a_long_run_are_read_when_they_are_asked_for(
