@@ -47,6 +47,11 @@ class Coordinate:
         return f"{self.owner}{joint}{self.variable}"
 
 
+COUNTED = ("premises",)
+"""Attributes of holds that are counted for the results, and that no hold reads: no part of the
+state."""
+
+
 @dataclass(frozen=True)
 class Template:
     """A saved state: of the FMUs in bytes, by name; the signals; the attributes of holds and
@@ -237,7 +242,10 @@ def _mapped(value: Any, path: str, visit: Visit) -> Any:
         case float():
             return float(visit(path, np.array(value)))
         case dict():
-            return {k: _mapped(v, f"{path}.{k}", visit) for k, v in value.items()}
+            return {
+                k: v.copy() if k in COUNTED else _mapped(v, f"{path}.{k}", visit)
+                for k, v in value.items()
+            }
         case list() | tuple():
             return type(value)(_mapped(v, f"{path}[{i + 1}]", visit) for i, v in enumerate(value))
         case deque():

@@ -54,7 +54,9 @@ class Passive(Account):
         """(r + c) |dx| of a step that is not as predicted, (1 - beta) C |dx| of any other."""
         way = np.abs(self.motion)
         beyond = (self.motion * self.predicted < 0.0) | (way > furthest)
-        return beyond, np.where(beyond, self.swing + added, (1.0 / self.beta - 1.0) * added) * way
+        ones = np.ones_like(self.beta)  # without friction, as a linearisation has it, beta is 0
+        left_out = np.divide(1.0, self.beta, out=ones, where=self.beta > 0.0) - 1.0
+        return beyond, np.where(beyond, self.swing + added, left_out * added) * way
 
     def correction(self, fresh: bool) -> Vector:
         ahead = self._last_predicted

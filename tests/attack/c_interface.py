@@ -69,6 +69,7 @@ def sanitized(component: Component, folder: Path, wrapper: Path = WRAPPER) -> Fm
     flags = ["-shared", "-fPIC", "-std=gnu11", "-O1", *UNDEFINED, "-fsanitize=address"]
     headers = Path(fmpy.__file__).parent / "c-code"
     command = ["gcc", *flags, "-fno-sanitize-recover=all", f"-I{room}", f"-I{headers}"]
+    command += [f"-I{WRAPPER.parent}"]
     subprocess.run([*command, "-o", library, wrapper, "-lm"], check=True)
     environment = {
         "LD_PRELOAD": _address_library(),
@@ -101,7 +102,7 @@ def _compiled(
     kind: str, component: Component, folder: Path, options: Iterable[str], wrapper: Path = WRAPPER
 ) -> Fmu:
     room = _sources(component, folder / kind.replace(" ", "-"))
-    exported = ["-fvisibility=default", f"-I{room}", *options]
+    exported = ["-fvisibility=default", f"-I{room}", f"-I{WRAPPER.parent}", *options]
     library = compile_library(wrapper, room / "library.so", options=exported)
     return Fmu(kind, library, GUID, _reals(component), True, {})
 

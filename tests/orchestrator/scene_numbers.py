@@ -81,7 +81,8 @@ def tables(name: str) -> dict[str, Any]:
 
 @cache
 def of_scene(name: str) -> list[Number]:
-    return list(numbers(Scene, open_scene.load(name).plain(), ()))
+    every = numbers(Scene, open_scene.load(name).plain(), ())
+    return [number for number in every if number.quantity.unit != "the variable's own"]
 
 
 def beyond(number: Number) -> st.SearchStrategy[Any]:
@@ -92,7 +93,8 @@ def beyond(number: Number) -> st.SearchStrategy[Any]:
     if number.whole:
         assert low is not None
         found.append(st.integers(-(2**63), int(low) - 1))
-        found += [st.integers(int(high) + 1, 2**63 - 1)] if high is not None else []
+        if high is not None and high < 2**63 - 1:
+            found.append(st.integers(int(high) + 1, 2**63 - 1))
         return st.one_of(found)
     if low is not None:
         found.append(st.floats(max_value=low, exclude_max="ge" in number.quantity.bounds))

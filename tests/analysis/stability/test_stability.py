@@ -360,6 +360,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
             [
                 "stability",
                 "virtual-wall",
+                "--equilibrium",
                 "--set",
                 "fmu.wall.start.stiffness=6000",
                 "--out",

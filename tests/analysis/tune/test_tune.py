@@ -18,7 +18,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.stability.hands import FIRM, SPRINGS, spring
+from hapticlink.analysis.stability.hands import FIRM, spring
 from hapticlink.analysis.stability.held_equilibria import held
 from hapticlink.analysis.stability.linearisation import linearised
 from hapticlink.analysis.stability.poses import LIGHT, Pose, simulated
@@ -128,7 +128,7 @@ def test_felt_stiffness_has_its_closed_form(
     pose = Pose(0.0, {"rail": 0.0205}, (0.0205, 0.0, 0.0), (1.0, 0.0, 0.0))
     options = pose.options((f"haptics.rate={rate}", f"graphics.rate={rate // 16}"))
     with held(slider, options) as place:
-        X = place.compliance({}, FIRM, hertz)
+        X = place.compliance({}, hertz)
         assert place.signal("virtual_mechanism.F_env")[0] == pytest.approx(-1.0, abs=0.03)
         M = place.signal("haptic_device.M").reshape(3, 3)
     exact = closed_form(M, 2j * np.pi * hertz)
@@ -254,16 +254,16 @@ def test_a_contact_that_is_slid_off_is_pressed_lightly() -> None:
         assert least < np.hypot(*(run["haptic_device.x_true"][-1] - pose.point)[:2]) < most
 
 
-def test_the_columns_that_are_carried_hold_all_modes() -> None:
-    """A judgement carries the directions of the first rest alone; the map linearised along all of
-    them has the same spectral radius."""
+def test_slopes_of_operations_have_the_radius_of_the_whole_map() -> None:
+    """A judgement takes the slopes of single operations; the whole map, by differences along all of
+    its columns, has the same spectral radius."""
     pose = poses(recorded("closed-loop"))[0]
     given = pose.options(("sensing=encoders", "graphics.rate=32"))
     with held("closed-loop", given) as place:
         for scale in (0.1, 1.0, 3.0):
-            place.stable(dict.fromkeys(("drift", "topology"), scale), SPRINGS[0])
-            whole = linearised(place._map, place._at.point)
-            radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (place._at, whole)]
+            period = place.period(dict.fromkeys(("drift", "topology"), scale))
+            whole = linearised(place.map, period.point)
+            radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (period.in_map, whole)]
             assert radii[0] == pytest.approx(radii[1], rel=1e-6)
 
 

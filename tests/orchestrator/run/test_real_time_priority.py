@@ -13,7 +13,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="sched(7) is of 
 
 
 def test_the_thread_has_the_priority_and_its_threads_do_not() -> None:
-    before = os.sched_getscheduler(0), os.sched_getaffinity(0)
+    before = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getaffinity(0)
     beside: list[int] = []
     with real_time_priority.raised() as got:
         own = os.sched_getscheduler(0)

@@ -19,7 +19,6 @@ from hapticlink.orchestrator.results.named_runs import named
 from hapticlink.orchestrator.results.scene_file import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, page, settings
-from hapticlink.visualization.figures.run_figures import figures as run_figures
 from tests.shared_fixtures import status
 
 pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
@@ -145,8 +144,9 @@ def test_dollar_signs_of_a_scene_are_no_formula(root: Path) -> None:
 def test_letters_that_no_font_has_are_replaced(root: Path) -> None:
     run = titled(root, "fast", "闭环 Механизм")
     assert "闭环" in page.page({"环": run})
-    title = run_figures(run)["mechanism"].axes[0].get_title()
-    assert title.startswith("\N{REPLACEMENT CHARACTER}\N{REPLACEMENT CHARACTER} Механизм at the")
+    legend = overlay.figures({"环 Механизм": run, "b": run})["distance"].axes[0].get_legend()
+    assert legend
+    assert legend.get_texts()[0].get_text() == "\N{REPLACEMENT CHARACTER} Механизм"
 
 
 @pytest.mark.parametrize(
