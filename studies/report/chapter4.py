@@ -85,4 +85,4 @@ def trace(axes: Any, results: Results) -> None:
 
 
 def _range(values: Vector) -> str:
-    return f"{values.min():.2g} to {values.max():.2g}"
+    return f"{values.min():.3g} to {values.max():.3g}"
