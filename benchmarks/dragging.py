@@ -32,7 +32,7 @@ NOTE = """() => {
   };
   stage.canvas.addEventListener("pointermove", (event) => {
     const held = [...stage.pulls.values()][0];
-    if (held?.sent === event.timeStamp) log.sent.push([...held.target, wall(event.timeStamp)]);
+    if (held?.sent >= event.timeStamp) log.sent.push([...held.target, wall(event.timeStamp)]);
   });
   const box = stage.canvas.getBoundingClientRect(), [x, y] = stage.toScreen(view.frame.x);
   return [box.left + x, box.top + y, stage.scale];
