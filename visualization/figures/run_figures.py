@@ -183,9 +183,10 @@ def _with(unit: str, value: float) -> str:
 def _arrow(results: Results, axes: Axes) -> None:
     """The largest force of the hand, where it acted."""
     acted = (found for window in results.windows() if (found := _largest(window)))
-    most, time, force, pose = max(acted, key=lambda each: each[0], default=(0.0, 0.0, None, None))
-    if not most > 0:
+    largest = max(acted, key=lambda each: each[0], default=None)
+    if largest is None or not largest[0] > 0:
         return
+    most, time, force, pose = largest
     _, color, _ = marks.FORCES["F_hand"]
     along = force / most * ARROW
     axes.annotate(
