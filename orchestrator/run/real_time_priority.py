@@ -12,7 +12,7 @@ import ctypes
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 PRIORITY = 20
@@ -24,48 +24,53 @@ _CURRENT, _FUTURE = 1, 2  # MCL_CURRENT, MCL_FUTURE of mlockall(2)
 @contextmanager
 def raised() -> Iterator[dict[str, str]]:
     """A context in which the calling thread has what the user may have of it. Gives what that is,
-    and for what was refused the reason: `scheduler`, `memory`, `core`."""
+    and for what was refused the reason: `scheduler`, `memory`, `core`. What the thread had before,
+    as under `chrt`, is not lowered, and is there again afterwards."""
     if sys.platform != "linux":
         yield {"scheduler": "normal: real-time priority is for Linux only"}
         return
-    cores = os.sched_getaffinity(0)
-    got = {"scheduler": _first_in_first_out(), "memory": _locked(), "core": _isolated()}
-    try:
-        yield got
-    finally:
-        os.sched_setaffinity(0, cores)
-        if got["memory"].startswith("locked"):
-            ctypes.CDLL(None).munlockall()
-        if got["scheduler"].startswith("SCHED_FIFO"):
-            # Only a privileged process may take the second flag back.
-            os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
+    with ExitStack() as undo:
+        yield {"scheduler": _scheduler(undo), "memory": _memory(undo), "core": _core(undo)}
 
 
-def _first_in_first_out() -> str:
+def _scheduler(undo: ExitStack) -> str:
+    policy, before = os.sched_getscheduler(0), os.sched_getparam(0)
+    if before.sched_priority >= PRIORITY:
+        return f"priority {before.sched_priority}, as it was before"
+    wanted = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
     try:
-        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-        os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, wanted, os.sched_param(PRIORITY))
     except PermissionError:
         return f"normal: no right to SCHED_FIFO (ulimit -r {PRIORITY})"
+    except OSError as error:
+        return f"normal: {error.strerror}"
+    # Only a privileged process may take the second flag back.
+    undo.callback(os.sched_setscheduler, 0, policy | os.SCHED_RESET_ON_FORK, before)
     return f"SCHED_FIFO {PRIORITY}"
 
 
-def _locked() -> str:
+def _memory(undo: ExitStack) -> str:
     import resource  # not on Windows
 
     unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
     # With a limit, memory that is asked for later would be refused once it is reached.
     wanted = _CURRENT | _FUTURE if unlimited or os.geteuid() == 0 else _CURRENT
-    if ctypes.CDLL(None, use_errno=True).mlockall(wanted):
+    library = ctypes.CDLL(None, use_errno=True)
+    if library.mlockall(wanted):
         return f"not locked: {os.strerror(ctypes.get_errno())} (ulimit -l unlimited)"
+    undo.callback(library.munlockall)
     return "locked"
 
 
-def _isolated() -> str:
+def _core(undo: ExitStack) -> str:
     """Move the thread to the first isolated core."""
     text = _ISOLATED.read_text().strip() if _ISOLATED.exists() else ""
     if not text:
         return "shared: none is isolated (isolcpus)"
-    core = int(text.replace("-", ",").split(",")[0])
-    os.sched_setaffinity(0, {core})
+    core, before = int(text.replace("-", ",").split(",")[0]), os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {core})
+    except OSError as error:  # a container may be kept from it
+        return f"shared: {core} is isolated, and cannot be had: {error.strerror}"
+    undo.callback(os.sched_setaffinity, 0, before)
     return f"{core}, isolated"

@@ -37,6 +37,27 @@ def test_a_missing_right_is_a_reason_and_no_error(monkeypatch: pytest.MonkeyPatc
     assert got["scheduler"] == "normal: no right to SCHED_FIFO (ulimit -r 20)"
 
 
+def test_a_higher_priority_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As under `chrt -f 50`."""
+    monkeypatch.setattr(os, "sched_getparam", lambda _: os.sched_param(50))
+    set_to: list[object] = []
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *given: set_to.append(given))
+    with real_time_priority.raised() as got:
+        assert got["scheduler"] == "priority 50, as it was before"
+    assert set_to == []
+
+
+def test_a_core_that_cannot_be_had_is_a_reason_and_no_error(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "isolated").write_text("1000\n")
+    monkeypatch.setattr(real_time_priority, "_ISOLATED", tmp_path / "isolated")
+    before = os.sched_getaffinity(0)
+    with real_time_priority.raised() as got:
+        assert os.sched_getaffinity(0) == before
+    assert got["core"].startswith("shared: 1000 is isolated, and cannot be had")
+
+
 def test_the_first_isolated_core_is_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     before = os.sched_getaffinity(0)
     core = min(before)
