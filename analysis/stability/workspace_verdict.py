@@ -89,8 +89,11 @@ class WorkspaceStability:
     def finding(self) -> str:
         """The verdict in one line."""
         poses = len({case.pose for case in self.cases})
-        count = f"{sum(not hand.free for hand in _hands(self.cases))} hands"
-        everywhere = f"in {count} and {poses} pose{'s' if poses > 1 else ''}"
+        held = {case.hand for case in self.cases if not case.free}
+        edge = {c.hand for c in self.cases if c.hand in held and c.verdict == "marginal"}
+        everywhere = f"in {len(held)} hands and {poses} pose{'s' if poses > 1 else ''}"
+        if edge:
+            everywhere += f", marginal in {len(edge)} of the hands"
         worst = self.worst
         if self.verdict == "unstable":
             return f"unstable: {_named(worst)}"
@@ -103,11 +106,11 @@ class WorkspaceStability:
                     f"not held: in free air it does not grow, nor come to rest; stable {everywhere}"
                 )
             does = "drifts" if loose.drifts else f"shows a growing {loose.kind}"
-            ends = f"about {self.damping:.2g} N.s/m of damping end that"
-            if self.damping is None or not math.isfinite(self.damping):
-                ends = "no damping that was tried ends that"
+            ends = "small motions decay with no damping that was tried"
+            if self.damping is not None and math.isfinite(self.damping):
+                ends = f"small motions decay with about {self.damping:.2g} N.s/m of damping"
             return (
-                f"not held: in free air it {does} at {loose.growth:.2g} 1/s, {ends}; "
+                f"not held: in free air it {does} at {loose.growth:.2g} 1/s, and {ends}; "
                 f"stable {everywhere}"
             )
         return f"stable {everywhere}; slowest to decay at {-worst.growth:.3g} 1/s, {_where(worst)}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -113,6 +114,10 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     assert found.remedy.stable
     options = dict(option.split("=", 1) for option in found.remedy.options)
     again = hl.stability("virtual-wall", beyond | options, poses=1)
+    edge = [replace(c, verdict="marginal") if not c.free else c for c in again.cases]
+    hands = len({c.hand for c in edge if not c.free})
+    assert f"marginal in {hands} of the hands" in replace(again, cases=tuple(edge)).finding
+    assert "marginal" not in again.finding or any(c.verdict == "marginal" for c in again.cases)
     assert again.in_hands == "stable"
     assert len(found.cases) >= len(HANDS)
 
